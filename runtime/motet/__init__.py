@@ -34,7 +34,7 @@ from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
 from motet.models.base import BundleModel, ControlModel
 from motet.models.compose import Composition, Met
-from motet.models.composition import Passage
+from motet.models.composition import Passage, Shown
 from motet.models.describe import DescribeModel, Description, Part
 from motet.models.fill import FillModel
 from motet.models.generate import Generated, GenerateModel, GenerateSettings, MixtureModel
@@ -60,11 +60,11 @@ __all__ = [
     "ControlWarning", "DecodingError", "DescribeModel", "Description", "Event", "FillModel", "FormatError",
     "GenerateModel", "GenerateSettings", "Generated", "Hit", "Humanoid", "Index", "Met", "MixtureModel", "Moment",
     "MotetError", "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession",
-    "Quantities", "ScriptError", "SearchModel", "SessionOptions", "SettingError", "SteerModel", "SteerSession",
-    "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning",
-    "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load",
-    "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo",
-    "write_live_page",
+    "Quantities", "ScriptError", "SearchModel", "SessionOptions", "SettingError", "Shown", "SteerModel",
+    "SteerSession", "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError",
+    "TextWarning", "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles",
+    "live_page", "load", "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write",
+    "write_demo", "write_live_page",
 ]
 # fmt: on
 

@@ -16,6 +16,7 @@ import pytest
 
 from motet.decode.acts import Act, ActSettings
 from motet.errors import ControlError, OutputError, TextError
+from motet.models.composition import Shown
 from motet.models.steer import SteerModel
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.pose import Pose
@@ -164,10 +165,13 @@ class Said:
         self.made = Act.of("wave", numbers.astype(np.float32), model.fps, model.settings(ActSettings))
 
     def act(self, sentence: str) -> Act:
+        return self.shown(sentence)[0]
+
+    def shown(self, sentence: str, strict: bool = False) -> tuple[Act, Shown]:
         if sentence != "wave":
             raise TextError(f"the model knows no word of {sentence!r}")
         time.sleep(0.05)
-        return self.made
+        return self.made, Shown("a person waves")
 
 
 def test_acts_are_told_in_words_and_what_is_not_known_is_said(steer_model: SteerModel) -> None:

@@ -120,6 +120,8 @@ def test_how_a_sentence_was_understood(client: TestClient) -> None:
         "confidence": found.confidence,
         "nearest": list(found.nearest),
         "confident": found.confident,
+        "action": found.nearest[0],
+        "lacking": ["juggling", "torches"],
     }
     assert not found.confident
     with pytest.raises(motet.TextError) as refused:

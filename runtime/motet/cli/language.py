@@ -229,8 +229,8 @@ def _written(
         motion = output.write(place, looped(motion) if loop else motion, text, captions)
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
-        told: dict[str, Any] = {"action": result.action or None, "lacking": list(result.lacking)}
-        told |= {"asked": dict(result.asked), "measured": dict(result.measured)}
+        shown = {"action": result.action or None, "lacking": result.lacking, "confidence": result.confidence}
+        told = {**shown, "asked": dict(result.asked), "measured": dict(result.measured)}
         found.append({"output": str(place), "log_likelihood": result.log_likelihood, **facts, **told, **passages})
     return {"input": text, "hypotheses": found}
 
@@ -247,13 +247,22 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
             score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
             yield f"{found['output']}: {size(found['frames'], found['fps'])}{score}: {row['input']}"
             if found["action"]:
-                yield f"  as: {found['action']}"
+                yield f"  as: {found['action']}{_sure(found)}"
             if found["action"] and (numbers := _numbers(found)):
                 yield f"  {numbers}"
             for passage in found.get("passages", ()):
                 numbers = "" if found["action"] else _numbers(passage)
-                shown = "" if found["action"] else f" (as: {passage['action']}{numbers and f'; {numbers}'})"
+                shown = (
+                    "" if found["action"] else f" (as: {passage['action']}{_sure(passage)}{numbers and f'; {numbers}'})"
+                )
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"
+
+
+def _sure(shown: Mapping[str, Any]) -> str:
+    """How sure the model is of what it shows, and the words that are left out."""
+    without = ", ".join(f"'{word}'" for word in shown["lacking"])
+    sure = "" if shown["confidence"] is None else f", confidence {shown['confidence']:.2f}"
+    return sure + (without and f", without {without}")
 
 
 def _numbers(found: Mapping[str, Any]) -> str:
@@ -303,6 +312,6 @@ def compose(
         return
     click.echo(f"{out}: {size(len(motion), motion.fps)}")
     for one in found.passages:
-        click.echo(f"  {one.start:.1f}-{one.stop:.1f} s {one.text} (as: {one.action})")
+        click.echo(f"  {one.start:.1f}-{one.stop:.1f} s {one.text} (as: {one.action}{_sure(vars(one))})")
     for each in found.met:
         click.echo(f"  {each}")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import ControlError, ControlWarning, MotetError, TextError, collected, quoted
+from motet.errors import ControlError, ControlWarning, MotetError, TextError, TextWarning, collected, each_once, quoted
 from motet.models.guided import LARGEST_COMMAND
 from motet.models.said_acts import SaidActs
 from motet.models.steer import SteerModel
@@ -59,10 +59,10 @@ class ClientSession:
         ProtocolError or ControlError for one that cannot be obeyed; nothing has changed then.
         """
         kind, given = parsed(text)
-        with collected(ControlWarning) as notes:
+        with collected(ControlWarning, TextWarning) as notes:
             unknown = self._obey(kind, given)
         self.heard += 1
-        return [*unknown, *map(str, notes)]
+        return [*unknown, *each_once(notes)]
 
     def _obey(self, kind: str, given: dict[str, Any]) -> list[str]:
         """Do what a message says; why an act is not known."""

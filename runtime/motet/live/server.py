@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
-from motet.errors import MotetError, OutputError, TextError
+from motet.errors import MotetError, OutputError, TextError, TextWarning, collected
 from motet.live import protocol
 from motet.live.protocol import LOCAL, ClientSession, ProtocolError
 from motet.models.generate import GenerateModel
@@ -189,7 +189,7 @@ class LiveClients:
         if (words := self.words) is None:
             return
         for sentence in protocol.sentences(text):
-            with suppress(TextError):  # of which the client is told
+            with suppress(TextError), collected(TextWarning):  # of which the client is told
                 await asyncio.to_thread(words.act, sentence)
 
     async def _tick(self, connection: Wire, client: ClientSession) -> None:

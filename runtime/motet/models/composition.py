@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
@@ -41,16 +42,31 @@ OWN = re.compile(
 """A part of the body, and what is done with it."""
 
 
+class Shown(NamedTuple):
+    """What a sentence is shown as: ``action``, ``lacking`` and ``confidence`` as for
+    :class:`motet.models.generate.Generated`."""
+
+    action: str = ""
+    lacking: tuple[str, ...] = ()
+    confidence: float | None = None
+
+    def left_out(self, sentence: str) -> str:
+        """What is said of a sentence of which words are left out."""
+        words = ", ".join(f"'{word}'" for word in self.lacking)
+        return f"{sentence!r} is read as {self.action!r}, which leaves out {words}"
+
+
 @dataclass(frozen=True)
 class Passage:
-    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action``, ``lacking``, ``asked`` and
-    ``measured`` as for :class:`motet.models.generate.Generated`."""
+    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action``, ``lacking``, ``confidence``,
+    ``asked`` and ``measured`` as for :class:`motet.models.generate.Generated`."""
 
     text: str
     start: float
     stop: float
     action: str = ""
     lacking: tuple[str, ...] = ()
+    confidence: float | None = None
     asked: Mapping[str, float] = field(default_factory=dict)
     measured: Mapping[str, float] = field(default_factory=dict)
 

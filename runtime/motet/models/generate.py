@@ -64,7 +64,9 @@ class Generated:
         None where the model's loop has no likelihoods.
     after: the motion that it continues; without one it starts at the origin.
     action: a sentence of the action that it shows, "" where a model knows none, or several are shown.
-    lacking: known words of its sentence that no sentence of that action has.
+    lacking: known words of its sentence that no sentence of that action has. confidence: from 0 to 1, how well the
+        model knows its sentence (:meth:`motet.models.generate_codes.CodesModel.understood`), or of several the one that
+        it knows least; None where a model cannot say.
     asked: what its sentence asks for in numbers (:mod:`motet.models.quantities`): degrees to the left, metres, steps,
         times, seconds, and a pace beside the usual; empty where several things are shown. measured: how much of each
         the motion has, as far as it can be said.
@@ -77,6 +79,7 @@ class Generated:
     after: Motion | None = None
     action: str = ""
     lacking: tuple[str, ...] = ()
+    confidence: float | None = None
     asked: Mapping[str, float] = field(default_factory=dict)
     measured: Mapping[str, float] = field(default_factory=dict)
 
@@ -152,7 +155,8 @@ class GenerateModel(LanguageModel):
         whole: take a sentence that asks for several things in a row (:meth:`parts`) as one; else each of its motions is
             a story of its parts, and seconds is what they last together.
         seed: sentence i uses seed + i (or seed[i]), and gets the same motions as alone with that seed.
-        strict: fail on unknown words instead of warning. progress: called with the number of sentences done and in all.
+        strict: refuse a sentence with unknown words, one that is outside the training data, and one of which the action
+            taken lacks a word; else a warning says so. progress: called with the number of sentences done and in all.
         settings: those of the model's loop (:mod:`motet.decode.loops`); None (the default) for the bundle's.
             temperature: of sampling: about the centres of a mixture's components, or of codes. max_seconds: a motion
             that has not ended by then is cut. Mixture models also take candidates: frames drawn by each hypothesis in a
@@ -221,12 +225,20 @@ class GenerateModel(LanguageModel):
             raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")
         return self.loop.settled(self.defaults, settings)
 
-    def check(self, sentence: str, whole: bool = False, numbers: bool = True) -> None:
-        """TextError where the model does not know all of a sentence, or of its parts; see :meth:`note`."""
+    def check(self, sentence: str, whole: bool = False, numbers: bool = True, lacking: bool = True) -> None:
+        """TextError where the model does not know all of a sentence, or of its parts; see :meth:`note`.
+
+        lacking: and where the action that it is read as leaves out a word (:meth:`check_whole`).
+        """
         with collected(TextWarning):
             for said in [sentence] if whole else self.parts(sentence):
                 part = self.quantities(said).text if numbers else said
                 self.note(part, self.embed(part), strict=True)
+                if lacking:
+                    self.check_whole(part)
+
+    def check_whole(self, sentence: str) -> None:
+        """TextError where the action that a sentence is read as leaves out a word of it, if the model knows actions."""
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """Warn where the model knows a sentence with this context (C,) only in part, beyond its unknown words.

@@ -22,7 +22,17 @@ from motet.decode.memory import Memory
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
 from motet.models.amounts import Seen, short
 from motet.models.compose import Composition, compose
-from motet.models.composition import FUNCTION_WORDS, OWN, Passage, at_odds, parts_of, sentences_of, stem, verbs_of
+from motet.models.composition import (
+    FUNCTION_WORDS,
+    OWN,
+    Passage,
+    Shown,
+    at_odds,
+    parts_of,
+    sentences_of,
+    stem,
+    verbs_of,
+)
 from motet.models.generate import Generated, GenerateModel, LoopSettings
 from motet.models.plans import Moment
 from motet.models.quantities import PACES, Quantities, known_turns, quantities_of
@@ -36,6 +46,9 @@ from motet.settings import Range, Seed, Settings
 
 DONE = re.compile(r"(?:ing|ed|[^s]s)$")
 """The ending of a word for what is done."""
+
+NEVER = -1e9
+"""Log-probability of an action that is not drawn."""
 
 Stand = Literal["start", "end", "both"]
 """Where a figure stands briefly."""
@@ -182,8 +195,12 @@ class CodesModel(GenerateModel):
         of what a common word is near to; by default of the likeliest action."""
         ids, _ = self.vocabulary.encode(sentence)
         have = self._stems[int(self.contexts([ids])[0].argmax()) if action is None else action]
+        return [word for word, forms in self._content(sentence).items() if have.isdisjoint(forms)]
+
+    def _content(self, sentence: str) -> dict[str, frozenset[str]]:
+        """The known words of a sentence in their order, but for function words, and the stems that show each."""
         words = set(map(self.vocabulary.meant, self.vocabulary.rules.words(sentence))) - FUNCTION_WORDS - {""}
-        return sorted(one for one in words if have.isdisjoint({stem(one), stem(self.vocabulary.near(one))}))
+        return {word: frozenset((stem(word), stem(self.vocabulary.near(word)))) for word in sorted(words)}
 
     def _composed(self, sentence: str, numbers: bool, whole: bool, settings: Mapping[str, float | None]) -> bool:
         seconds, told = self._settled(settings)["seconds"], super()._composed(sentence, numbers, whole, settings)
@@ -199,9 +216,13 @@ class CodesModel(GenerateModel):
         seeds = [seed, *np.random.SeedSequence(seed).generate_state(count - 1).tolist()]
         return [self.story(sentence, **cast(StorySettings, {**own, "seed": one, "strict": strict})) for one in seeds]
 
-    def understood(self, sentence: str) -> Understood:
-        """How well a sentence is known, and the nearest known sentences; errors like :meth:`ids`."""
-        return self._understood(sentence, self.embed(sentence))
+    def understood(self, sentence: str, numbers: bool = True) -> Understood:
+        """How well a sentence is known, and the nearest known sentences; errors like :meth:`ids`.
+
+        numbers: of what it is taken for without its numbers (:meth:`quantities`), as :meth:`generate` shows them.
+        """
+        text = self.quantities(sentence).text if numbers else sentence
+        return self._understood(text, self.embed(text))
 
     def _understood(self, sentence: str, context: Floats) -> Understood:
         asked, unheard = set(self.vocabulary.rules.words(sentence)), math.log(1 + len(self._sentences))
@@ -224,7 +245,7 @@ class CodesModel(GenerateModel):
         for verb in OWN.findall(self.vocabulary.rules.normalise(sentence)):
             if stem(verb) in nouns:
                 shown = self._sentences[likeliest]
-                warn(f"{verb!r} is nothing that is done in {shown!r} (in {sentence!r})", TextWarning)
+                warn(f"{shown!r} has no action {verb!r} (in {sentence!r})", TextWarning)
         found = self._understood(sentence, context)
         if found.confident:
             return
@@ -238,15 +259,44 @@ class CodesModel(GenerateModel):
         """See :meth:`GenerateModel.results`."""
         told = {action: self._shown(sentence, action) for one in samples if (action := one.action) is not None}
         found = zip(super().results(sentence, samples), samples, strict=True)
-        return [replace(one, action=told[own][0], lacking=told[own][1]) for one, (*_, own) in found if own is not None]
+        return [replace(one, **told[own]._asdict()) for one, (*_, own) in found if own is not None]
 
-    def _shown(self, sentence: str, action: int) -> tuple[str, tuple[str, ...]]:
-        """A sentence of the action taken for a sentence, and the words that it lacks, of which a TextWarning says."""
-        taken, lacking = self._sentences[action], tuple(self.lacking(sentence, action))
-        if lacking:
-            words = ", ".join(f"'{word}'" for word in lacking)
-            warn(f"nothing of {words} in what {sentence!r} is taken for: {taken!r}", TextWarning)
-        return taken, lacking
+    def _shown(self, sentence: str, action: int) -> Shown:
+        """What a sentence is shown as by an action; a TextWarning names the words that are left out."""
+        shown = self._shown_as(sentence, action)
+        if shown.lacking:
+            warn(shown.left_out(sentence), TextWarning)
+        return shown
+
+    def likeliest(self, sentence: str) -> Shown:
+        """What a sentence is shown as by its likeliest action; motions that are drawn may show another likely one.
+        Errors like :meth:`ids`, without warnings."""
+        return self._shown_as(self.quantities(sentence).text)
+
+    def _shown_as(self, sentence: str, action: int | None = None) -> Shown:
+        """What a sentence is shown as by an action, by default by the likeliest."""
+        context = self.contexts([self.vocabulary.encode(sentence)[0]])[0]
+        taken = int(context.argmax()) if action is None else action
+        confidence = self._understood(sentence, context).confidence
+        return Shown(self._sentences[taken], tuple(self.lacking(sentence, taken)), confidence)
+
+    def check_whole(self, sentence: str) -> None:
+        """See :meth:`GenerateModel.check_whole`."""
+        shown = self._shown_as(sentence)
+        if shown.lacking:
+            raise TextError(shown.left_out(sentence))
+
+    def asked(
+        self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
+    ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
+        """See :meth:`GenerateModel.asked`; strict: of each sentence only actions that leave out no word are drawn."""
+        contexts, noise, chosen = super().asked(texts, rows, seed, strict, settings)
+        if strict:
+            for text, context in zip(texts, contexts, strict=True):
+                self.check_whole(text)
+                words = self._content(text).values()
+                context[[any(have.isdisjoint(forms) for forms in words) for have in self._stems]] = NEVER
+        return contexts, noise, chosen
 
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
         """See :meth:`GenerateModel.decode`."""
@@ -282,13 +332,14 @@ class CodesModel(GenerateModel):
         )
         unknown = tuple(word for part in parts for word in self.unknown(part.asked.text))
         lacking = tuple(word for one in passages for word in one.lacking)
+        confidence = min(one.confidence or 0.0 for one in passages)
         only = passages[0] if len(passages) == 1 else Passage("", 0, 0)
-        told = (only.action, lacking, only.asked, only.measured)
+        told = (only.action, lacking, confidence, only.asked, only.measured)
         return Story(self.contract, frames, None, unknown, after, *told, passages=passages)
 
     def _passage(self, part: Part, action: int, frames: Array, start: float, stop: float) -> Passage:
         """What is said of the frames (T, D) that show a part; a TextWarning tells numbers that are not met."""
-        taken, lacking = self._shown(part.asked.text, action)
+        shown = self._shown(part.asked.text, action)
         asked: dict[str, float] = {kind: value for kind, value in part.asked.amounts.items()}  # noqa: C416
         seen = Seen.of(self.contract, frames) if asked and len(frames) else None
         found = [(kind, seen.measured(kind, part.asked.act)) for kind in part.asked.amounts] if seen else []
@@ -297,7 +348,7 @@ class CodesModel(GenerateModel):
             warn(f"{part.text!r} asks for {asked[kind]:g} {kind}, which are not counted in what is shown", TextWarning)
         for kind in short(asked, measured, part.asked.either):
             warn(f"{part.text!r} asks for {asked[kind]:g} {kind}; shown: {measured[kind]:.3g}", TextWarning)
-        return Passage(part.text, start, stop, taken, lacking, asked, measured)
+        return Passage(part.text, start, stop, *shown, asked, measured)
 
     def compose(
         self, moments: Sequence[Moment], *, steer: SteerModel | None = None, seed: int = 0, strict: bool = False

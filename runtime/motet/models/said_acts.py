@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING
 
 from motet.decode.acts import Act
-from motet.errors import TextError, TextWarning, collected
+from motet.errors import TextError, TextWarning, collected, each_once, warn
+from motet.models.composition import Shown
 from motet.models.generate import GenerateModel
 
 if TYPE_CHECKING:
@@ -22,27 +23,41 @@ class SaidActs:
 
     def __init__(self, model: "SteerModel", words: GenerateModel) -> None:
         self.model, self.words = model, words
-        self._made: dict[str, Act] = {}
+        self._made: dict[str, tuple[Act, Shown, list[str]]] = {}
 
     def act(self, sentence: str) -> Act:
-        """The act of a sentence, such as "wave" or "sit down"; TextError for one that the model does not know."""
+        """The act of a sentence, such as "wave" or "sit down"; TextError for one that the model does not know. A
+        TextWarning says what it leaves out, each time."""
+        return self.shown(sentence)[0]
+
+    def shown(self, sentence: str, strict: bool = False) -> tuple[Act, Shown]:
+        """The act of a sentence, and what that is shown as; errors and warnings like :meth:`act`.
+
+        strict: TextError for a sentence of which the action leaves out a word.
+        """
+        if strict:
+            self.words.check(self._known(sentence))
         if sentence not in self._made:
-            with collected(TextWarning):  # of a sentence that was checked
-                (found,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
+            with collected(TextWarning) as notes:
+                (made,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
             if len(self._made) >= KEPT:
                 del self._made[next(iter(self._made))]
-            self._made[sentence] = self.model.act_of(found.motion, sentence)
-        return self._made[sentence]
+            act = self.model.act_of(made.motion, sentence)
+            self._made[sentence] = act, Shown(made.action, made.lacking, made.confidence), each_once(notes)
+        act, shown, said = self._made[sentence]
+        for text in said:
+            warn(text, TextWarning)
+        return act, shown
 
     def _known(self, sentence: str) -> str:
         """A sentence that the model knows: itself, or what a person does who is told it."""
         self.words.vocabulary.encode(sentence)  # an order without words is none, though "a person" is known
         try:
-            self.words.check(sentence)
+            self.words.check(sentence, lacking=False)
         except TextError:
             told = _of_a_person(sentence)
             try:
-                self.words.check(told)
+                self.words.check(told, lacking=False)
             except TextError:
                 told = ""
             if not told:

@@ -107,7 +107,7 @@ class SteerModel(ControlModel):
         start: a gait, by default the first; or a motion of any human figure. places: (characters, 3) x and z in metres
             and facing in degrees; by default all are at the origin and face z.
         hold_feet: keep planted feet in place, by turning hips and knees. strict: refuse a speed outside a gait's range,
-            instead of clamping it.
+            instead of clamping it, and acts in words of which a word is left out.
         phases: a whole number for all or for each, from 0, less than the ``search_every`` of the bundle's settings: the
             ticks until its first search of the table. From then on it searches in its turn alone, every
             ``search_every`` ticks, and what it is told waits for that. By default the phases of 32 characters or more

@@ -14,6 +14,7 @@ from motet.decode.matching import Playback, Rows
 from motet.decode.standing import Standing
 from motet.decode.steering import tick
 from motet.errors import ControlError, ControlWarning, warn
+from motet.models.composition import Shown
 from motet.models.gaits import Command
 from motet.models.guided import Guidance, Guided, Who
 from motet.models.leading import led, speed_of
@@ -202,7 +203,7 @@ class SteerSession(Guided):
             self._command = replace(told, direction=direction, facing=facing)
             self._target = np.where(who[:, None], np.insert(np.zeros((len(who), 2)), 2, facing, axis=1), self._target)
 
-    def act(self, what: Doing | Sequence[Doing], *, who: Who = None, upper: bool | None = None) -> None:
+    def act(self, what: Doing | Sequence[Doing], *, who: Who = None, upper: bool | None = None) -> list[Shown]:
         """Do something, from the next tick on, in place of what is being done.
 
         what: a motion of any human figure, without what it rests at both ends; an act, which
@@ -213,35 +214,40 @@ class SteerSession(Guided):
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
             the ground. By default by the whole body where a character stands, whose legs go once it is told to; or
             where the act is one of the legs, such as a kick, after which a character that moves goes on.
-        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not
-        know, ControlError for a motion of less than three ticks, for characters that are not there, and for a sentence
-        without ``words``; nothing changes then.
+        Returns what each sentence is shown as, and warns (TextWarning) of words that are left out.
+        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not know,
+        or of which a word is left out if the session is strict, ControlError for a motion of less than three ticks, for
+        characters that are not there, and for a sentence without ``words``; nothing changes then.
         """
         characters = self._who(who).tolist()
         each = [what] * len(characters) if isinstance(what, Doing) else list(what)
         if len(each) != len(characters):
             raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
-        made = {id(one): self._acts_of(one) for one in each}
+        shown: list[Shown] = []
+        made = {id(one): self._acts_of(one, shown) for one in each}
         for i, one in zip(characters, each, strict=True):
             acts, chosen = made[id(one)], max if self._target[i, :2].any() else min
             self._acting.asked[i] = (chosen(acts, key=lambda act: act.reach) if acts else None, upper)
+        return shown
 
-    def _acts_of(self, what: Doing) -> tuple[Act, ...]:
-        """The acts that are meant, of which a character does one."""
+    def _acts_of(self, what: Doing, shown: list[Shown]) -> tuple[Act, ...]:
+        """The acts that are meant, of which a character does one; what a sentence is shown as is added to a list."""
         if what is None:
             return ()
         if isinstance(what, str) and what in self.model.takes:
             return self.model.takes[what]
-        return (self._act_of(what),)
+        return (self._act_of(what, shown),)
 
-    def _act_of(self, what: Motion | Act | str) -> Act:
+    def _act_of(self, what: Motion | Act | str, shown: list[Shown]) -> Act:
         if isinstance(what, Act):
             return what
         if isinstance(what, Motion):
             return self.model.act_of(what)
         if self._words is None:
             raise ControlError("an act in words needs a model that makes it: start(words=motet.load('generate'))")
-        return self._words.act(what)
+        act, said = self._words.shown(what, self.strict)
+        shown.append(said)
+        return act
 
     @property
     def acting(self) -> list[tuple[str, float] | None]:

@@ -13,6 +13,7 @@ import numpy as np
 from motet.draw.page import Captions
 from motet.errors import TextWarning, TravelWarning, collected
 from motet.formats import ONTO, Character
+from motet.models.composition import Passage, Shown
 from motet.models.describe import DescribeModel, Description
 from motet.models.generate import PLAYED, Generated
 from motet.models.generate_codes import CodesModel, Story
@@ -95,7 +96,8 @@ class Answers:
         texts, settings = await _in(self._threads, self._told, asked, True)
         settings |= await self._after(asked)
         pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
-        understood = await _in(self._models, self._understood, texts, asked)
+        parts = [part for text in texts for part in self._parts(text, asked)]
+        understood = await _in(self._models, lambda: [self._read_as(part) for part in parts])
         piece = await _in(self._models, next, pieces, None)
 
         async def lines() -> AsyncIterator[bytes]:
@@ -144,17 +146,20 @@ class Answers:
         """What a text asks for one after another."""
         return [text] if asked.settings.get("whole") else self._writer.parts(text)
 
-    def _understood(self, texts: list[str], asked: Asked) -> list[dict[str, Any]]:
-        parts = [part for text in texts for part in self._parts(text, asked)]
-        return [{"text": part, **asdict(self._writer.understood(part))} for part in parts]
+    def _read_as(self, text: str, shown: Shown | Generated | Passage | None = None) -> dict[str, Any]:
+        """How a sentence was understood: as what it is shown, or will likely be."""
+        shown = shown or self._writer.likeliest(text)
+        known = asdict(self._writer.understood(text))
+        return {"text": text, **known, "action": shown.action, "lacking": list(shown.lacking)}
 
     def _shown(self, result: Generated, texts: list[str], asked: Asked, form: str) -> tuple[Motion, Order]:
         """What was drawn, and how it is to be given, like ``motet generate`` writes it."""
         motion = result.playable(asked.settings.get("fps", PLAYED), not asked.settings.get("no_plant", False))
         motion = looped(motion) if asked.settings.get("loop") else motion
-        passages = [asdict(one) for one in result.passages] if isinstance(result, Story) else []
-        captions = [(one["start"], one["text"]) for one in passages] or None
-        understood = self._understood(texts, asked)
+        shown = result.passages if isinstance(result, Story) else ()
+        passages = [asdict(one) for one in shown]
+        captions = [(one.start, one.text) for one in shown] or None
+        understood = [self._read_as(one.text, one) for one in shown] or [self._read_as(texts[0], result)]
         said = {"understood": understood, "unknown": result.unknown, "passages": passages}
         return motion, order_of(asked, form, " / ".join(texts), captions, said)
 

@@ -180,6 +180,9 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         said = [("seed", "info", f"drawn with the seed {seed}")]
         for text in dict.fromkeys(getattr(segment, "prompt", IDLE) for segment in request.segments):
             found, unknown = self.model.understood(text), self.model.unknown(text)
+            shown = self.model.likeliest(text)
+            if shown.lacking:
+                said.append(("left_out", "warning", shown.left_out(text)))
             if unknown:
                 said.append(("unknown_words", "warning", f"{text!r}: unknown words: {', '.join(unknown)}"))
             if not found.confident:

@@ -20,6 +20,8 @@ export interface GenerateSettings extends Partial<Drawing> {
   max_seconds?: number;
   /** Take a text that asks for several things in a row as one; else it is a story of its parts. */
   whole?: boolean;
+  /** Refuse a text that is outside the training data, or of which a word is unknown or left out. */
+  strict?: boolean;
 }
 
 /** How a story is drawn: by default as the bundle says. */
@@ -30,6 +32,8 @@ export interface StorySettings extends Partial<Drawing> {
   max_seconds?: number;
   /** Take a text that asks for several things in a row as one; else its parts are passages, each of the same length. */
   whole?: boolean;
+  /** Refuse texts like `GenerateSettings.strict`. */
+  strict?: boolean;
   /** Where the figure is to stand briefly. */
   stand?: "start" | "end" | "both";
   /** The frames (T, D) that the story continues, such as those of an earlier one. */
@@ -42,6 +46,8 @@ export interface Shown {
   action: string;
   /** Known words of the text that no sentence of that action has; the console is warned of them. */
   lacking: string[];
+  /** From 0 to 1, how well the model knows the text: see `understood`; of several sentences the one that it knows least. */
+  confidence: number;
 }
 
 /** A motion that was drawn: frames (T, D) of `root_sixd`, those that Python draws with the same seed, before feet are held. */
@@ -71,6 +77,7 @@ export interface Understood {
 /** Sentences of a story, for each its seconds (0 where it ends by itself), whether they are whole, how it is drawn. */
 interface Told {
   whole: boolean;
+  strict: boolean;
   texts: string[];
   seconds: number[];
   longest: number;
@@ -88,6 +95,14 @@ interface Piece {
 }
 
 const STANDING = { text: "a person stands still", seconds: 0.8 };
+
+/** Log-probability of an action that is not drawn. */
+const NEVER = -1e9;
+
+/** What is said of a sentence whose action lacks words of it. */
+function leftOut(sentence: string, { action, lacking }: Shown): string {
+  return `'${sentence}' is read as '${action}', which leaves out ${lacking.map((word) => `'${word}'`).join(", ")}`;
+}
 
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
@@ -142,11 +157,29 @@ export class GenerateModel extends LanguageModel {
   }
 
   /** What a sentence is taken for. */
-  private shown(sentence: string, action: number): Shown {
-    const [taken, lacking] = [this.manifest.actions![action]!.sentence, this.lacking(sentence, action)];
-    const words = lacking.map((word) => `'${word}'`).join(", ");
-    if (lacking.length) console.warn(`nothing of ${words} in what '${sentence}' is taken for: '${taken}'`);
-    return { action: taken, lacking };
+  private shown(sentence: string, action: number, context: Float32Array): Shown {
+    const shown = this.shownAs(sentence, action, context);
+    if (shown.lacking.length) console.warn(leftOut(sentence, shown));
+    return shown;
+  }
+
+  private shownAs(sentence: string, action: number, context: Float32Array): Shown {
+    const taken = this.manifest.actions![action]!.sentence;
+    return { action: taken, lacking: this.lacking(sentence, action), confidence: this.known(sentence, context).confidence };
+  }
+
+  /** The context of a sentence; strict: without the actions that leave out a word. TextError for what is refused then. */
+  private async asked(sentence: string, strict = false): Promise<Float32Array> {
+    const context = await this.context(sentence);
+    if (!strict) return context;
+    const { unknown } = this.vocabulary.encode(sentence);
+    if (unknown.length) throw new TextError(`the model does not know ${unknown.join(", ")} (in '${sentence}')`);
+    const { confidence, confident, nearest } = this.known(sentence, context);
+    const near = nearest.map((one) => `'${one}'`).join(", ");
+    if (!confident) throw new TextError(`'${sentence}' is outside the training data (confidence ${confidence.toFixed(2)}); nearest: ${near}`);
+    const shown = this.shownAs(sentence, context.indexOf(Math.max(...context)), context);
+    if (shown.lacking.length) throw new TextError(leftOut(sentence, shown));
+    return context.map((value, action) => (this.lacking(sentence, action).length ? NEVER : value));
   }
 
   /** The same by noise that is given for each motion. */
@@ -154,10 +187,10 @@ export class GenerateModel extends LanguageModel {
     const drawing = this.drawing(given);
     const seconds = given.seconds === undefined ? 0 : this.setting("seconds", given.seconds);
     const longest = Math.max(1, this.steps(seconds || this.setting("max_seconds", given.max_seconds)));
-    const context = await this.context(text);
+    const context = await this.asked(text, given.strict);
     const actions = noise.map((one) => drawnAction(this.source, context, one, drawing.certainty));
     const codes = await drawCodes(new Writer(this.source, noise, drawing), actions, longest, seconds > 0);
-    const shown = new Map([...new Set(actions)].map((action) => [action, this.shown(text, action)]));
+    const shown = new Map([...new Set(actions)].map((action) => [action, this.shown(text, action, context)]));
     const motions: Generated[] = [];
     for (const [at, one] of codes.entries()) {
       const frames = await new StreamingDecoder(this.codec).push(one, true);
@@ -186,7 +219,8 @@ export class GenerateModel extends LanguageModel {
       return passage;
     });
     const action = passages.length > 1 ? "" : passages[0]!.action;
-    return { frames, action, lacking: passages.flatMap((one) => one.lacking), passages };
+    const confidence = Math.min(...passages.map((one) => one.confidence));
+    return { frames, action, lacking: passages.flatMap((one) => one.lacking), confidence, passages };
   }
 
   /** The frames of `story` in pieces, as they are drawn; what cannot be told is refused before the first one. */
@@ -200,7 +234,10 @@ export class GenerateModel extends LanguageModel {
 
   /** How well a sentence is known, and the nearest known sentences: docs/bundle.md, the loop `codes`. */
   async understood(text: string): Promise<Understood> {
-    const context = await this.context(text);
+    return this.known(text, await this.context(text));
+  }
+
+  private known(text: string, context: Float32Array): Understood {
     const actions = this.manifest.actions!;
     const said = new Map<string, number>();
     for (const { words } of actions) for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
@@ -250,26 +287,28 @@ export class GenerateModel extends LanguageModel {
     }
     texts.forEach((text) => this.words(text));
     const longest = this.steps(this.setting("max_seconds", given.max_seconds));
-    return { texts, seconds, whole: given.whole ?? false, longest, drawing: this.drawing(given), noise: new Pcg64(this.setting("seed", given.seed ?? 0)) };
+    return { texts, seconds, whole: given.whole ?? false, strict: given.strict ?? false, longest, drawing: this.drawing(given), noise: new Pcg64(this.setting("seed", given.seed ?? 0)) };
   }
 
   /** The story with the parts of its sentences as passages. */
   private async parted(told: Told): Promise<Told> {
-    if (told.whole) return told;
-    const parts = await Promise.all(told.texts.map((text) => this.parts(text)));
-    return { ...told, texts: parts.flat(), seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)) };
+    const parts = told.whole ? told.texts.map((text) => [text]) : await Promise.all(told.texts.map((text) => this.parts(text)));
+    const texts = parts.flat();
+    if (told.strict) for (const text of texts) await this.asked(text, true); // refused before anything is drawn
+    return { ...told, texts, seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)) };
   }
 
   /** What each sentence is shown as, then for each step of codes the frames that become final with it; at last the remaining frames. */
-  private async *pieces({ texts, seconds, longest, drawing, noise }: Told, after?: Frames): AsyncGenerator<Piece, void> {
+  private async *pieces({ texts, strict, seconds, longest, drawing, noise }: Told, after?: Frames): AsyncGenerator<Piece, void> {
     const writer = new Writer(this.source, [noise], drawing);
     const before = after && (await this.continued(after));
     if (before) await writer.see(before.codes);
     const decoder = new StreamingDecoder(this.codec, before);
     let [done, given, end, limit] = [0, 0, 0, Infinity];
     for (const [sentence, text] of texts.entries()) {
-      const action = drawnAction(this.source, await this.context(text), noise, drawing.certainty);
-      yield { sentence, shown: this.shown(text, action), frames: [], steps: 0 };
+      const context = await this.asked(text, strict);
+      const action = drawnAction(this.source, context, noise, drawing.certainty);
+      yield { sentence, shown: this.shown(text, action, context), frames: [], steps: 0 };
       const length = seconds[sentence]!;
       end += length;
       limit = length ? Math.max(1, Math.round(end * this.fps)) : Infinity;

@@ -124,7 +124,10 @@ async function taken(read: Read): Promise<void> {
     for (const [text, wanted] of Object.entries(python.taken)) {
       const found = await model.generate(text, { hypotheses: 2, seed: 1, seconds: 1 });
       const own = found.flatMap((one) => [one, ...("passages" in one ? one.passages : [])]);
-      equal(own.map(({ action, lacking }) => [action, lacking]), wanted, text);
+      equal(own.map(({ action, lacking }) => [action, lacking]), wanted.map(([action, lacking]) => [action, lacking]), text);
+      close(own.map((one) => one.confidence), wanted.map((one) => one[2]), text);
+      const refused = await model.generate(text, { seconds: 1, strict: true }).then(() => "", String);
+      equal(refused.includes(", which leaves out '"), own.some((one) => one.lacking.length > 0), `${text}: ${refused}`);
     }
   } finally {
     console.warn = warn;

@@ -30,13 +30,15 @@ const { acts } = JSON.parse(await readFile("../motet/live/repertoire.json", "utf
 const phrases = new Phrases(acts);
 
 test("sentences find the acts that are said so, and nothing else", () => {
-  const found = (text: string) => acts[phrases.find(text)]?.sentence ?? "?";
+  const found = (text: string) => acts[phrases.find(text).at]?.sentence ?? "?";
   const wanted = {
     wave: "waves vehicles", kick: "kick", "sit down": "takes a seat", bow: "bows", "do a cartwheel": "cartwheel", jump: "jump",
     "a person is boxing": "box", "drink something": "drink", "dance, please": "danc", "laugh out loud": "laugh", kik: "kick",
     "kick with the left leg": "left", "punch with the right hand": "right", "crouch": "crouch",
   };
   for (const [text, part] of Object.entries(wanted)) assert.ok(found(text).includes(part), `${text}: ${found(text)}`);
+  assert.deepEqual(phrases.find("wave").lacking, []);
+  assert.deepEqual(phrases.find("kick the ball with the left leg").lacking, ["left"]);
   for (const text of ["play the violin", "fly to the moon", "", "the a of", "paint a house"]) assert.equal(found(text), "?", text);
 });
 

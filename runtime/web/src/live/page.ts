@@ -93,7 +93,8 @@ export class Page {
     const found = this.repertoire.find(text);
     if (!found) return `? It knows ${KNOWN}: type ${this.repertoire.names[0]}, or choose from the list.`;
     this.act(found.act, found.arms, saysAll(text));
-    return found.act.name;
+    const without = found.lacking.map((word) => `'${word}'`).join(", ");
+    return found.act.name + (without && `, without ${without} (confidence ${found.confidence.toFixed(2)})`);
   }
 
   /** Take what was dropped; what is to be said of it. */

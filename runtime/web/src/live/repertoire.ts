@@ -39,10 +39,10 @@ export class Repertoire {
     return new Repertoire(model, given.acts, numbers.map((value) => value / given.steps));
   }
 
-  /** The act that a sentence asks for, and whether the arms do it alone; null for one that none of them is. */
-  find(text: string): { act: Act; arms: boolean } | null {
-    const at = this.phrases.find(text);
-    return at < 0 ? null : { act: this.act(at), arms: this.entries[at]!.arms };
+  /** The act that a sentence asks for, whether the arms do it alone, the words that it leaves out, and how much it has, from 0 to 1; null for a sentence that none is. */
+  find(text: string): { act: Act; arms: boolean; lacking: string[]; confidence: number } | null {
+    const { at, ...shown } = this.phrases.find(text);
+    return at < 0 ? null : { act: this.act(at), arms: this.entries[at]!.arms, ...shown };
   }
 
   /** What to type for each: its sentence without who does it. */

@@ -60,16 +60,18 @@ export class Phrases {
     this.known = [...new Set(phrases.flatMap(({ sentence, words }) => [...wordsOf(sentence), ...words]))];
   }
 
-  /** The number of the phrase; -1 if none has enough of what is said. */
-  find(text: string): number {
-    const asked = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word)).map((word) => this.read(word));
+  /** The number of the phrase, -1 if none has enough of what is said; the words that it leaves out; how much it has, by their weight. */
+  find(text: string): { at: number; lacking: string[]; confidence: number } {
+    const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word));
+    const asked = words.map((word) => this.read(word));
     const all = asked.reduce((sum, word) => sum + this.weight(word), 0);
     const scores = this.stems.map((own, at) => {
       const shared = asked.reduce((sum, word) => sum + (own.has(word) ? this.weight(word) : 0), 0);
       return { at, share: all ? shared / all : 0, ...this.own(at, asked) };
     });
     const [best] = scores.sort((a, b) => b.share - a.share || b.said - a.said || a.rest - b.rest || a.at - b.at);
-    return best && best.share >= ENOUGH ? best.at : -1;
+    if (!best || best.share < ENOUGH) return { at: -1, lacking: words, confidence: best?.share ?? 0 };
+    return { at: best.at, lacking: words.filter((_, i) => !this.stems[best.at]!.has(asked[i]!)), confidence: best.share };
   }
 
   /** The stem of a word, or of the known one that it is a misspelling of. */
