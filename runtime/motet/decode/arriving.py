@@ -41,8 +41,8 @@ STANDS = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Paths of B figures laid end to end. points: (P, 2). along: (P,) metres to each, in all. first: (B + 1,) where
-    the paths begin."""
+    """Paths of B figures laid end to end. points: (P, 2). along: (P,) metres to each from where its path
+    begins. first: (B + 1,) where the paths begin."""
 
     points: Array
     along: Array
@@ -55,12 +55,13 @@ class Paths:
         first = np.cumsum([0, *map(len, paths)])
         steps = np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T)
         steps[first[:-1]] = 0.0
-        return Paths(points, np.cumsum(steps), first)
+        along = [np.cumsum(part) for part in np.split(steps, first[1:-1])]  # rounded as it would be alone
+        return Paths(points, np.concatenate(along), first)
 
     @property
     def lengths(self) -> Array:
         """Metres of each path (B,)."""
-        found: Array = self.along[self.first[1:] - 1] - self.along[self.first[:-1]]
+        found: Array = self.along[self.first[1:] - 1]
         return found
 
     @property
@@ -71,11 +72,15 @@ class Paths:
 
     def at(self, gone: Array) -> Array:
         """The points (B, 2) of the paths that are so many metres from their beginnings (B,)."""
-        first, last = self.first[:-1], self.first[1:] - 1
-        along = self.along[first] + gone
-        after = np.searchsorted(self.along, along, side="right").clip(first + 1, last)
+        # the first point after so many metres, by halving what lies between two others
+        after, last = self.first[:-1] + 1, self.first[1:] - 1
+        while (after < last).any():
+            middle = (after + last) // 2
+            beyond = self.along[middle] > gone
+            after = np.where(beyond, after, np.minimum(middle + 1, last))
+            last = np.where(beyond, middle, last)
         start, stop = self.along[after - 1], self.along[after]
-        part = ((along - start) / np.maximum(stop - start, 1e-9)).clip(0, 1)[:, None]
+        part = ((gone - start) / np.maximum(stop - start, 1e-9)).clip(0, 1)[:, None]
         found: Array = self.points[after - 1] + part * (self.points[after] - self.points[after - 1])
         return found
 

@@ -59,17 +59,17 @@ LEAST = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """Of B figures; replaced, never written into. ticks: since the session's start. share, rate: (B,) how far they have
+    """Of B figures; replaced, never written into. ticks: (B,) since each began. share, rate: (B,) how far they have
     come to rest, from 0 to 1, and how fast that changes."""
 
-    ticks: int
+    ticks: Rows
     share: Array
     rate: Array
 
     @staticmethod
     def none(figures: int) -> "Standing":
         """Of figures that have not yet stood."""
-        return Standing(0, np.zeros(figures), np.zeros(figures))
+        return Standing(np.zeros(figures, dtype=np.int64), np.zeros(figures), np.zeros(figures))
 
     def kept(
         self,
@@ -99,7 +99,8 @@ class Standing:
         if not len(who):
             return pose
         x, z, _ = parts(pose.ground[who])
-        wave = 2 * np.pi * (self.ticks * dt / PERIOD % 1) + WAVE[0] * x + WAVE[1] * z
+        (breath,) = parts(2 * np.pi * (self.ticks[who] * dt / PERIOD % 1)[:, None])
+        wave = breath + WAVE[0] * x + WAVE[1] * z
         half = computed(np.sin, wave) * single(self.share[who]) * (DEPTH / 2)
         return replace(pose, rotations=_turned(pose.rotations, who, half))
 

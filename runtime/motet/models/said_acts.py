@@ -19,7 +19,7 @@ KEPT = 256
 
 
 class SaidActs:
-    """Acts for a model, each made once: sessions can share it."""
+    """Acts for a model, each made once: sessions and threads can share it."""
 
     def __init__(self, model: "SteerModel", words: GenerateModel) -> None:
         self.model, self.words = model, words
@@ -37,14 +37,16 @@ class SaidActs:
         """
         if strict:
             self.words.check(self._known(sentence))
-        if sentence not in self._made:
+        known = self._made.get(sentence)
+        if known is None:
             with collected(TextWarning) as notes:
                 (made,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
             if len(self._made) >= KEPT:
-                del self._made[next(iter(self._made))]
+                self._made.pop(next(iter(self._made)), None)
             act = self.model.act_of(made.motion, sentence)
-            self._made[sentence] = act, Shown(made.action, made.lacking, made.confidence), each_once(notes)
-        act, shown, said = self._made[sentence]
+            known = act, Shown(made.action, made.lacking, made.confidence), each_once(notes)
+            self._made[sentence] = known
+        act, shown, said = known
         for text in said:
             warn(text, TextWarning)
         return act, shown

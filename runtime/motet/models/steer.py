@@ -120,7 +120,7 @@ class SteerModel(ControlModel):
         characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)
         gait = self.gaits[0] if start is None or isinstance(start, Motion) else start
         number = self.abilities.number(gait)
-        spread = self._phases(characters, phases)
+        spread = self.phases(characters, phases)
         playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
         said = SaidActs(self, words) if isinstance(words, GenerateModel) else words
         session = SteerSession(self, playback, number, hold_feet, strict, said)
@@ -130,7 +130,7 @@ class SteerModel(ControlModel):
             session.put(places)
         return session
 
-    def _phases(self, characters: int, given: ArrayLike | None) -> Rows | None:
+    def phases(self, characters: int, given: ArrayLike | None = None) -> Rows | None:
         """The phase of each character; None for those that search after every command."""
         every = self.matcher.settings.search_every
         if given is None:

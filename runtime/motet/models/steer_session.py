@@ -14,6 +14,8 @@ from motet.decode.matching import Playback, Rows
 from motet.decode.standing import Standing
 from motet.decode.steering import tick
 from motet.errors import ControlError, ControlWarning, warn
+from motet.models import crowd
+from motet.models.base import LARGEST_CROWD
 from motet.models.composition import Shown
 from motet.models.gaits import Command
 from motet.models.guided import Guidance, Guided, Who
@@ -46,7 +48,7 @@ class SteerSnapshot:
     poses: tuple[Pose, Pose] | None
     ahead: float
     guidance: Guidance
-    happenings: Happenings | None
+    happenings: Happenings
     late: tuple[Event, ...]
 
     def __repr__(self) -> str:
@@ -75,7 +77,7 @@ class SteerSession(Guided):
         self._lock = self._new_lock() if hold_feet else None
         self._standing = Standing.none(self.characters)
         self._poses: tuple[Pose, Pose] | None = None
-        self._happenings: Happenings | None = None
+        self._happenings = Happenings.none(self.characters)
         self._late: tuple[Event, ...] = ()  # of a tick that was to be shown next, when characters were put elsewhere
         self._ahead = 0.0
         self._said: set[str] = set()
@@ -186,7 +188,7 @@ class SteerSession(Guided):
     def _happened(self, pose: Pose) -> tuple[Event, ...]:
         gait, before = self._command.gait, self._happenings
         shows = self.model.matcher.table.shows[self._playback.row, gait]
-        self._happenings = Happenings.after(before, pose.contacts, gait, shows, self.arrived, self._acting.done)
+        self._happenings = before.after(pose.contacts, gait, shows, self.arrived, self._acting.done)
         return tuple(self._happenings.events(before, self.model.gaits))
 
     @property
@@ -228,6 +230,15 @@ class SteerSession(Guided):
         for i, one in zip(characters, each, strict=True):
             acts, chosen = made[id(one)], max if self._target[i, :2].any() else min
             self._acting.asked[i] = (chosen(acts, key=lambda act: act.reach) if acts else None, upper)
+        return shown
+
+    def prepare(self, *sentences: str) -> list[Shown]:
+        """Make acts of sentences, so that :meth:`act` has them at once; what they are shown as. It may be called in
+        another thread while the session ticks, such as by ``asyncio.to_thread(session.prepare, "wave")``. Errors and
+        warnings are those of :meth:`act`."""
+        shown: list[Shown] = []
+        for sentence in sentences:
+            self._acts_of(sentence, shown)
         return shown
 
     def _acts_of(self, what: Doing, shown: list[Shown]) -> tuple[Act, ...]:
@@ -294,6 +305,38 @@ class SteerSession(Guided):
         if self._lock is not None:
             self._lock = self._new_lock()
 
+    def add(self, places: ArrayLike, *, gait: str | None = None, phases: ArrayLike | None = None) -> list[int]:
+        """Add characters that stand at places: (3,) for one or (n, 3), x and z in metres, facing in degrees; their
+        numbers (n), which follow those that there are. Each moves as in a session of its own that starts now.
+
+        gait, phases: like ``start`` and ``phases`` of :meth:`motet.models.steer.SteerModel.start`. ControlError for
+        values out of range, and for more than 100,000 characters in all; nothing changes then.
+        """
+        wanted = _places(places)
+        count = len(wanted)
+        total = self.characters + count
+        if not 0 < count <= LARGEST_CROWD - self.characters:
+            raise ControlError(f"a session has 1 to {LARGEST_CROWD} characters; places of {count} make it {total}")
+        turns = self.model.phases(total) if phases is None else None
+        phases = phases if turns is None else turns[self.characters :]
+        held = self._lock is not None
+        more = self.model.start(gait, characters=count, places=wanted, hold_feet=held, phases=phases)
+        if self._poses is not None:
+            more.advance(0)
+        numbers = list(range(self.characters, total))
+        self.restore(crowd.picked([self.snapshot(), more.snapshot()], np.arange(total)))
+        return numbers
+
+    def remove(self, who: int | Sequence[int]) -> None:
+        """Remove characters. Those that stay keep their order: the numbers of those behind become smaller. ControlError
+        for characters that are not there, and for all of them: one stays."""
+        if who is None:
+            raise ControlError("who must be the numbers of the characters that go")
+        stay = np.delete(np.arange(self.characters), self._who(who))
+        if not len(stay):
+            raise ControlError("a session keeps one character at least")
+        self.restore(crowd.picked([self.snapshot()], stay))
+
     def take(self, pose: Pose) -> None:
         """Continue from a changed pose: its rotations and height, one for all characters or one for each. Their
         positions and velocities stay. ControlError for a pose that does not fit."""
@@ -351,16 +394,27 @@ class SteerSession(Guided):
         return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings, self._late)
 
     def restore(self, snapshot: SteerSnapshot) -> None:
-        """Go back to a snapshot of this session or of one like it: the same model, as many characters, and the same
-        ``hold_feet``; ControlError for another."""
+        """Go back to a snapshot of this session or of one like it, of the same model and the same ``hold_feet``, else
+        ControlError. The session has as many characters then as the snapshot."""
         command = snapshot.command
-        if len(command.gait) != self.characters:
-            raise ControlError(f"a snapshot of {len(command.gait)} characters does not fit {self.characters}")
         if (snapshot.lock is None) != (self._lock is None):
             has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")
             raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
+        self.characters = len(command.gait)
         self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
         self._acting, self._standing = snapshot.acting.copy(), snapshot.standing
         self._command, (self._target, _) = command, self.model.abilities.target(command)
         self._guidance, self._happenings, self._late = snapshot.guidance, snapshot.happenings, snapshot.late
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)
+
+
+def _places(values: ArrayLike) -> Array:
+    """Places (n, 3) of characters, of one (3,) or more; not yet whether they are finite."""
+    needed = "places need x, z and facing, for each of the characters that are added"
+    try:
+        wanted = np.atleast_2d(np.array(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise ControlError(needed) from error
+    if wanted.shape[1:] != (3,):
+        raise ControlError(needed)
+    return wanted

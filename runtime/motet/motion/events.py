@@ -1,7 +1,7 @@
 """What happens to live figures from one tick to the next: feet come down, figures leave the ground and land."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -37,8 +37,8 @@ class Done(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Happenings:
     """Of B figures in a tick; replaced, never written into. down: (B, 2) whether the left and the right foot is down.
-    air: (B,) ticks since one was. gait: (B,) numbers. arrived: (B,) whether they are where they were to go. done: B
-    acts."""
+    air: (B,) ticks since one was, -1 before the first tick. gait: (B,) numbers. arrived: (B,) whether they are where
+    they were to go. done: B acts."""
 
     down: NDArray[np.bool_]
     air: NDArray[np.int64]
@@ -47,8 +47,13 @@ class Happenings:
     done: tuple[Done | None, ...]
 
     @staticmethod
+    def none(figures: int) -> "Happenings":
+        """Before the first tick."""
+        none, count = np.zeros(figures, dtype=bool), np.zeros(figures, dtype=np.int64)
+        return Happenings(np.zeros((figures, 2), dtype=bool), count - 1, count, none, (None,) * figures)
+
     def after(
-        before: "Happenings | None",
+        self,
         contacts: NDArray[np.float32],
         gait: NDArray[np.int64],
         shows: NDArray[np.bool_],
@@ -56,17 +61,18 @@ class Happenings:
         done: tuple[Done | None, ...],
     ) -> "Happenings":
         """Those of the next tick, of contacts (B, 2) and gaits (B,) that are asked for; shows: (B,) whether these are
-        played. before: None in the first tick."""
+        played."""
         down = contacts > DOWN
-        if before is None:
-            return Happenings(down, np.where(down[:, 0] | down[:, 1], 0, FLIES), gait, arrived, done)
-        down |= before.down & (contacts >= UP)
-        air = np.where(down[:, 0] | down[:, 1], 0, before.air + 1)
-        return Happenings(down, air, np.where(shows, gait, before.gait), arrived, done)
+        down |= self.down & (contacts >= UP)
+        begins = self.air < 0
+        air = np.where(down[:, 0] | down[:, 1], 0, np.where(begins, FLIES, self.air + 1))
+        return Happenings(down, air, np.where(shows | begins, gait, self.gait), arrived, done)
 
-    def events(self, before: "Happenings | None", gaits: Sequence[str]) -> Iterator[Event]:
-        """What has happened since the tick before, None in the first tick; ``gaits`` are the names of all."""
-        before = before or replace(self, done=(None,) * len(self.done))
+    def events(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
+        """What has happened since the tick before; ``gaits`` are the names of all."""
+        unseen = before.air < 0
+        if unseen.any():
+            before = before._as(self, unseen)
         yield from self._moved(before, gaits)
         if before.done.count(None) + self.done.count(None) == 2 * len(self.done):
             return
@@ -76,6 +82,16 @@ class Happenings:
                 yield Event("act ended", character, old.name)
             if new and begins:
                 yield Event("act begun", character, new.name)
+
+    def _as(self, other: "Happenings", which: NDArray[np.bool_]) -> "Happenings":
+        """With feet, gaits and ways of others in place of those of some figures (B,)."""
+        return Happenings(
+            np.where(which[:, None], other.down, self.down),
+            np.where(which, other.air, self.air),
+            np.where(which, other.gait, self.gait),
+            np.where(which, other.arrived, self.arrived),
+            self.done,
+        )
 
     def _moved(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
         """Of steps, flights, gaits and ways."""

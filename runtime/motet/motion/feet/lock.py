@@ -93,13 +93,14 @@ class FootLock:
     """The lock of B characters. dt: seconds of a tick.
 
     feet: those of one character, left and right, in floats; of more the feet of all as one, in float64 arrays (2, B).
-    They are replaced, never written into.
+    They are replaced, never written into. new: (B,) which of several have not been held yet, None for none.
     """
 
     characters: int
     dt: float
     settings: FootLockSettings = FootLockSettings()
     feet: tuple[Foot, ...] = (Foot(), Foot())
+    new: NDArray[np.bool_] | None = None
 
     def held(self, pose: Pose) -> Pose:
         """The next pose, one tick later, with standing feet held in place and above ground."""
@@ -109,6 +110,7 @@ class FootLock:
         legs = zip(self.feet, limbs(pose.rotations, pose.contacts), strict=False)
         found = [self._stood(foot, limb, hips, (x, height, z)) for foot, limb in legs]
         self.feet = tuple(foot for foot, _ in found)
+        self.new = None
         rotations = with_legs(pose.rotations, [turns for _, turns in found])
         return Pose(pose.ground, rotations, pose.height, pose.contacts)
 
@@ -132,7 +134,7 @@ class FootLock:
 
     def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Foot, Part]:
         """A foot a tick later, and by how much it is lifted."""
-        how, before = self.settings, soles if foot.soles is None else foot.soles
+        how, before = self.settings, self._before(foot, soles)
         (x, lowest, z), (from_x, _, from_z) = soles[1], before[1]
         x, z, height = x - from_x, z - from_z, lowest - how.bears
         for (to_x, y, to_z), (from_x, _, from_z) in zip(soles[::2], before[::2], strict=True):
@@ -150,6 +152,17 @@ class FootLock:
         off, rise = self._faded(foot.height[0] - steps, foot.height[1], LIFTS)
         drift = where(stands, 0.0, slower_x), where(stands, 0.0, slower_z)
         return Foot((shift_x, shift_z), drift, (steps + off, rise), soles), larger(steps + off - lowest, 0.0)
+
+    def _before(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Vector, ...]:
+        """Where the points of a sole were; of who is new, where they are."""
+        if foot.soles is None:
+            return soles
+        if self.new is None:
+            return foot.soles
+        pairs = zip(soles, foot.soles, strict=True)
+        return tuple(
+            (where(self.new, a, d), where(self.new, b, e), where(self.new, c, f)) for (a, b, c), (d, e, f) in pairs
+        )
 
     def _faded(self, off: Part, rate: Part, half_life: float) -> Pair:
         """What a foot is off and its rate, as the spring of a half-life takes it back."""
