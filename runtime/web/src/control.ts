@@ -1,7 +1,7 @@
 /* Figures that are steered by motion matching; no ONNX Runtime is needed. */
 import { type Act, actOf, reachOf } from "./acts.js";
 import type { Bundle, Manifest } from "./bundle.js";
-import { ControlSession } from "./controlSession.js";
+import { ControlSession, LARGEST_CROWD } from "./controlSession.js";
 import { BundleError, ControlError } from "./errors.js";
 import { Gaits, type Speeds } from "./gaits.js";
 import { BONES } from "./humanoid.js";
@@ -10,8 +10,6 @@ import { Model } from "./model.js";
 import { Steerer } from "./steering.js";
 import { type ActSettings, actsOf, lockOf, steeringOf, type LockSettings } from "./steeringSettings.js";
 
-/** A session has at most so many figures. */
-const LARGEST_CROWD = 100_000;
 /** From so many figures on the searches of a session are spread over the ticks. */
 const SPREAD_FROM = 32;
 /** A number of a table at most. */
@@ -87,7 +85,8 @@ export class ControlModel extends Model {
     return session;
   }
 
-  private phases(characters: number, given?: number | readonly number[]): number[] | null {
+  /** The phase of each figure; null for those that search after every command. */
+  phases(characters: number, given?: number | readonly number[]): number[] | null {
     const every = this.steerer.matcher.how.search_every;
     if (given === undefined && characters < SPREAD_FROM) return null;
     const found = Array.from({ length: characters }, (_, at) => (given === undefined ? at % every : Array.isArray(given) ? (given[at] as number) : (given as number)));

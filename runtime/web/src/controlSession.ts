@@ -2,7 +2,7 @@
 import { doing, type Doing, noAct } from "./acting.js";
 import { type Act, actOf, numbersOf } from "./acts.js";
 import { type Point, sent } from "./arriving.js";
-import type { ControlModel } from "./control.js";
+import type { ControlModel, StartSettings } from "./control.js";
 import { ControlError } from "./errors.js";
 import { after, eventsOf, type FigureEvent } from "./events.js";
 import { newLock } from "./footLock.js";
@@ -87,6 +87,9 @@ export interface ControlSnapshot {
   readonly state: unknown;
 }
 
+/** Figures of a session. */
+export const LARGEST_CROWD = 100_000;
+
 /** Figures that move together, each steered separately. Angles are degrees about the vertical: 0 along z, positive to the left. */
 export class ControlSession {
   private state: State;
@@ -95,13 +98,17 @@ export class ControlSession {
   constructor(
     readonly model: ControlModel,
     gait: number,
-    readonly characters: number,
+    characters: number,
     private readonly holdFeet: boolean,
     private readonly strict: boolean,
     phases: readonly number[] | null,
   ) {
     const figures = Array.from({ length: characters }, (_, at) => standing(model, gait, undefined, phases?.[at]));
     this.state = { figures, room: 0, shown: null, ahead: 0, late: figures.map(() => []) };
+  }
+
+  get characters(): number {
+    return this.state.figures.length;
   }
 
   /** Of each figure the velocity along x and z, m/s, and the facing, radians, within the limits of its gait. */
@@ -320,17 +327,43 @@ export class ControlSession {
     this.state.shown = null; // nothing lies between there and here
   }
 
+  /**
+   * Add figures that stand at places, x and z in metres and facing in degrees, of one or of each; their numbers, which follow
+   * those that there are. Each moves as in a session of its own that starts now. gait, phases: as those of `start`. ControlError
+   * for what is out of range; nothing has changed then.
+   */
+  add(places: readonly number[] | readonly (readonly number[])[], { gait, phases }: Pick<StartSettings, "gait" | "phases"> = {}): number[] {
+    if (!Array.isArray(places) || !places.length) throw new ControlError("places needs x, z, facing, for each of the characters that are added");
+    const { state, characters, model, holdFeet } = this;
+    const count = Array.isArray(places[0]) ? places.length : 1;
+    if (characters + count > LARGEST_CROWD) throw new ControlError(`a session has up to ${LARGEST_CROWD} characters, not ${characters + count}`);
+    const turns = phases ?? model.phases(characters + count)?.slice(characters);
+    const more = model.start({ characters: count, places, holdFeet, ...(gait !== undefined && { gait }), ...(turns !== undefined && { phases: turns }) });
+    if (state.shown) more.advance(0);
+    state.shown?.forEach((shown, at) => shown.push(...more.state.shown![at]!));
+    state.figures.push(...more.state.figures);
+    state.late.push(...more.state.late);
+    return more.state.figures.map((_, at) => characters + at);
+  }
+
+  /** Remove figures by their numbers. Those behind move up. ControlError for figures that are not there, and for all: one stays. */
+  remove(who: readonly number[]): void {
+    if (!Array.isArray(who) || !who.length) throw new ControlError("who needs the numbers of the figures that go");
+    const gone = new Set(this.who(who));
+    if (gone.size === this.characters) throw new ControlError("a session keeps one figure at least");
+    const stay = <One>(all: One[]) => all.filter((_, at) => !gone.has(at));
+    const { figures, late, shown } = this.state;
+    Object.assign(this.state, { figures: stay(figures), late: stay(late), shown: shown && [stay(shown[0]), stay(shown[1])] });
+  }
+
   /** The whole state, to be restored later. */
   snapshot(): ControlSnapshot {
     return { holdFeet: this.holdFeet, state: structuredClone(this.state) };
   }
 
-  /** Go back to a snapshot of this session or of one like it; ControlError for another. */
+  /** Go back to a snapshot of this session or of one like it, with as many figures as there were; ControlError for another. */
   restore(snapshot: ControlSnapshot): void {
     const state = snapshot.state as State;
-    if (state.figures.length !== this.characters) {
-      throw new ControlError(`a snapshot of ${state.figures.length} characters does not fit ${this.characters}`);
-    }
     if (snapshot.holdFeet !== this.holdFeet) throw new ControlError("a snapshot with held feet fits no session without them, nor the other way round");
     this.state = structuredClone(state);
   }

@@ -33,7 +33,6 @@ test("what cannot be followed is refused, and changes nothing", () => {
   for (const characters of [0, 1.5, NaN, 1e6]) assert.throws(() => model.start({ characters }), ControlError);
   assert.throws(() => model.start({ gait: "fly" }), ControlError);
   assert.throws(() => model.start({ places: [1, 2] }), ControlError);
-  assert.throws(() => session.restore(model.start().snapshot()), /1 characters does not fit 2/);
   assert.throws(() => session.restore(model.start({ characters: 2, holdFeet: false }).snapshot()), ControlError);
 });
 
@@ -155,4 +154,46 @@ test("settings and tables that are out of range are refused", () => {
   const { manifest, steerer } = model;
   const made = (config: object) => new ControlModel({ ...manifest, config: { ...manifest.config, ...config } }, steerer.matcher.tables);
   for (const config of [{ gaits: [] }, { speeds: [[1, 2]] }, { odd: 99 }, { gaits: "walk" }]) assert.throws(() => made(config), BundleError);
+});
+
+test("figures come and go, and each moves as it would alone", () => {
+  for (const [holdFeet, step] of [[true, "tick"], [false, "tick"], [true, "advance"]] as const) {
+    const begun = (place: number[]) => model.start({ places: place, holdFeet });
+    const places = [[0, 0, 0], [1, 0.5, 30], [-1, 0.5, 200]];
+    const crowd = begun(places[0]!);
+    let alone = [begun(places[0]!)];
+    const moved = (session: typeof crowd) => (step === "tick" ? session.tick() : session.advance(1 / 30));
+    for (let at = 0; at < 90; at++) {
+      if (at === 20 || at === 40) {
+        const number = alone.length;
+        assert.deepEqual(crowd.add(places[number]!), [number]);
+        alone.push(begun(places[number]!));
+        if (step === "advance") alone[number]!.advance(0); // the crowd is shown already
+        crowd.goTo([3, -number], { who: [number] });
+        alone[number]!.goTo([3, -number]);
+      }
+      if (at === 60) {
+        crowd.remove([0]);
+        alone = alone.slice(1);
+      }
+      if (at === 75) {
+        const before = crowd.snapshot();
+        crowd.add([[5, 5, 0], [6, 6, 0]]);
+        assert.equal(crowd.tick().length, 4);
+        crowd.restore(before);
+      }
+      assert.deepEqual(moved(crowd), alone.flatMap(moved));
+    }
+    assert.equal(crowd.characters, 2);
+  }
+});
+
+test("figures that cannot come or go are refused, and nothing changes", () => {
+  const session = model.start({ characters: 2 });
+  const before = session.snapshot();
+  for (const places of [[], [0, 0], [[0, 0, NaN]], "here", null]) assert.throws(() => session.add(places as number[]), ControlError);
+  for (const who of [[], [2], [0, 0], [0, 1], 0, null]) assert.throws(() => session.remove(who as number[]), ControlError);
+  assert.throws(() => session.add([0, 0, 0], { gait: "fly" }), ControlError);
+  assert.throws(() => session.add(Array<number[]>(100_000).fill([0, 0, 0])), /100000/);
+  assert.deepEqual(session.snapshot(), before);
 });
