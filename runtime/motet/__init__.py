@@ -11,8 +11,11 @@ from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import SessionOptions
 from motet.checked import Checked, check
+from motet.decode.acts import Act
+from motet.decode.matched import Matched
 from motet.demo import write_demo
 from motet.errors import (
+    ArgumentError,
     BundleError,
     ControlError,
     ControlWarning,
@@ -28,7 +31,7 @@ from motet.errors import (
     TravelWarning,
     UnitError,
 )
-from motet.formats import clips
+from motet.formats import Character, clips
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
@@ -43,6 +46,7 @@ from motet.models.load import load, load_as
 from motet.models.plans import Moment, parse_plan, read_plan
 from motet.models.predict import PredictModel, PredictSession
 from motet.models.quantities import Quantities
+from motet.models.said_acts import SaidActs
 from motet.models.search import Hit, Index, SearchModel
 from motet.models.steer import SteerModel
 from motet.models.steer_session import SteerSession, SteerSnapshot
@@ -56,15 +60,15 @@ __version__ = version("motet")
 
 # fmt: off
 __all__ = [
-    "Bundle", "BundleError", "BundleModel", "Checked", "CodesModel", "Composition", "ControlError", "ControlModel",
-    "ControlWarning", "DecodingError", "DescribeModel", "Description", "Event", "FillModel", "FormatError",
-    "GenerateModel", "GenerateSettings", "Generated", "Hit", "Humanoid", "Index", "Met", "MixtureModel", "Moment",
-    "MotetError", "Motion", "MotionError", "OutputError", "Part", "Passage", "Pose", "PredictModel", "PredictSession",
-    "Quantities", "ScriptError", "SearchModel", "SessionOptions", "SettingError", "Shown", "SteerModel",
-    "SteerSession", "SteerSnapshot", "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError",
-    "TextWarning", "TravelWarning", "Understood", "UnitError", "check", "clips", "from_humanoid", "list_bundles",
-    "live_page", "load", "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write",
-    "write_demo", "write_live_page",
+    "Act", "ArgumentError", "Bundle", "BundleError", "BundleModel", "Character", "Checked", "CodesModel",
+    "Composition", "ControlError", "ControlModel", "ControlWarning", "DecodingError", "DescribeModel", "Description",
+    "Event", "FillModel", "FormatError", "GenerateModel", "GenerateSettings", "Generated", "Hit", "Humanoid", "Index",
+    "Matched", "Met", "MixtureModel", "Moment", "MotetError", "Motion", "MotionError", "OutputError", "Part",
+    "Passage", "Pose", "PredictModel", "PredictSession", "Quantities", "SaidActs", "ScriptError", "SearchModel",
+    "SessionOptions", "SettingError", "Shown", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings",
+    "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning", "Understood",
+    "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load", "load_as", "motion",
+    "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo", "write_live_page",
 ]
 # fmt: on
 

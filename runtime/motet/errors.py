@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import Any
 
 
 def quoted(text: str, most: int = 60) -> str:
@@ -64,6 +65,16 @@ class MotetError(Exception):
 
 class MotionError(MotetError, ValueError):
     """A motion or a skeleton that cannot be used for what was asked."""
+
+
+class ArgumentError(MotetError, TypeError):
+    """An argument of a type that a function does not take."""
+
+
+def needs(value: object, kinds: Any, expected: str) -> None:
+    """ArgumentError, which says what was expected, for a value that is of none of the kinds of :func:`isinstance`."""
+    if not isinstance(value, kinds):
+        raise ArgumentError(f"expected {expected}, not {quoted(repr(value))}")
 
 
 class UnitError(MotionError):

@@ -55,6 +55,9 @@ class SessionOptions:
                 remedy = f"; in place of onnxruntime:  pip install {package}" if package else ""
                 known = ", ".join(available)
                 raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {known}{remedy}")
+        of_each = self.provider_options
+        if isinstance(of_each, Mapping) or not all(isinstance(options, Mapping) for options in of_each):
+            raise SettingError(f"provider_options must hold a mapping for each provider, not {of_each!r:.60}")
         if not self.providers or len(self.provider_options) not in {0, len(self.providers)}:
             raise SettingError("give at least one provider, and options for each provider or for none")
 

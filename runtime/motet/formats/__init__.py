@@ -21,7 +21,7 @@ from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
 from motet.formats.text import Clip, split_clip
 from motet.motion.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, motions_of
 from motet.motion.root_motion import travel_on_root
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, metres
@@ -274,8 +274,10 @@ def write_motion(
     onto: a character's .glb, .gltf or .vrm; it is written with its mesh and materials and the motion, or several
         motions by clip name, as animations.
 
-    FormatError, MotionError or OutputError if that is impossible; then nothing is written.
+    FormatError, MotionError or OutputError if that is impossible; then nothing is written. ArgumentError for what is no
+    motion, and has none as its ``motion``, as what models generate has.
     """
+    motion = {name: _moving(each) for name, each in motion.items()} if isinstance(motion, Mapping) else _moving(motion)
     if onto is None:
         if isinstance(motion, Mapping):
             raise MotionError(
@@ -290,6 +292,12 @@ def write_motion(
         onto = read_character(onto)
     motions = motion if isinstance(motion, Mapping) else {"motion": motion}
     return write_all_on(file, {name: put_onto(each, onto) for name, each in motions.items()}, onto)
+
+
+def _moving(moving: Any) -> Motion:
+    """A motion, or that of what a model generated; ArgumentError for what has none."""
+    (motion,) = motions_of([moving if isinstance(moving, Motion) else getattr(moving, "motion", moving)])
+    return motion
 
 
 def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:

@@ -143,31 +143,9 @@ def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
 def _smpl(
     path: Path, archive: zipfile.ZipFile, names: set[str], parts: tuple[str, ...], size: int, fps: float | None
 ) -> Motion:
-    with archive.open(f"{parts[0]}.npy") as stream:
-        shape = _header(stream)[0]
-    if not shape:
-        raise FormatError(path, f"{parts[0]} is a single number: expected its frames")
-    if shape[0] * len(AMASS_JOINTS) >= most_poses(size):
-        raise FormatError(path, f"{shape[0]} frames are too many for a file of {size} bytes")
-    arrays = {part: array(archive, part, "fiu").astype(np.float64) for part in parts}
-    turned = np.concatenate([_rotations(path, part, values) for part, values in arrays.items()], axis=1)
-    if turned.shape[1] < len(AMASS_JOINTS):
-        expected = f"expected {len(AMASS_JOINTS)} or more"
-        raise FormatError(path, f"{' and '.join(parts)}: {turned.shape[1]} joints, {expected}")
-    turned = turned[:, : len(AMASS_JOINTS)]
-
-    place = next((name for name in ("trans", "transl") if name in names), None)
-    if place is None:
-        raise FormatError(path, "no translation of the root: expected an array trans or transl")
-    trans = array(archive, place, "fiu").astype(np.float64)
-    if trans.shape != (len(turned), 3) or not np.isfinite(trans).all():
-        raise FormatError(path, f"{place} must be ({len(turned)}, 3) finite numbers, not {trans.shape}")
-
-    rate = next((name for name in RATES if name in names), None)
-    stated = None if rate is None else frame_rate(float(array(archive, rate, "fiu")), path)
-    if stated is None and fps is None:
-        raise FormatError(path, f"no frame rate, as an array {' or '.join(RATES)}: give it by --fps-in, in Python fps=")
-    check_rate(path, stated, fps)
+    turned = _joints(path, archive, parts, size)
+    trans = _path_of_root(path, archive, names, len(turned))
+    rate = _rate(path, archive, names, fps)
 
     # rotations in the world, y up
     if parts[-1] != "body_pose":
@@ -176,8 +154,46 @@ def _smpl(
         trans = trans @ z_to_y.T
     for i, joint in enumerate(AMASS_JOINTS[1:], start=1):
         turned[:, i] = product(turned[:, joint.parent], turned[:, i])
-    rate_of_motion = frame_rate(float(fps or 0), path) if stated is None else stated
-    return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans}, rate_of_motion)
+    return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans}, rate)
+
+
+def _joints(path: Path, archive: zipfile.ZipFile, parts: tuple[str, ...], size: int) -> NDArray[np.float64]:
+    """Rotations (T, 22, 3, 3) of the body's joints, each in its parent's frame."""
+    with archive.open(f"{parts[0]}.npy") as stream:
+        shape = _header(stream)[0]
+    if not shape:
+        raise FormatError(path, f"{parts[0]} is a single number: expected its frames")
+    if shape[0] * len(AMASS_JOINTS) >= most_poses(size):
+        raise FormatError(path, f"{shape[0]} frames are too many for a file of {size} bytes")
+    each = [_rotations(path, part, array(archive, part, "fiu").astype(np.float64)) for part in parts]
+    turned = np.concatenate(each, axis=1)
+    if turned.shape[1] < len(AMASS_JOINTS):
+        expected = f"expected {len(AMASS_JOINTS)} or more"
+        raise FormatError(path, f"{' and '.join(parts)}: {turned.shape[1]} joints, {expected}")
+    return np.array(turned[:, : len(AMASS_JOINTS)])
+
+
+def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames: int) -> NDArray[np.float64]:
+    """The translation (T, 3) of the root in metres."""
+    place = next((name for name in ("trans", "transl") if name in names), None)
+    if place is None:
+        raise FormatError(path, "no translation of the root: expected an array trans or transl")
+    trans = array(archive, place, "fiu").astype(np.float64)
+    if trans.shape != (frames, 3) or not np.isfinite(trans).all():
+        raise FormatError(path, f"{place} must be ({frames}, 3) finite numbers, not {trans.shape}")
+    return trans
+
+
+def _rate(path: Path, archive: zipfile.ZipFile, names: set[str], fps: float | None) -> float:
+    """The frame rate that a file states, or else the one that was given."""
+    name = next((name for name in RATES if name in names), None)
+    if name is not None:
+        stated = frame_rate(float(array(archive, name, "fiu")), path)
+        check_rate(path, stated, fps)
+        return stated
+    if fps is None:
+        raise FormatError(path, f"no frame rate, as an array {' or '.join(RATES)}: give it by --fps-in, in Python fps=")
+    return frame_rate(fps, path)
 
 
 def _rotations(path: Path, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

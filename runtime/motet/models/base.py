@@ -14,7 +14,7 @@ from motet.bundle.graph import Arrays, Graph, SessionOptions, Sizes, TensorSpec,
 from motet.bundle.manifest import Manifest
 from motet.decode.loops import LOOPS
 from motet.errors import BundleError
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, with_frames
 from motet.settings import Settings
 
 S = TypeVar("S", bound=Settings)
@@ -109,7 +109,8 @@ class BundleModel(ABC):
         return self.contract.fps
 
     def at_own_rate(self, motion: Motion) -> Motion:
-        """A motion at the model's frame rate, its last frame kept."""
+        """A motion at the model's frame rate, its last frame kept; MotionError for one without frames."""
+        with_frames(motion)
         return motion if motion.fps == self.fps else motion.continuous().resample(self.fps, to_end=True)
 
     @property

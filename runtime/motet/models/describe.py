@@ -21,7 +21,7 @@ from motet.decode.words import Hypothesis, Limits, noise_of, score_words
 from motet.errors import DecodingError
 from motet.models.known import AnswerSettings, Known, Seen, known_of, path_of
 from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, motions_of
 from motet.motion.rotations import Array
 from motet.settings import Progress, Range, Settings, seeds_of, silent
 
@@ -152,14 +152,14 @@ class DescribeModel(LanguageModel):
         """
         name = self._decoding(decoding, draws)
         if name == "known":
-            found = self._answers([motions] if isinstance(motions, Motion) else motions, beams, progress)
+            found = self._answers(motions_of(motions), beams, progress)
             return found[0] if isinstance(motions, Motion) else found
         loop, (first,) = LOOPS[name] if name else self.loop, seeds_of(seed, 1, DecodingError)
         given = {"beams": beams, "draws": draws}
         settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), given)}
         if "draws" in settings:
             settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
-        contexts = self.embed([motions] if isinstance(motions, Motion) else motions)
+        contexts = self.embed(motions_of(motions))
         least, decode = self.settings(ConfidenceSettings).log_probability, self.vocabulary.decode
         rows = [
             [Description(decode(one.ids), one.log_probability, one.score, one.log_probability >= least) for one in row]
@@ -254,9 +254,7 @@ class DescribeModel(LanguageModel):
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The context vector (C,) float32 of a motion, or (N, C) of several; MotionError like :meth:`frames`."""
-        found = self.contexts(
-            [self.frames(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
-        )
+        found = self.contexts([self.frames(motion) for motion in motions_of(motions)])
         return found[0] if isinstance(motions, Motion) else found
 
     def score(self, motion: Motion, sentence: str) -> float:

@@ -21,7 +21,7 @@ from motet.motion.rotations import Array
 from motet.representation.placed import PLACED_CHANNELS, bridge, placed, pose_of, put_at, seen_from, unplaced
 from motet.representation.retargeting import from_model_figure
 from motet.representation.root_sixd import facing
-from motet.settings import Progress, checked_int, silent
+from motet.settings import Progress, checked_int, is_number, silent
 
 log = logging.getLogger(__name__)
 
@@ -192,8 +192,8 @@ class FillModel(BundleModel):
 
     def _joined(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
         """The first motion, the transition, and the second placed after it; all in the channels of the first."""
-        if not 0 < seconds <= self.seconds:
-            raise MotionError(f"a transition takes more than 0 and at most {self.seconds:g} seconds, not {seconds:g}")
+        if not is_number(seconds) or not 0 < seconds <= self.seconds:
+            raise MotionError(f"a transition takes more than 0 and at most {self.seconds:g} seconds, not {seconds}")
         if None not in (first.skeleton, second.skeleton) and self._in_its_world(first):
             count = max(1, round(seconds * first.fps))
             other = second if second is first else to_figure_of(second, first)

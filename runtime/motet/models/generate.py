@@ -16,7 +16,7 @@ from motet.decode.mixture import score_frames
 from motet.errors import DecodingError, TextError, TextWarning, collected
 from motet.files import File
 from motet.formats import Character, write_motion
-from motet.models.language import LanguageModel
+from motet.models.language import LanguageModel, texts_of
 from motet.models.quantities import Quantities
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -165,7 +165,7 @@ class GenerateModel(LanguageModel):
         TextError for a sentence that is empty, too long or wholly unknown; DecodingError for a setting that is out of
         range or unknown to the loop. Unknown words are named by a TextWarning and in the result.
         """
-        texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        texts = texts_of(sentences)
         own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
         read, seeds = {**own, "numbers": numbers, "whole": whole}, seeds_of(seed, len(texts), DecodingError)
         composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole, own)}
@@ -254,7 +254,7 @@ class GenerateModel(LanguageModel):
 
     def embed(self, sentences: str | Sequence[str]) -> Floats:
         """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors like :meth:`ids`."""
-        found = self.contexts([self.ids(text) for text in ([sentences] if isinstance(sentences, str) else sentences)])
+        found = self.contexts([self.ids(text) for text in texts_of(sentences)])
         return found[0] if isinstance(sentences, str) else found
 
     def score(self, sentence: str, motion: Motion) -> float:

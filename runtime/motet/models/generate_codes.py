@@ -19,7 +19,15 @@ from motet.decode.codes import CodesSettings, Source, Writer, draw_codes, drawn_
 from motet.decode.continue_codes import ContinuationSettings
 from motet.decode.loop import Noise, Sample, apart
 from motet.decode.memory import Memory
-from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning, warn
+from motet.errors import (
+    BundleError,
+    DecodingError,
+    MotionError,
+    TextError,
+    TextWarning,
+    needs,
+    warn,
+)
 from motet.models.amounts import Seen, short
 from motet.models.compose import Composition, compose
 from motet.models.composition import (
@@ -34,7 +42,8 @@ from motet.models.composition import (
     verbs_of,
 )
 from motet.models.generate import Generated, GenerateModel, LoopSettings
-from motet.models.plans import Moment
+from motet.models.language import texts_of
+from motet.models.plans import Moment, parse_plan
 from motet.models.quantities import PACES, Quantities, known_turns, quantities_of
 from motet.models.steer import SteerModel
 from motet.models.telling import Part, Piece, Teller, pace_of
@@ -351,13 +360,13 @@ class CodesModel(GenerateModel):
         return Passage(part.text, start, stop, *shown, asked, measured)
 
     def compose(
-        self, moments: Sequence[Moment], *, steer: SteerModel | None = None, seed: int = 0, strict: bool = False
+        self, moments: str | Sequence[Moment], *, steer: SteerModel | None = None, seed: int = 0, strict: bool = False
     ) -> Composition:
         """A motion that shows prompts at their times, and is where it is asked to be, facing that way, in given poses.
 
-        moments: what is asked for at which time (:class:`motet.Moment`), such as ``motet.parse_plan`` and
-            ``motet.read_plan`` give. Feet are planted. A prompt that asks for walking or running, and nothing else, is
-            steered to its places; any other motion is turned and moved there by up to half a metre a second.
+        moments: what is asked for at which time (:class:`motet.Moment`), such as ``motet.read_plan`` gives; or a script
+            as ``motet.parse_plan`` reads it. Feet are planted. A prompt that asks for walking or running, and nothing
+            else, is steered to its places; any other motion is turned and moved there by up to half a metre a second.
         steer: the model of walks to places, by default the bundle "control".
         seed, strict: like :meth:`story`.
         SettingError for moments that are out of order; MotionError for a place that is out of reach, with the time that
@@ -365,7 +374,10 @@ class CodesModel(GenerateModel):
         """
         from motet.models.load import load  # which knows this class
 
-        return compose(moments, self, steer or load("control"), seed, strict)
+        given = parse_plan(moments) if isinstance(moments, str) else list(moments)
+        for moment in given:
+            needs(moment, Moment, "a moment")
+        return compose(given, self, steer or load("control"), seed, strict)
 
     def stream(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.
@@ -402,7 +414,7 @@ class CodesModel(GenerateModel):
     ) -> tuple[list[Part], Motion | None, Iterator[Piece]]:
         """The parts of a story with those of standing, the motion on the model's figure that it continues, and its
         pieces as they are drawn."""
-        texts = [sentences] if isinstance(sentences, str) else list(sentences)
+        texts = texts_of(sentences)
         numbers, whole = settings.pop("numbers", True), settings.pop("whole", False)
         drawn = cast(Mapping[str, float | None], settings)
         if not texts:

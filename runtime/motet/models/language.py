@@ -20,12 +20,12 @@ from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import two_rows
-from motet.errors import BundleError, MotionError, TextError, TextWarning, warn
+from motet.errors import BundleError, MotionError, TextError, TextWarning, needs, warn
 from motet.models.base import BundleModel
 from motet.models.composition import stem
 from motet.models.spelling import corrected
 from motet.motion.feet.treadmill import travelling
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, is_many
 from motet.motion.rotations import Array
 
 PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
@@ -217,6 +217,14 @@ class Vocabulary:
     def decode(self, ids: Iterable[int]) -> str:
         """The sentence of ids (:meth:`TextRules.sentence`), without PAD, SOS, EOS and UNK."""
         return self.rules.sentence(self.words[i] if i >= len(SPECIALS) else "" for i in ids)
+
+
+def texts_of(given: str | Iterable[str]) -> list[str]:
+    """A sentence, or several, as a list; ArgumentError for anything else."""
+    texts = list(given) if is_many(given) else [given]
+    for text in texts:
+        needs(text, str, "a sentence")
+    return [str(text) for text in texts]
 
 
 class LanguageModel(BundleModel):

@@ -9,7 +9,7 @@ from motet.bundle.bundle import Bundle
 from motet.bundle.golden import replay
 from motet.bundle.graph import Arrays, Graph, SessionOptions
 from motet.bundle.manifest import Manifest
-from motet.errors import BundleError
+from motet.errors import ArgumentError, BundleError, quoted
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.fill import FillModel
@@ -64,7 +64,9 @@ def load_as(kind: Callable[..., Kind], name_or_path: str | Path, options: Sessio
 
     kind: the class; typed as a callable, since type checkers reject an abstract class for ``type``.
     """
-    wanted, model = cast(type[BundleModel], kind), load(name_or_path, options)
+    if not (isinstance(kind, type) and issubclass(kind, BundleModel)):
+        raise ArgumentError(f"expected a class of models, such as motet.DescribeModel, not {quoted(repr(kind))}")
+    wanted, model = kind, load(name_or_path, options)
     if not isinstance(model, wanted):
         need = f"need one for {wanted.VERB!r}"
         if model.VERB == wanted.VERB:

@@ -15,7 +15,7 @@ from typing import Any
 
 from motet.errors import FormatError, MotetError, ScriptError, SettingError, quoted
 from motet.formats import read_motion
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, motions_of
 from motet.settings import is_number
 
 LONGEST, FARTHEST = 600.0, 1000.0  # seconds of a composition; metres from its start, and degrees
@@ -50,6 +50,8 @@ class Moment:
     pose_at: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.pose is not None:
+            motions_of([self.pose])
         place, motion = self.place, self.pose
         flat = isinstance(place, Sequence) and len(place) == 2 and all(map(_near, place))
         within = motion is None or (is_number(self.pose_at) and 0 <= self.pose_at * motion.fps < len(motion))

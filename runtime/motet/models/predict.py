@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from motet.bundle.graph import Arrays, Floats, Graph, bind
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import two_rows
-from motet.errors import BundleError, DecodingError, MotionError
+from motet.errors import BundleError, DecodingError, MotionError, needs
 from motet.models.base import BundleModel
 from motet.models.continuation import brought_back, futures, together
 from motet.models.generate import GenerateModel
 from motet.motion.feet.treadmill import travelling
 from motet.motion.humanoid import Figure
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, motions_of
 from motet.motion.rotations import Array
 from motet.settings import Progress, Seed, checked_int, is_number, seeds_of, silent
 
@@ -112,7 +112,8 @@ class PredictModel(BundleModel):
         where ``beyond`` is not a motion-code model.
         """
         count = self.count(seconds, frames)
-        given = [travelling(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
+        given = [travelling(motion) for motion in motions_of(motions)]
+        needs(beyond, GenerateModel | None, "beyond to be a model, such as motet.load('generate')")
         if beyond is not None and count > self.horizon:
             found = self._beyond(given, count, append, progress, beyond, seeds_of(seed, len(given), DecodingError))
         else:
@@ -209,7 +210,7 @@ class PredictModel(BundleModel):
         """
         if not self.knows_errors:
             raise DecodingError(f"{self!r} does not estimate its errors: it has no graph 'error'")
-        given = [travelling(motion) for motion in ([motions] if isinstance(motions, Motion) else motions)]
+        given = [travelling(motion) for motion in motions_of(motions)]
         seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, given, strict=True):
             row[:] = self._seen(motion)[2]

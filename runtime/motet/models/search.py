@@ -19,15 +19,15 @@ import numpy as np
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.errors import FormatError, MotetError, MotionError, OutputError, UnitError
+from motet.errors import ArgumentError, FormatError, MotetError, MotionError, OutputError, UnitError, quoted
 from motet.files import files_in, write_whole
 from motet.formats import MOCAP, clips, read_motion
 from motet.formats.npz import array
 from motet.formats.text import MARK
 from motet.jobs import Shard, in_order
-from motet.models.language import MAX_SECONDS, LanguageModel
+from motet.models.language import MAX_SECONDS, LanguageModel, texts_of
 from motet.motion.feet.treadmill import is_in_place, with_travel
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, is_many, motions_of
 from motet.motion.skeleton import metres
 from motet.settings import Progress, Range, Settings, silent
 
@@ -71,13 +71,13 @@ class SearchModel(LanguageModel):
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The unit vector (E,) float32 of a motion, or vectors (N, E) of several; MotionError like :meth:`frames`."""
-        given = [motions] if isinstance(motions, Motion) else motions
+        given = motions_of(motions)
         found = self.contexts([self.frames(motion) for motion in given], "motion")
         return found[0] if isinstance(motions, Motion) else found
 
     def embed_text(self, sentences: str | Sequence[str]) -> Floats:
         """The unit vector (E,) float32 of a sentence, or vectors (N, E) of several; errors like :meth:`ids`."""
-        given = [sentences] if isinstance(sentences, str) else sentences
+        given = texts_of(sentences)
         found = self.contexts([self.ids(text) for text in given], "text")
         return found[0] if isinstance(sentences, str) else found
 
@@ -214,6 +214,8 @@ class Index:
         wanted = int(self.model.loop.settled(self.model.defaults, {"count": count})["count"])
         if isinstance(queries, str | Motion):
             return self._nearest(queries, wanted)
+        if not is_many(queries) or not all(isinstance(query, str | Motion) for query in queries):
+            raise ArgumentError(f"expected a sentence or a motion, or several, not {quoted(repr(queries))}")
         return [self._nearest(query, wanted) for query in queries]
 
     @cached_property

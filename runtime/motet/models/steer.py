@@ -14,7 +14,7 @@ from motet.decode.acts import Act, ActSettings
 from motet.decode.matching import FEATURES, Matcher, Playback, Rows, Table
 from motet.decode.steering import PoseCodes
 from motet.decode.steering_settings import SteeringSettings
-from motet.errors import BundleError, ControlError
+from motet.errors import ArgumentError, BundleError, ControlError
 from motet.models.base import LARGEST_CROWD, ControlModel
 from motet.models.gaits import Gaits
 from motet.models.generate import GenerateModel
@@ -122,6 +122,8 @@ class SteerModel(ControlModel):
         number = self.abilities.number(gait)
         spread = self.phases(characters, phases)
         playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
+        if not (words is None or hasattr(words, "act") or isinstance(words, GenerateModel)):
+            raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
         said = SaidActs(self, words) if isinstance(words, GenerateModel) else words
         session = SteerSession(self, playback, number, hold_feet, strict, said)
         if isinstance(start, Motion):

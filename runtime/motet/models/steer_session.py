@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,7 @@ from motet.decode.matched import Matched, matched
 from motet.decode.matching import Playback, Rows
 from motet.decode.standing import Standing
 from motet.decode.steering import tick
-from motet.errors import ControlError, ControlWarning, warn
+from motet.errors import ControlError, ControlWarning, needs, warn
 from motet.models import crowd
 from motet.models.base import LARGEST_CROWD
 from motet.models.composition import Shown
@@ -24,9 +24,10 @@ from motet.models.scripts import Order, parse_orders
 from motet.motion.events import Event, Happenings
 from motet.motion.feet.lock import FootLock, FootLockSettings
 from motet.motion.humanoid import BONES
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, is_many
 from motet.motion.pose import Pose
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
+from motet.settings import is_number
 
 if TYPE_CHECKING:
     from motet.models.said_acts import SaidActs
@@ -183,7 +184,7 @@ class SteerSession(Guided):
         self._face_as_acted()
         pose = pose if self._lock is None else self._lock.held(self._standing.breathed(pose, seconds))
         self._guidance, pose = self._guidance.after(pose, seconds)
-        return replace(pose, events=self._happened(pose))
+        return replace(pose, events=self._happened(pose)).read_only()
 
     def _happened(self, pose: Pose) -> tuple[Event, ...]:
         gait, before = self._command.gait, self._happenings
@@ -222,7 +223,7 @@ class SteerSession(Guided):
         characters that are not there, and for a sentence without ``words``; nothing changes then.
         """
         characters = self._who(who).tolist()
-        each = [what] * len(characters) if isinstance(what, Doing) else list(what)
+        each = list(what) if is_many(what) and not isinstance(what, Doing) else [what] * len(characters)
         if len(each) != len(characters):
             raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
         shown: list[Shown] = []
@@ -241,8 +242,9 @@ class SteerSession(Guided):
             self._acts_of(sentence, shown)
         return shown
 
-    def _acts_of(self, what: Doing, shown: list[Shown]) -> tuple[Act, ...]:
+    def _acts_of(self, what: Any, shown: list[Shown]) -> tuple[Act, ...]:
         """The acts that are meant, of which a character does one; what a sentence is shown as is added to a list."""
+        needs(what, Doing, "a motion, an act or a sentence")
         if what is None:
             return ()
         if isinstance(what, str) and what in self.model.takes:
@@ -271,7 +273,7 @@ class SteerSession(Guided):
     def advance(self, seconds: float) -> Pose:
         """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. Its
         events are those since the pose before. A command shows within a tick. ControlError unless 0 <= seconds <= 1."""
-        if not 0 <= seconds <= 1:
+        if not is_number(seconds) or not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
         events, self._late = self._late, ()
         if self._poses is None:
@@ -396,6 +398,7 @@ class SteerSession(Guided):
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it, of the same model and the same ``hold_feet``, else
         ControlError. The session has as many characters then as the snapshot."""
+        needs(snapshot, SteerSnapshot, "a snapshot of a session")
         command = snapshot.command
         if (snapshot.lock is None) != (self._lock is None):
             has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")

@@ -1,15 +1,16 @@
 """The motion: frames of named channels with units and a frame rate. Immutable, finite, never guessed."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from os import PathLike
 from typing import Any, SupportsIndex
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import MotionError, listed
+from motet.errors import ArgumentError, MotionError, listed, quoted
 from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
 from motet.motion.skeleton import Skeleton
 
@@ -135,6 +136,8 @@ class Motion:
         """The same motion with skeleton and "length" channels in another length unit."""
         if self.skeleton is None:
             raise MotionError("a motion without a skeleton has no length unit to convert from")
+        if not isinstance(metres_per_unit, int | float) or not 0 < metres_per_unit < np.inf:
+            raise MotionError(f"a unit is a positive number of metres, not {metres_per_unit!r}")
         factor = self.skeleton.unit_factor(metres_per_unit)
         factors = [factor if unit == "length" else 1.0 for unit in self.units]
         return replace(self, values=self.values * factors, skeleton=self.skeleton.scaled(metres_per_unit))
@@ -151,8 +154,8 @@ class Motion:
         The first frame is kept, or the last one (``to_end``). Unless frames are merely picked, jumps of angles are
         removed first (:meth:`continuous`).
         """
-        if not (np.isfinite(fps) and fps > 0):
-            raise MotionError(f"the frame rate must be a positive number, not {fps}")
+        if not isinstance(fps, int | float | np.number) or not 0 < fps < np.inf:
+            raise MotionError(f"the frame rate must be a positive number, not {fps!r}")
         if fps == self.fps:
             return self
         ratio = self.fps / fps
@@ -263,3 +266,27 @@ def _between(values: Array, times: Array) -> tuple[NDArray[np.intp], Array]:
     # a time that equals a frame up to rounding is that frame
     start = np.minimum((times + 1e-9).astype(np.intp), len(values) - 2)
     return start, (times - start).reshape(-1, *[1] * (values.ndim - 1))
+
+
+def motions_of(given: Motion | Iterable[Motion]) -> list[Motion]:
+    """A motion, or several, as a list; ArgumentError for anything else."""
+    motions: list[Motion] = []
+    for motion in given if is_many(given) and not isinstance(given, Motion) else [given]:
+        if not isinstance(motion, Motion):
+            remedy = ": motet.read() reads a file" if isinstance(motion, str | PathLike) else ""
+            raise ArgumentError(f"expected a motion, not {quoted(repr(motion))}{remedy}")
+        motions.append(motion)
+    return motions
+
+
+def with_frames(motion: Motion) -> Motion:
+    """A motion; ArgumentError if it is none, MotionError if it has no frames."""
+    motions_of([motion])
+    if not len(motion):
+        raise MotionError("the motion has 0 frames")
+    return motion
+
+
+def is_many(given: object) -> bool:
+    """Whether something is several things, and no text."""
+    return isinstance(given, Iterable) and not isinstance(given, str | bytes)

@@ -37,6 +37,14 @@ class Pose:
     contacts: Floats
     events: tuple[Event, ...] = ()
 
+    def read_only(self) -> "Pose":
+        """The same, whose arrays cannot be written into: what a session gives is the state that it goes on from."""
+        ground, rotations = self.ground.view(), self.rotations.view()
+        height, contacts = self.height.view(), self.contacts.view()
+        for array in (ground, rotations, height, contacts):
+            array.flags.writeable = False
+        return Pose(ground, rotations, height, contacts, self.events)
+
     def __len__(self) -> int:
         """B."""
         return len(self.ground)
