@@ -74,6 +74,8 @@ def test_the_innermost_collects_its_categories_and_others_go_on() -> None:
         warn("a speed", ControlWarning)
         with pytest.warns(TravelWarning, match="a path"):
             warn("a path", TravelWarning)
+    with pytest.warns(TextWarning, match="after both"):
+        warn("after both", TextWarning)
     assert (each_once(outer), each_once(inner)) == (["a speed"], ["a word"])
 
 

@@ -211,13 +211,13 @@ def test_damaged_files_give_a_motion_or_an_error_of_motet(tmp_path: Path, name: 
     for n in range(400):
         file = sorted(original)[n % len(original)]
         file.write_bytes(mutated(original[file], rng))
-        started = time.monotonic()
+        started = time.process_time()
         try:
             motion = read_motion(path)
             assert np.isfinite(motion.values).all()
         except MotetError as error:
             messages.append(str(error))
-        slowest = max(slowest, time.monotonic() - started)
+        slowest = max(slowest, time.process_time() - started)
         file.write_bytes(original[file])
     assert 50 < len(messages) < 400
     assert max(map(len, messages)) < 2000

@@ -292,6 +292,23 @@ SHARED = {
 
 
 @pytest.mark.parametrize("share", SHARED.values(), ids=SHARED)
+def test_more_primitives_than_any_character_has_are_not_computed(
+    tmp_path: Path,
+    share: Callable[[dict[str, Any]], None],
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    file = character(tmp_path / "avatar.glb")
+    document, binary = parts(file)
+    share(document)
+    file.write_bytes(packed(document, binary))
+    monkeypatch.setattr(gltf_character, "MAX_PRIMITIVES", 10_000)
+    with caplog.at_level("INFO", logger="motet"):
+        assert read_character(file).skin == {}
+    assert "its nodes have more than 10000 primitives of meshes" in caplog.text
+
+
+@pytest.mark.parametrize("share", SHARED.values(), ids=SHARED)
 def test_what_many_nodes_share_is_computed_once(
     tmp_path: Path, share: Callable[[dict[str, Any]], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -320,8 +337,6 @@ def test_meshes_with_too_many_points_are_not_computed(
     with caplog.at_level("INFO", "motet"):
         assert read_character(character(tmp_path / "avatar.glb")).skin == {}
     assert "6 points, more than 5" in caplog.text
-    monkeypatch.setattr(gltf_character, "MAX_PRIMITIVES", 0)
-    assert read_character(character(tmp_path / "avatar.glb")).skin == {}
 
 
 def test_a_loop_of_links_is_no_buffer(tmp_path: Path) -> None:

@@ -302,6 +302,10 @@ def test_who_waits_longest_gives_way_to_a_newcomer(limits: dict[str, int]) -> No
         writer.write(HALF + b"Connection: close\r\n\r\n")
         assert (await reader.read()).startswith(b"HTTP/1.1 200")
         writer.close()
+        newest, half = halves[-1]
+        half.write(b"Connection: close\r\n\r\n")
+        assert (await newest.read()).startswith(b"HTTP/1.1 200")
+        half.close()
         for first, half in halves[:16]:
             with suppress(ConnectionResetError):
                 assert await first.read() == b""
