@@ -31,7 +31,7 @@ from motet.errors import (
     TravelWarning,
     UnitError,
 )
-from motet.formats import Character, clips
+from motet.formats import Character, clips, figures_in
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
 from motet.live.page import live_page, write_live_page
@@ -67,8 +67,8 @@ __all__ = [
     "Passage", "Pose", "PredictModel", "PredictSession", "Quantities", "SaidActs", "ScriptError", "SearchModel",
     "SessionOptions", "SettingError", "Shown", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings",
     "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning", "Understood",
-    "UnitError", "check", "clips", "from_humanoid", "list_bundles", "live_page", "load", "load_as", "motion",
-    "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo", "write_live_page",
+    "UnitError", "check", "clips", "figures_in", "from_humanoid", "list_bundles", "live_page", "load", "load_as",
+    "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo", "write_live_page",
 ]
 # fmt: on
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from motet.errors import MotionError
 from motet.files import place_of
-from motet.formats import READABLE, clips, read_motion
-from motet.formats.text import Clip, chosen, split_clip
+from motet.formats import contents_of, read_motion, split_part
+from motet.formats.text import Clip, Figure, choice
 from motet.motion.feet.treadmill import IMPLIED, is_in_place
 from motet.motion.humanoid import (
     HUMANOID,
@@ -31,6 +31,8 @@ class Checked:
     """One clip of a motion file, or all of a file without clips.
 
     file: its path. clip: its name, None in a file without clips. clips: the names of all clips of the file.
+    figure: the name of the skeleton that was asked for, None for the format's default. figures: the names of all
+        skeletons of the file; empty where a format names none.
     frames, fps: how many, and how many a second. joints: of the skeleton, 0 where there is none.
     refused: why it is not taken for a human's motion; what follows is then None or empty. None where it is one.
     convention: of the joints' names, or "by the tree". confidence: from 0 to 1, that every joint is what it is taken
@@ -49,6 +51,8 @@ class Checked:
     file: str
     clip: str | None
     clips: tuple[str, ...]
+    figure: str | None
+    figures: tuple[str, ...]
     frames: int
     fps: float
     joints: int
@@ -85,18 +89,27 @@ class Checked:
         return {**asdict(self), "seconds": self.seconds, "sure": self.sure, "in_place": self.in_place}
 
 
-def check(file: str | Path, *, clip: Clip = None, **options: Any) -> Checked:
-    """Look at a motion file, or at one clip of it: "file.glb#Walk", or ``clip``, by default the first.
+def check(file: str | Path, *, clip: Clip = None, figure: Figure = None, **options: Any) -> Checked:
+    """Look at a motion file, or at one clip or figure of it: "file.glb#Walk", ``clip``, by default the first, and
+    ``figure``, by default the one that moves the most.
 
     options: as :func:`motet.read` takes them. FormatError for what cannot be read; what is read, and is no human's
     motion, has the reason in :attr:`Checked.refused`.
     """
-    motion = read_motion(file, clip=clip, **options)
-    place, named = split_clip(file, READABLE)
-    names = clips(place_of(place), format=options.get("format"))
-    taken = names[chosen(place_of(place), names, (named if clip is None else clip) or 1)] if names else None
+    motion = read_motion(file, clip=clip, figure=figure, **options)
+    unnamed, named_clip, named_figure = split_part(file, options.get("format"))
+    clip = named_clip if clip is None else clip
+    figure = named_figure if figure is None else figure
+    path = place_of(unnamed)
+    parts = contents_of(path, format=options.get("format"))
+    titles = tuple(parts.figures)
+    if clip is None and figure is None and parts.clips:
+        clip = 1
+    at, place_of_figure = choice(path, parts, clip, figure)
+    taken = None if at is None else parts.clips[at]
+    title = None if place_of_figure is None else titles[place_of_figure]
     joints = 0 if motion.skeleton is None else len(motion.skeleton.joints)
-    about = (str(place_of(place)), taken, names, len(motion), motion.fps, joints)
+    about = (str(path), taken, parts.clips, title, titles, len(motion), motion.fps, joints)
     try:
         found = to_humanoid(motion)
     except MotionError as error:

@@ -97,7 +97,7 @@ def test_where_one_motion_is_wanted_one_is_named(tmp_path: Path) -> None:
     assert run("join", f"{path}#Walk", f"{path}#A/B", "-o", tmp_path / "a.bvh").exit_code == 0
     refused = run("join", path, path, "--clip", "all", "-o", tmp_path / "b.bvh")
     assert refused.exit_code == 2
-    assert f"expected one motion, but {path} holds 2 clips: name one" in refused.stderr
+    assert f"expected one motion, but {path} holds 2 motions: name one" in refused.stderr
 
 
 def test_search_finds_each_clip_for_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -220,7 +220,7 @@ def test_more_frames_than_declared_are_taken_and_said(read, caplog):
         ("Frames: 2", "Frames: " + "9" * 5000, 17, "'Frames: 9999"),
         ("    OFFSET 0 5 0\n", "", 6, "joint 'Chest' has no OFFSET"),
         ("      OFFSET 0 3 0\n", "", 10, "joint 'Chest_end' has no OFFSET"),
-        ("MOTION", "ROOT Other\n{\n}\nMOTION", 16, "a single tree of joints"),
+        ("MOTION", "JOINT Other\n{\n}\nMOTION", 16, "expected trees of joints"),
         ("  OFFSET 0 5 0\n", "  SIZE 0 5 0\n", 8, "'SIZE 0 5 0' does not belong here"),
         ("\n}\nMOTION", "\nMOTION", 15, "'MOTION' does not belong here"),
         ("  JOINT Chest\n", "", 6, "'{' does not belong here"),

@@ -76,7 +76,7 @@ def test_takes_are_clips_in_any_script() -> None:
     look = Curves("camera", [0.0, 1.0], {(len(ARM), "T"): np.eye(3)[:2]})
     content = ascii_fbx(document([*ARM, camera], [look, *takes, replace(look, name="none", values={})], settings(Y_UP)))
     pytest.importorskip("ufbx")
-    assert fbx.clips(io.BytesIO(content)) == tuple(lengths)
+    assert fbx.contents(io.BytesIO(content)).clips == tuple(lengths)
     for number, (name, frames) in enumerate(lengths.items(), start=1):
         assert len(load(content, name if number % 2 else number)) == frames
     with pytest.raises(FormatError, match="no clip 'Jump': expected '歩く/1', "):
@@ -93,6 +93,7 @@ def test_a_clip_is_named_behind_the_path(tmp_path: Path) -> None:
 
 def test_a_few_curves_of_dense_keys_do_not_tell_the_rate() -> None:
     """As those that a program baked at 300 a second, among a figure's at the file's own rate."""
+    pytest.importorskip("ufbx")
     from motet.formats import fbx_to_gltf
 
     def curve(fps: float) -> Any:
@@ -101,13 +102,24 @@ def test_a_few_curves_of_dense_keys_do_not_tell_the_rate() -> None:
     scene: Any = SimpleNamespace(scene=SimpleNamespace(settings=SimpleNamespace(frames_per_second=30.0)))
     for dense, wanted in ((3, 30.0), (7, 300.0)):
         take: Any = SimpleNamespace(curves=[curve(300)] * dense + [curve(30)] * (10 - dense))
-        assert fbx_to_gltf.frame_rate(scene, take) == pytest.approx(wanted)
+        fps, note = fbx_to_gltf.frame_rate(scene, take)
+        assert fps == pytest.approx(wanted)
+        assert bool(note) == (wanted == 300.0)
     still: Any = SimpleNamespace(curves=[])
-    assert fbx_to_gltf.frame_rate(scene, still) == 30.0
+    assert fbx_to_gltf.frame_rate(scene, still) == (30.0, "")
+    scene.scene.settings.frames_per_second = 1e6
+    assert fbx_to_gltf.frame_rate(scene, still) == (
+        30.0,
+        "it states 1e+06 fps: reading 30, as rates are above 0 and at most 1000",
+    )
 
 
-def test_keys_denser_than_the_file_s_rate_tell_the_rate() -> None:
-    assert load(ascii_fbx(document(ARM, [swing(frames=121, fps=120)], settings(Y_UP)))).fps == 120.0
+def test_keys_denser_than_the_file_s_rate_tell_the_rate(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, "motet"):
+        assert load(ascii_fbx(document(ARM, [swing(frames=121, fps=120)], settings(Y_UP)))).fps == 120.0
+    assert [record.message for record in caplog.records] == [
+        "<file object>: it states 24 fps, but most of its curves have 120 keys a second: reading these"
+    ]
     sparse = swing(frames=5, fps=2)
     motion = load(ascii_fbx(document(ARM, [sparse], settings(Y_UP, mode=6))))
     assert (motion.fps, len(motion)) == (30.0, 61)
@@ -168,7 +180,7 @@ def test_of_two_skeletons_the_one_that_moves_is_taken(caplog: pytest.LogCaptureF
     assert motion.skeleton is not None
     assert motion.skeleton.names[0] == "hips"
     assert [record.message for record in caplog.records] == [
-        "<file object>: of 2 skeletons, reading that of 'hips', which moves the most"
+        "<file object>: of 2 skeletons, reading that of 'hips', which moves the most; figure= or --figure takes another"
     ]
 
 

@@ -87,6 +87,7 @@ def test_a_damaged_part_is_refused(changes: dict[str, Any], said: str, plain: Pa
 @pytest.mark.parametrize(("length", "count", "fits"), [(64, 64 * 128, True), (64, 64 * 128 + 1, False)])
 def test_a_packed_part_holds_at_most_what_its_bytes_can_expand_to(length: int, count: int, fits: bool) -> None:
     """A block of 256 equal bytes takes two bits: 1,024 bytes a byte. Beyond that nothing is unpacked at all."""
+    pytest.importorskip("meshopt")
     gltf = gltf_data.Gltf(Path("a.glb"), {}, (bytes(length),))
     part = {"buffer": 0, "byteLength": length, "count": count, "byteStride": 8, "mode": "ATTRIBUTES"}
     with pytest.raises(FormatError, match="is broken: Malformed" if fits else f"cannot hold {count} elements"):

@@ -10,7 +10,7 @@ from gltf_files import node_places, read_document, write_clips, write_document
 
 import motet
 from motet.errors import FormatError
-from motet.formats.text import clip_names
+from motet.formats.text import part_names
 from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
@@ -89,17 +89,17 @@ def test_a_clip_that_is_not_there_is_refused_with_those_that_are(clip: str | int
 
 
 def test_of_formats_without_clips_none_is_named_or_read(tmp_path: Path) -> None:
-    motet.write(tmp_path / "a.bvh", swinging(3))
-    assert motet.clips(tmp_path / "a.bvh") == ()
+    motet.write(tmp_path / "a.npz", swinging(3))
+    assert motet.clips(tmp_path / "a.npz") == ()
     with pytest.raises(FormatError, match=r"'clip' is an option for \.glb \.gltf \.vrm \.vrma"):
-        motet.read(f"{tmp_path / 'a.bvh'}#Walk")
+        motet.read(f"{tmp_path / 'a.npz'}#Walk")
     with pytest.raises(FormatError, match=r"^\S*none\.glb: no such file"):
         motet.read(tmp_path / "none.glb#Walk")
 
 
 def test_names_are_made_plain_and_different() -> None:
     given = ["Walk", "", "Walk", " Walk ", "歩く", "a/b#c", "Line\nbreak \x1b[31m", "1", "clip2", "x" * 999]
-    found = clip_names(given)
+    found = part_names(given)
     assert found[:7] == ("Walk", "clip2", "Walk_2", "Walk_3", "歩く", "a/b#c", "Line break [31m")
     assert found[7:9] == ("1", "clip2_2")
     assert len(set(found)) == len(given)

@@ -23,7 +23,6 @@ from motet.corpus.answers import Answer, Check, Verb, to_json
 from motet.corpus.sources import Source, files_of
 from motet.draw.page import write_many
 from motet.formats import READS, WRITES, write_motion
-from motet.formats.text import MARK
 from motet.motion.feet.hold import hold_feet as feet_held
 from motet.motion.feet.treadmill import with_travel
 from motet.motion.humanoid import LENGTH_UNITS, read_map, to_humanoid
@@ -101,7 +100,7 @@ class Look(Check):
             figures = {bare: self.read(answer)}
             if found.refused is None:
                 figures["as the humanoid"] = to_humanoid(figures[bare]).motion
-            title = source.path.name + (f"{MARK}{found.clip}" if found.clip else "")
+            title = source.path.name + source.part
             write_many(source.place, list(figures.values()), list(figures), title, bare=[bare])
         return [found]
 
@@ -132,9 +131,9 @@ def _print_text(rows: Iterator[Row], sources: Sequence[Source], counts: Mapping[
     for file, of_file in groupby(rows, key=lambda row: row.source.path):
         last = None
         for row in of_file:
-            if row.source.clip is not None and last is None:
+            if row.source.part and last is None:
                 click.echo(str(file))
-            name = str(file) if row.source.clip is None else f"  #{row.source.clip}"
+            name = f"  {row.source.part}" if row.source.part else str(file)
             said = f"{row.verdict}, as above" if row.reason and last and last.reason == row.reason else _line(row)
             click.echo(f"{name:<{width - 2}}  {said}")
             last = row
@@ -167,6 +166,10 @@ def _report(row: Row) -> Iterator[str]:
     said: list[tuple[str, str]] = []
     if found.clips:
         said.append(("clip", f"{found.clip}, {found.clips.index(found.clip or '') + 1} of {len(found.clips)}"))
+    if len(found.figures) > 1:
+        names = ", ".join(found.figures)
+        taken = "the default" if found.figure is None else found.figure
+        said.append(("figures", f"{taken}, of {len(found.figures)}: {names} (--figure)"))
     said += [("refused", found.refused)] if found.refused else _understood(found)
     said.append(("length", size(found.frames, found.fps)))
     said += [("" if number else "assumed", note) for number, note in enumerate(found.notes)]
@@ -308,7 +311,7 @@ def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:
 def view(sources: tuple[Path, ...], out: Path | None, read: Read) -> None:
     """Write a self-contained page that plays each motion file, and print its path."""
     tries, given = Tries(), read.sources(sources)
-    new = ((source, source.name if source.clip is None else source.label) for source in given)
+    new = ((source, source.label if source.part else source.name) for source in given)
     pages = places(out, given) if out else [Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html" for _, name in new]
     for source, page in zip(given, pages, strict=True):
         with tries.of(source):

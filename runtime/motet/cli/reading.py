@@ -16,33 +16,39 @@ from motet.motion.skeleton import METRES
 
 log = logging.getLogger(__name__)
 
+FPS_IN = click.FloatRange(1e-3, 1e5)
+"""Frame rates that files may have, as :func:`motet.formats.text.frame_rate` takes them."""
+
 FPS = click.FloatRange(0, 10_000, min_open=True)
-"""Frame rates that a motion is read with or resampled to."""
+"""Frame rates that a motion is resampled to."""
 
 
 @dataclass(frozen=True)
 class Read:
     """Reads motion files as the options of a command say. clip: a name, a number or "all", where none is in a path.
+    figure: the same of a file's skeletons.
 
     rates: the frame rates of the motions that were read.
     """
 
     options: Mapping[str, Any]
     clip: str | None
+    figure: str | None = None
     rates: list[float] = field(default_factory=list)
 
     def __call__(self, given: Path | Source) -> Motion:
         """The motion of a file, of one clip of it; FormatError as :func:`motet.read`."""
         source, *others = [given] if isinstance(given, Source) else self.sources([given])
         if others:
-            raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} clips: name one")
+            raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} motions: name one")
         motion = source.read(**self.options)
         self.rates.append(motion.fps)
         return motion
 
     def sources(self, given: Sequence[Path], every: bool = False) -> list[Source]:
-        """What files hold, as ``--clip`` says or their own names (a.glb#Walk). every: all clips where nothing does."""
-        return [source for path in given for source in sources_of(path, self.clip, every)]
+        """The motions of files, as ``--clip``, ``--figure`` or their own names (a.glb#Walk) select them. every: all
+        clips where nothing does."""
+        return [source for path in given for source in sources_of(path, self.clip, self.figure, every)]
 
     def say_resampled(self, rate_of: Callable[[], float]) -> None:
         """Log in one line how many of the motions that were read have another frame rate than a model's, for which a
@@ -65,16 +71,19 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
         return " ".join(kind.extension for kind in FORMATS if option in kind.options)
 
     @unit_option
-    @click.option("--fps-in", type=FPS, help=f"Frame rate of files that have none ({takers('fps')}).")
+    @click.option("--fps-in", type=FPS_IN, help=f"Frame rate of files that have none ({takers('fps')}).")
     @click.option("--asf", type=Path, help=f"Skeleton of the files ({takers('asf')}). [default: found beside them]")
     @click.option("--clip", metavar="NAME|N|all", help=f"Clip of files with several ({takers('clip')}).")
+    @click.option("--figure", metavar="NAME|N|all", help=f"Skeleton of files with several ({takers('figure')}).")
     @click.option("--partial", is_flag=True, help=f"Take the complete frames of truncated files ({takers('partial')}).")
     @click.option(
         "--rest", type=Path, metavar="FILE", help=f"File with the same joints in a T-pose ({takers('rest')})."
     )
     @functools.wraps(command)
-    def with_read(unit_in: str | None, fps_in: float | None, clip: str | None, **options: Any) -> None:
+    def with_read(
+        unit_in: str | None, fps_in: float | None, clip: str | None, figure: str | None, **options: Any
+    ) -> None:
         given = {"unit": unit_in, "fps": fps_in, **{name: options.pop(name) for name in ("asf", "partial", "rest")}}
-        command(read=Read(given, clip), **options)
+        command(read=Read(given, clip, figure), **options)
 
     return with_read

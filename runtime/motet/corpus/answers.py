@@ -245,5 +245,5 @@ class Check(Verb):
 def look(source: Source, reading: Mapping[str, Any]) -> Checked:
     """:func:`motet.check` of a source, whose file may be in a zip."""
     with opened(source.path) as file:
-        found = checked.check(file, clip=source.clip, **reading)
+        found = checked.check(file, clip=source.clip, figure=source.figure, **reading)
     return found if file == source.path else replace(found, file=str(source.path))

@@ -13,9 +13,9 @@ from typing import Any
 from motet.archives import MAX_FILE, ZipFiles, copy_bounded, is_plain_path
 from motet.errors import FormatError, MotetError, MotionError
 from motet.files import files_in, place_of
-from motet.formats import CLIPPED, MOCAP, READABLE, clips, read_motion
+from motet.formats import CLIPPED, MOCAP, READABLE, contents_of, read_motion, split_part
 from motet.formats.amc import skeleton_for
-from motet.formats.text import MARK, chosen, plain_names, split_clip
+from motet.formats.text import MARK, Contents, choice, chosen, plain_names, split_clip
 from motet.motion.motion import Motion
 
 KINDS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
@@ -24,7 +24,7 @@ KINDS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
 
 @dataclass(frozen=True)
 class Source:
-    """A motion file, and which clip of it; None for the first.
+    """A motion file, and which clip and figure of it; None for the format's defaults.
 
     path: of the file; one in a zip has the zip's path before its own: a.zip/walks/1.bvh. place: where its result is
     written, if it is written to a file of its own. number: of the file in its corpus.
@@ -32,11 +32,17 @@ class Source:
 
     path: Path
     clip: str | None = None
+    figure: str | None = None
     place: Path | None = None
     number: int = 0
 
     def __str__(self) -> str:
-        return str(self.path) if self.clip is None else f"{self.path}{MARK}{self.clip}"
+        return f"{self.path}{self.part}"
+
+    @property
+    def part(self) -> str:
+        """The clip and the figure as they are named after the path: "#Walk"; empty for the defaults."""
+        return "".join(f"{MARK}{name}" for name in (self.clip, self.figure) if name is not None)
 
     @property
     def name(self) -> str:
@@ -45,21 +51,44 @@ class Source:
 
     @property
     def label(self) -> str:
-        """What stands for ``{clip}``: the clip's name, as a file name can have it, or the file's where it has none."""
-        names, index = self._clips()
+        """The text for ``{clip}``: the names of clip and figure as a file name can have them, or the file's name where
+        it has none."""
         # what the name of a file cannot have, on one system or another
-        return plain_names(names, r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$')[index]
+        forbidden = r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$'
+        parts = self.contents()
+        clip = 1 if self.clip is None and self.figure is None and parts.clips else self.clip
+        try:
+            at, place = choice(self.path, parts, clip, self.figure)
+        except FormatError:  # it is said when the file is read
+            return self.name
+        labels = []
+        if at is not None:
+            labels.append(plain_names(parts.clips, forbidden)[at])
+        if place is not None and len(parts.figures) > 1:
+            labels.append(plain_names(parts.figures, forbidden)[place])
+        return "-".join(labels) or self.name
 
     @property
     def title(self) -> str:
-        """What its result is called as a clip: the clip's name where one was asked for, else the file's."""
-        names, index = self._clips()
-        return self.name if self.clip is None else names[index]
+        """What its result is called as a clip: the names of the clip and figure asked for, else the file's."""
+        if not self.part:
+            return self.name
+        parts = self.contents()
+        try:
+            clip, figure = choice(self.path, parts, self.clip, self.figure)
+        except FormatError:  # it is said when the file is read
+            return self.name
+        titles = []
+        if clip is not None:
+            titles.append(parts.clips[clip])
+        if figure is not None:
+            titles.append(tuple(parts.figures)[figure])
+        return "-".join(titles)
 
     def read(self, **options: Any) -> Motion:
         """The motion, with options of :func:`motet.read`; FormatError as there, and for a damaged zip."""
         with opened(self.path) as file:
-            return read_motion(file, clip=self.clip, **options)
+            return read_motion(file, clip=self.clip, figure=self.figure, **options)
 
     def hash(self) -> str:
         """SHA-256 of the file, in hex; "" where it cannot be read."""
@@ -69,14 +98,13 @@ class Source:
         except (MotetError, OSError):
             return ""
 
-    def _clips(self) -> tuple[tuple[str, ...], int]:
-        """The names of the file's clips, its own where it has none, and which of them it is."""
+    def contents(self) -> Contents:
+        """The clips and figures of the file; none where it cannot be read."""
         try:
             with opened(self.path) as file:
-                names = clips(file)
-            return names, chosen(self.path, names, 1 if self.clip is None else self.clip)
-        except MotetError:
-            return (self.name,), 0
+                return contents_of(file)
+        except MotetError:  # it is said when the file is read
+            return Contents((), {})
 
 
 def files_of(given: Sequence[Path]) -> list[Path]:
@@ -106,19 +134,41 @@ def _files(path: Path) -> list[Path]:
     return found
 
 
-def sources_of(file: Path, clip: str | None = None, every: bool = False) -> list[Source]:
-    """What a file holds, as its own name (a.glb#Walk) or ``clip`` says: a name, a number or "all". every: all clips
-    where nothing does."""
-    path, named = split_clip(file, READABLE)
-    path, asked = place_of(path), "all" if every and clip is None else clip
-    if named is not None or asked != "all":
-        return [Source(path, asked if named is None else named)]
+def sources_of(file: Path, clip: str | None = None, figure: str | None = None, every: bool = False) -> list[Source]:
+    """The motions of a file that its own name (a.glb#Walk), ``clip`` and ``figure`` select: a name, a number or "all".
+
+    every: all clips where none is selected.
+    """
+    unnamed, named_clip, named_figure = split_part(file)
+    path = place_of(unnamed)
+    if named_clip is not None:
+        clip = named_clip
+    elif every and clip is None:
+        clip = "all"
+    if named_figure is not None:
+        figure = named_figure
+    if clip != "all" and figure != "all":
+        return [Source(path, clip, figure)]
+    parts = Source(path).contents()
+    titles: list[str | None] = [figure]
+    if figure == "all":
+        titles = list(parts.figures) if len(parts.figures) > 1 else [None]
+    sources = []
+    for title in titles:
+        sources += [Source(path, name, title) for name in _clips_of(parts, path, clip, title)]
+    return sources
+
+
+def _clips_of(parts: Contents, path: Path, clip: str | None, figure: str | None) -> list[str | None]:
+    """The clips of a figure that are meant; None for a file's only one, and for one that has yet to be refused."""
+    if clip != "all":
+        return [clip]
+    titles = tuple(parts.figures)
     try:
-        with opened(path) as place:
-            names = clips(place)
-    except MotetError:  # it is said when the file is read
+        names = parts.clips if figure is None else parts.figures[titles[chosen(path, titles, figure, "figure")]]
+    except FormatError:  # it is said when the file is read
         names = ()
-    return [Source(path, name) for name in names] if len(names) > 1 else [Source(path)]
+    return list(names) if len(names) > 1 else [None]
 
 
 @contextmanager

@@ -1,9 +1,10 @@
 """Files of motion: one record per format, chosen by the extension.
 
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
-binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions, it also
-has ``clips(file)``, which returns their names, and ``read`` takes "clip". To add a format, write its module and add its
-record to :data:`FORMATS`, which help texts, the table of docs/formats.md and the lists of corpora are built from.
+binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions
+or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes "clip", "figure" or both. To
+add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of docs/formats.md and
+the lists of corpora are built from.
 """
 
 import logging
@@ -19,7 +20,7 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.files import File, check_place, place_of
-from motet.formats.text import Clip, split_clip
+from motet.formats.text import Clip, Contents, Figure, split_clip
 from motet.motion.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
 from motet.motion.motion import Motion, motions_of
 from motet.motion.root_motion import travel_on_root
@@ -84,11 +85,11 @@ _KEEPS = {
     ".html": "a page with a player: orbit, play, scrub, no network",
     ".gif": "an animated picture; needs Pillow: `pip install 'motet[plot]'`",
 }
-_NODES = ("clip", "rest")
+_NODES = ("clip", "figure", "rest")
 
 FORMATS = (
     Format(".amc", "Acclaim, with its .asf", "formats.amc", "formats.amc.write", ("asf", "fps", "partial"), mocap=True),
-    Format(".bvh", "Biovision", "formats.bvh", "formats.bvh.write", ("partial",), mocap=True),
+    Format(".bvh", "Biovision", "formats.bvh", "formats.bvh.write", ("figure", "partial"), mocap=True),
     Format(".npz", "motet's own; SMPL", "formats.npz", "formats.npz.write", ("fps",), mocap=True),
     Format(".csv", "table", "formats.csv", "formats.csv.write"),
     Format(".xml", "MMM of KIT", "formats.mmm"),
@@ -105,6 +106,7 @@ READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
 WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
 MOCAP = tuple(kind.extension for kind in FORMATS if kind.mocap)
 CLIPPED = tuple(kind.extension for kind in FORMATS if "clip" in kind.options)
+FIGURED = tuple(kind.extension for kind in FORMATS if "figure" in kind.options)
 READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.reader)
 WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writer)
 """The formats as help texts list them."""
@@ -140,10 +142,12 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     unit: str | float | None = None,
     partial: bool = False,
     clip: Clip = None,
+    figure: Figure = None,
     rest: File | None = None,
     format: str | None = None,
 ) -> Motion:
-    """Read a motion file or a binary file object; "file.glb#Walk" is the clip Walk of file.glb.
+    """Read a motion file or a binary file object; "file.glb#Walk" is the clip Walk of file.glb, or the figure
+    Walk where no clip has this name.
 
     fps: the frame rate of a file that states none, such as AMC's and some of SMPL's.
     asf: the skeleton of an AMC file; by default it is looked for beside it.
@@ -151,6 +155,8 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
         is only a convention, it applies unless the figure is human-sized in metres and not in that unit.
     partial: read the complete frames of a truncated AMC or BVH file instead of refusing it.
     clip: a motion of a file with several: a name from :func:`clips` or a number from 1; default: the first.
+    figure: a skeleton of a file with several: a name from :func:`figures_in` or a number from 1; default: the one that
+        moves the most, in BVH the first. Without a clip, the first clip that moves it is read.
     rest: a glTF file with the same joints in a T-pose, for glTF and FBX files whose rest pose is their first frame;
         "file.glb#TPose" means the first frame of that clip. For FBX, an FBX file works too.
     format: the extension, such as "bvh", if it differs from the path's; required for a file object.
@@ -158,9 +164,11 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     FormatError for an unknown extension, a missing file, one that is not a motion, and an option that the format does
     not take or the file contradicts.
     """
-    file, named = split_clip(file, READABLE)
+    file, named_clip, named_figure = split_part(file, format)
     kind, path = _format(file, format, READABLE, "read"), place_of(file)
-    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": named if clip is None else clip, "rest": rest}
+    clip = named_clip if clip is None else clip
+    figure = named_figure if figure is None else figure
+    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "figure": figure, "rest": rest}
     options = {name: value for name, value in given.items() if value is not None}
     for name in options.keys() - set(kind.options):
         takers = " ".join(known.extension for known in FORMATS if name in known.options)
@@ -172,6 +180,17 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
         return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
     except MotionError as error:
         raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
+
+
+def split_part(file: File, format: str | None = None) -> tuple[File, str | None, str | None]:
+    """A file without the part named after its mark, and this part as a clip or, in a format without clips but with
+    figures, as a figure."""
+    file, named = split_clip(file, READABLE)
+    if named is None:
+        return file, None, None
+    extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
+    has_only_figures = extension in FIGURED and extension not in CLIPPED
+    return (file, None, named) if has_only_figures else (file, named, None)
 
 
 def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
@@ -193,9 +212,24 @@ def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
     They are unique; empty if the format holds one motion per file, or the file holds none. format: see
     :func:`read_motion`. FormatError for an unknown extension, or for a damaged file of a format with clips.
     """
+    return contents_of(file, format=format).clips
+
+
+def figures_in(file: File, *, format: str | None = None) -> tuple[str, ...]:
+    """The names of the skeletons in a file, for ``figure`` of :func:`read_motion`.
+
+    They are unique; empty if the format holds one skeleton per file, or none. Errors like :func:`clips`.
+    """
+    return tuple(contents_of(file, format=format).figures)
+
+
+def contents_of(file: File, *, format: str | None = None) -> Contents:
+    """The names of the motions and skeletons in a file; errors like :func:`clips`."""
     kind = _format(file, format, READABLE, "read")
-    found: tuple[str, ...] = kind.module().clips(file) if "clip" in kind.options else ()
-    return found
+    if not {"clip", "figure"} & {*kind.options}:
+        return Contents((), {})
+    contents: Contents = kind.module().contents(file)
+    return contents
 
 
 def names_motion(text: str) -> bool:

@@ -25,27 +25,31 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 log = logging.getLogger(__name__)
 
 
-def read(file: File, partial: bool = False) -> Motion:
+def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motion:
     """Read a BVH file: channels in the file's order, units "deg" and "length".
 
     A frame time is read as a whole number of frames per second if its digits allow only one: 0.0083333 is 120 fps,
     but 0.03, which could mean 29 to 40, is 33.33.
     partial: read the complete frames of a file that is truncated or holds fewer than it declares instead of refusing
         it. If it holds more, all are read, with a warning in the log.
+    figure: one of several ROOTs, by its name or its number from 1; by default the first, with a warning in the log.
     FormatError names file and line.
     """
     path, lines = place_of(file), text.read_text(file).split("\n")
-    nodes, motion_line = _hierarchy(path, lines)
+    figures, motion_line = _hierarchy(path, lines)
+    names = _figure_names(figures)
+    chosen = text.chosen(path, names, figure, "figure")
     start, declared, fps = _motion_header(path, lines, motion_line)
-    channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
+    widths = [sum(len(node.channels) for node in nodes) for nodes in figures]
+    width = sum(widths)
     # without channels nothing else confirms the number
-    if not channels and declared > 10**7:
+    if not width and declared > 10**7:
         raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
     if partial:  # leave out an incomplete last frame
         last = max((n for n in range(start, len(lines)) if lines[n].strip()), default=start)
-        if last < len(lines) and len(lines[last].split()) != len(channels):
+        if last < len(lines) and len(lines[last].split()) != width:
             lines = lines[:last]
-    values = _values(path, lines, start, len(channels)) if channels else np.zeros((declared, 0))
+    values = _values(path, lines, start, width) if width else np.zeros((declared, 0))
     if len(values) < declared and not partial:
         reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
         raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
@@ -53,8 +57,22 @@ def read(file: File, partial: bool = False) -> Motion:
         log.info("%s: read %d of the declared %d frames", path, len(values), declared)
     elif len(values) > declared:
         log.warning("%s: it declares %d frames but holds %d: read them all", path, declared, len(values))
+    nodes = figures[chosen]
+    first_column = sum(widths[:chosen])
+    values = values[:, first_column : first_column + widths[chosen]]
+    channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
     return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
+
+
+def contents(file: File) -> text.Contents:
+    """The ROOTs; FormatError like :func:`read` for what precedes the line MOTION."""
+    figures, _ = _hierarchy(place_of(file), text.read_text(file).split("\n"))
+    return text.Contents((), dict.fromkeys(_figure_names(figures), ()))
+
+
+def _figure_names(figures: "list[list[_Node]]") -> tuple[str, ...]:
+    return text.part_names((nodes[0].name for nodes in figures), "figure")
 
 
 @dataclass
@@ -73,8 +91,9 @@ def _joint(path: Path, node: _Node) -> Joint:
     return Joint(node.name, node.parent, node.offset, text.complete_order(turns))
 
 
-def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
-    """The joints, and the number of the line MOTION after them."""
+def _hierarchy(path: Path, lines: list[str]) -> tuple[list[list[_Node]], int]:
+    """The joints of each ROOT, and the number of the line MOTION after them."""
+    figures: list[list[_Node]] = []
     nodes: list[_Node] = []
     open_nodes: list[int] = []
     names = text.Names()
@@ -84,9 +103,13 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
         match keyword.lower():
             case "root" | "joint" | "end" as kind:
-                if declared or bool(open_nodes) == (kind == "root") or (nodes and not open_nodes):
-                    reason = f"{quoted(statement)} does not belong here: expected a single tree of joints"
+                if declared or bool(open_nodes) == (kind == "root"):
+                    reason = f"{quoted(statement)} does not belong here: expected trees of joints"
                     raise FormatError(path, reason, line)
+                if kind == "root":
+                    nodes = []
+                    figures.append(nodes)
+                    names = text.Names()
                 parent = open_nodes[-1] if open_nodes else -1
                 wanted = nodes[parent].name + END_SUFFIX if kind == "end" else rest.strip() or "joint"
                 nodes.append(_Node(names.unique(wanted), parent, line))
@@ -99,7 +122,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[_Node], int]:
             case "channels" if open_nodes and not declared:
                 nodes[open_nodes[-1]].channels = _channels(path, rest.split(), line)
             case "motion" if nodes and not open_nodes and not declared:
-                return nodes, line
+                return figures, line
             case "hierarchy" if not nodes:
                 pass
             case _:
@@ -141,7 +164,7 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
 def _fps(path: Path, word: str, line: int) -> float:
     seconds = text.number(word, path, line)
     if not seconds > 0:
-        raise FormatError(path, f"frame time {word} s is out of range", line)
+        raise FormatError(path, f"frame time {word} s is out of range: expected more than 0", line)
     fps = text.frame_rate(1 / seconds, path, line)
     precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
     near = [rate for rate in (round(fps) - 1, round(fps), round(fps) + 1) if rate > 0]

@@ -5,6 +5,7 @@ ufbx runs in a separate process (``fbx_to_gltf.py``), which returns glTF. So joi
 """
 
 import json
+import logging
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -14,8 +15,13 @@ from pathlib import Path
 from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats import gltf
-from motet.formats.text import Clip, chosen, clip_names, read_bytes
+from motet.formats.text import Clip, Contents, Figure, choice, chosen, is_name_of, part_names, read_bytes
 from motet.motion.motion import Motion
+
+log = logging.getLogger(__name__)
+
+Takes = list[tuple[str, set[int]]]
+"""The names of takes, and the nodes that each moves."""
 
 PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
 
@@ -23,34 +29,52 @@ FBX_MAX_BYTES, FBX_SECONDS = 2**29, 600
 """The largest file read, and how long reading may take."""
 
 
-def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
+def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure = None) -> Motion:
     """Read a take, by default the first that moves a bone, or the rest pose as one frame if there is none.
 
     Lengths are metres. Channels: three angles in "deg" for each joint, the translation of the root and of moving
     joints in "length". FormatError names what the file lacks, and the extra if ufbx is not installed.
-    rest: see :func:`motet.formats.gltf.read`; or an FBX file, for its rest pose.
+    rest, figure: see :func:`motet.formats.gltf.read`; rest may be an FBX file, for its rest pose.
     """
-    path, content = place_of(file), BytesIO(read_bytes(file, FBX_MAX_BYTES))
-    content.name = str(path)  # used in error messages
-    found = as_gltf(content, 0 if clip is None else None)
-    names = _takes(found)
-    if clip is not None:
+    content = BytesIO(read_bytes(file, FBX_MAX_BYTES))
+    content.name = str(place_of(file))  # used in error messages
+    document = as_gltf(content, 0 if clip is None else None)
+    take, figure = _choice(content, _takes(document), clip, figure)
+    if take or clip is not None:
         content.seek(0)
-        found = as_gltf(content, chosen(path, names, clip))
-    elif names:
-        chosen(path, names, None)  # logs that there are others
+        document = as_gltf(content, take)
+    if note := json.loads(document.getvalue())["extras"]["note"]:
+        log.warning("%s: %s", place_of(file), note)
     if rest is not None and place_of(rest).suffix.lower() == ".fbx":
         rest = as_gltf(rest)
-    return gltf.read(found, rest=rest)
+    return gltf.read(document, None if take is None else 1, rest, figure)
 
 
-def clips(file: File) -> tuple[str, ...]:
-    """The names of the takes that move a bone, in the file's order; FormatError like :func:`read`."""
-    return _takes(as_gltf(file))
+def _choice(content: BytesIO, takes: Takes, clip: Clip, figure: Figure) -> tuple[int | None, Figure]:
+    """The index of a take, None for none, and a figure. The file is read for its figures only if that needs them."""
+    path = place_of(content)
+    names = tuple(name for name, _ in takes)
+    is_number = isinstance(clip, int) or (clip is not None and clip.isdecimal())
+    if figure is None and (clip is None or is_number or is_name_of(clip, names)):
+        return (chosen(path, names, clip) if names or clip is not None else None), None
+    content.seek(0)
+    parts = contents(content)
+    take, place = choice(path, parts, clip, figure)
+    return take, None if place is None else tuple(parts.figures)[place]
 
 
-def _takes(found: BytesIO) -> tuple[str, ...]:
-    return clip_names(json.loads(found.getvalue())["extras"]["takes"])
+def contents(file: File) -> Contents:
+    """The takes that move a bone, and the figures as the first take shows them; FormatError like :func:`read`."""
+    document = as_gltf(file, 0)
+    takes = _takes(document)
+    return gltf.contents_of_takes(document, [name for name, _ in takes], [moved for _, moved in takes])
+
+
+def _takes(document: BytesIO) -> Takes:
+    """The names of the takes, and the nodes that each moves."""
+    takes = json.loads(document.getvalue())["extras"]["takes"]
+    names = part_names(take["name"] for take in takes)
+    return [(name, set(take["moved"])) for name, take in zip(names, takes, strict=True)]
 
 
 def as_gltf(file: File, take: int | None = None) -> BytesIO:

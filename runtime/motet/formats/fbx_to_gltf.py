@@ -2,8 +2,10 @@
 
     python -P fbx_to_gltf.py NUMBER
 
-Only takes that move a bone count, from 0; without one of that number, the skeleton is at rest. All their names are in
-the glTF's ``extras``. It has nodes, skins and samples at every frame; y is up, lengths are metres. Exit status 1 comes
+Only takes that move a bone count, from 0; without one of that number, the skeleton is at rest. The names of all and the
+nodes that they move are in the glTF's ``extras``.
+
+It has nodes, skins and samples at every frame; y is up, lengths are metres. Exit status 1 comes
 with a reason on standard error.
 
 It runs separately because of ufbx: it is C code, which untrusted files may crash, and version 0.0.5 returns Python
@@ -176,19 +178,23 @@ def frame_times(scene: Scene, take: Take) -> list[float]:
     last = max((curve.max_time for curve in take.curves), default=0.0)
     begin, end = max(first, take.stack.time_begin), min(last, take.stack.time_end)
     begin, end = (begin, end) if begin < end else (first, max(first, last))
-    fps = frame_rate(scene, take)
+    fps, _ = frame_rate(scene, take)
     if not (end - begin) * fps * len(scene.near) < min(10**7, 10**5 + scene.size / 4):
         raise ValueError(f"{end - begin:g} s at {fps:g} fps is too many frames")
     return [begin + i / fps for i in range(round((end - begin) * fps) + 1)]
 
 
-def frame_rate(scene: Scene, take: Take, highest: float = 1000.0) -> float:
-    """The file's, or that of the take's keys if most of its curves are denser; 30 if neither is known."""
+def frame_rate(scene: Scene, take: Take, highest: float = 1000.0) -> tuple[float, str]:
+    """The file's, or that of the take's keys if most of its curves are denser; 30 if neither is known or below the
+    highest. And where it is not the file's, what the file states and which rate is taken."""
     stated = scene.scene.settings.frames_per_second
     rates = sorted(key_rate(curve, highest) for curve in take.curves)
     keyed = rates[len(rates) // 2] if rates else 0.0
-    fps = keyed if keyed > 1.01 * stated else stated
-    return fps if 0 < fps <= highest else 30.0
+    if keyed > 1.01 * stated:
+        return keyed, f"it states {stated:g} fps, but most of its curves have {keyed:g} keys a second: reading these"
+    if 0 < stated <= highest:
+        return stated, ""
+    return 30.0, f"it states {stated:g} fps: reading 30, as rates are above 0 and at most {highest:g}"
 
 
 def key_rate(curve: Any, highest: float) -> float:
@@ -258,9 +264,12 @@ def main(number: int) -> dict[str, Any]:
         most = 2**28 + 32 * len(content)
         resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
     scene = Scene(content)
-    found = takes(scene)
-    document = as_gltf(scene, found[number] if 0 <= number < len(found) else None)
-    return document | {"extras": {"takes": [take.stack.name for take in found]}}
+    moving = takes(scene)
+    take = moving[number] if 0 <= number < len(moving) else None
+    document = as_gltf(scene, take)
+    listed = [{"name": each.stack.name, "moved": sorted(each.moved)} for each in moving]
+    note = "" if take is None else frame_rate(scene, take)[1]
+    return document | {"extras": {"takes": listed, "note": note}}
 
 
 if __name__ == "__main__":

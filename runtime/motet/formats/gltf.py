@@ -19,7 +19,17 @@ import numpy as np
 from motet.errors import FormatError, MotionError, listed, quoted
 from motet.files import File, place_of
 from motet.formats.gltf_data import Gltf, broken, parse
-from motet.formats.text import Clip, Names, chosen, clip_names, most_poses, split_clip
+from motet.formats.text import (
+    Clip,
+    Contents,
+    Names,
+    choice,
+    chosen,
+    most_poses,
+    part_names,
+    split_clip,
+)
+from motet.formats.text import Figure as FigureChoice
 from motet.motion.humanoid import BONES, map_of
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
@@ -38,43 +48,65 @@ Tracks = Mapping[tuple[int, str], Array]
 """(Node, property) -> values (T, 3 or 4)."""
 
 
-def read(file: File, clip: Clip = None, rest: File | None = None) -> Motion:
+def read(file: File, clip: Clip = None, rest: File | None = None, figure: FigureChoice = None) -> Motion:
     """Read a clip, by default the first, or the rest pose as one frame if there is none; lengths are metres.
 
     rest: a file with the same joints in a T-pose, or "file#clip" whose first frame is one, used as the rest pose. An
         animation exported without its character needs it, because its nodes rest in its first frame.
+    figure: one of several skeletons, by name or number, by default that which the clip moves the most. Without a clip,
+        the first that moves this figure is read. The name of a figure may also be given as ``clip``.
 
     Bones of a VRM humanoid get VRM's names, other joints keep theirs. Channels: three angles in "deg" for each joint,
     the translation of the root and of moving joints in "length". FormatError names what the file lacks.
     """
     with broken(place_of(file)):
         scene = _scene(file)
-        gltf, stance = scene.gltf, {} if rest is None else _stance(rest)
-        take = _take(scene, chosen(gltf.path, scene.names, clip) if scene.names or clip is not None else None)
-        figure = take.figure
-        if stance and not stance.keys() & set(figure.names):
+        gltf = scene.gltf
+        stance = {} if rest is None else _stance(rest)
+        parts = _contents(scene, scene.names, [moved(animation) for animation in scene.animations])
+        take = _take(scene, *choice(gltf.path, parts, clip, figure))
+        if stance and not stance.keys() & set(take.figure.names):
             raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
         bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
         given = Names(bones.values())  # other joints with such a name are renamed
-        names = [bones.get(node) or given.unique(name) for node, name in zip(figure.nodes, figure.names, strict=True)]
+        joints = zip(take.figure.nodes, take.figure.names, strict=True)
+        names = [bones.get(node) or given.unique(name) for node, name in joints]
         turns, places = _rested(take, stance)
-        skeleton = skeleton_at(names, figure.parents, places)
+        skeleton = skeleton_at(names, take.figure.parents, places)
         turned = product(take.turns, inverse(turns))
         return motion_of(skeleton, turned, _moving(skeleton, turned, take.places), take.fps)
 
 
-def clips(file: File) -> tuple[str, ...]:
-    """The names of the animations that move a figure, in the file's order; FormatError like :func:`read`."""
+def contents(file: File) -> Contents:
+    """The animations that move a figure, and the figures; FormatError like :func:`read`."""
     with broken(place_of(file)):
-        return _scene(file).names
+        scene = _scene(file)
+        return _contents(scene, scene.names, [moved(animation) for animation in scene.animations])
+
+
+def contents_of_takes(file: File, names: Sequence[str], takes: Sequence[set[int]]) -> Contents:
+    """The figures of a file, with clips that are not in it, by their names and the nodes that each moves."""
+    with broken(place_of(file)):
+        return _contents(_scene(file), names, takes)
+
+
+def _contents(scene: "_Scene", names: Sequence[str], takes: Sequence[set[int]]) -> Contents:
+    figures = {}
+    for title, joints in scene.figures.items():
+        near = above(scene.gltf, joints)
+        figures[title] = tuple(name for name, nodes in zip(names, takes, strict=True) if nodes & near)
+    return Contents(tuple(names), figures)
 
 
 @dataclass(frozen=True)
 class _Scene:
-    """A file with its figures, their nodes, and the animations that move one, with their names."""
+    """A file with its figures, their nodes, and the animations that move one, with their names.
+
+    figures: by their names, which are those of their topmost nodes, in the order of the file's nodes.
+    """
 
     gltf: Gltf
-    figures: list[set[int]]
+    figures: dict[str, set[int]]
     animations: list[dict[str, Any]]
     names: tuple[str, ...]
 
@@ -82,12 +114,15 @@ class _Scene:
 def _scene(file: File) -> _Scene:
     gltf = parse(file)
     animations = gltf.objects("animations")
-    found = figures(gltf, set().union(*map(moved, animations)))
-    near = above(gltf, set().union(*found))
+    parts = figures(gltf, set().union(*map(moved, animations)))
+    parts.sort(key=lambda joints: gltf.order[_top(gltf, joints)])
+    titles = part_names((gltf.name(_top(gltf, joints)) for joints in parts), "figure")
+    near = above(gltf, set().union(*parts))
     moving = [animation for animation in animations if moved(animation) & near]
     if animations and not moving:
         raise FormatError(gltf.path, "its animations move no joint of its skeleton: export the armature's animations")
-    return _Scene(gltf, found, moving, clip_names(str(animation.get("name", "")) for animation in moving))
+    names = part_names(str(animation.get("name", "")) for animation in moving)
+    return _Scene(gltf, dict(zip(titles, parts, strict=True)), moving, names)
 
 
 def _stance(file: File) -> dict[str, Array]:
@@ -98,7 +133,7 @@ def _stance(file: File) -> dict[str, Array]:
         raise FormatError(place_of(file), f"a rest pose must come from a file of {' '.join(extensions)}")
     with broken(place_of(file)):
         scene = _scene(file)
-        take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip))
+        take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip), None)
         return dict(zip(take.figure.names, take.rest_turns if clip is None else take.turns[0], strict=True))
 
 
@@ -123,10 +158,12 @@ class _Take:
     fps: float
 
 
-def _take(scene: _Scene, index: int | None) -> _Take:
-    """A figure in the frames of an animation, or at rest."""
-    gltf, animation = scene.gltf, {} if index is None else scene.animations[index]
-    figure = figure_of(gltf, likeliest(gltf, scene.figures, moved(animation)))
+def _take(scene: _Scene, index: int | None, place: int | None) -> _Take:
+    """A figure, by default the likeliest, in the frames of an animation, or at rest."""
+    gltf = scene.gltf
+    animation = {} if index is None else scene.animations[index]
+    figures = list(scene.figures.values())
+    figure = figure_of(gltf, likeliest(gltf, figures, moved(animation)) if place is None else figures[place])
     near = above(gltf, figure.nodes)
     values, fps = ({}, 30.0) if index is None else _tracks(gltf, animation, scene.names[index], near)
     _, rest_turns, rest_places = (part[0, list(figure.nodes)] for part in gltf.world(near))
@@ -317,7 +354,8 @@ def likeliest(gltf: Gltf, found: list[set[int]], moved: set[int]) -> set[int]:
     best = max(found, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
     if len(found) > 1:
         name = quoted(gltf.name(_top(gltf, best)))
-        log.warning("%s: of %d skeletons, reading that of %s, which moves the most", gltf.path, len(found), name)
+        message = "%s: of %d skeletons, reading that of %s, which moves the most; figure= or --figure takes another"
+        log.warning(message, gltf.path, len(found), name)
     return best
 
 

@@ -1,6 +1,7 @@
 """Shared by the formats: bytes, text and numbers of files, names, clips, and the skeletons that text files can hold.
 
-Clips are the motions of a file that holds several, each by a name; "file.glb#Walk" is the clip Walk of file.glb.
+Clips are the motions of a file that holds several, figures its skeletons, each by a name; "file.glb#Walk" is the clip
+Walk of file.glb or, if there is no such clip, the figure of that name.
 """
 
 import logging
@@ -10,6 +11,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from itertools import permutations
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -26,6 +28,21 @@ Triple = tuple[float, float, float]
 
 Clip = str | int | None
 """One of a file's clips: its name, its number from 1, or None for the first."""
+
+Figure = str | int | None
+"""One of a file's figures: its name, its number from 1, or None for the format's default."""
+
+
+class Contents(NamedTuple):
+    """The parts of a motion file, by unique names in the file's order.
+
+    clips: its motions; empty in a format of one motion a file.
+    figures: each of its skeletons -> the clips that move it.
+    """
+
+    clips: tuple[str, ...]
+    figures: dict[str, tuple[str, ...]]
+
 
 MARK = "#"
 
@@ -114,7 +131,7 @@ def spaced(values: Iterable[float]) -> str:
 def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
     """A file's frame rate; FormatError if a motion cannot have it: at most 100,000, ten times what cameras take."""
     if not 1e-3 <= fps <= 1e5:
-        raise FormatError(path, f"frame rate {fps:g} is out of range", line)
+        raise FormatError(path, f"frame rate {fps:g} is out of range: expected 0.001 to 100000", line)
     return fps
 
 
@@ -195,10 +212,10 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
     return replace(still, skeleton=Skeleton(tuple(joints), skeleton.metres_per_unit)), tuple(moving)
 
 
-def clip_names(given: Iterable[str]) -> tuple[str, ...]:
-    """Unique names for a file's clips, in order: printable and on one line, "clip3" for an empty third."""
+def part_names(given: Iterable[str], kind: str = "clip") -> tuple[str, ...]:
+    """Unique names for a file's clips or figures, in order: printable and on one line, "clip3" for an empty third."""
     names = Names()
-    return tuple(names.unique(_tidy(name) or f"clip{i}") for i, name in enumerate(given, start=1))
+    return tuple(names.unique(_tidy(name) or f"{kind}{i}") for i, name in enumerate(given, start=1))
 
 
 def _tidy(name: str) -> str:
@@ -206,28 +223,62 @@ def _tidy(name: str) -> str:
     return " ".join(printable.split())[:200]
 
 
-def chosen(path: Path, names: Sequence[str], clip: Clip) -> int:
-    """The index of a clip among a file's; for a number as text, a clip of that name precedes the clip of that number.
+def is_name_of(part: Clip, names: Sequence[str]) -> bool:
+    """Whether a part is given by one of these names, rather than by its number."""
+    return isinstance(part, str) and _tidy(part) in names
 
-    None is the first, with a note in the log if there are others. FormatError, with the names, for an unknown clip.
+
+def chosen(path: Path, names: Sequence[str], part: Clip, kind: Literal["clip", "figure"] = "clip") -> int:
+    """The index of a clip or figure among a file's; for a number as text, one of that name precedes that number.
+
+    None is the first, with a note in the log if there are others. FormatError, with the names, for an unknown one.
     """
-    if clip is None:
-        if len(names) > 1:
-            said = "%s: reading the first of %d clips, %s; the next is %s%s%s"
-            log.warning(said, path, len(names), quoted(names[0]), path.name, MARK, names[1])
-            log.info("%s: clips: %s", path, ", ".join(map(quoted, names)))
+    if part is None:
+        _note_others(path, names, kind)
         return 0
-    if isinstance(clip, str) and _tidy(clip) in names:
-        return names.index(_tidy(clip))
-    at = int(clip) if isinstance(clip, int) or (clip.isdecimal() and len(clip) < 10) else 0
+    if isinstance(part, str) and _tidy(part) in names:
+        return names.index(_tidy(part))
+    at = int(part) if isinstance(part, int) or (part.isdecimal() and len(part) < 10) else 0
     if 1 <= at <= len(names):
         return at - 1
-    known = (
-        f"{listed([quoted(name) for name in _nearest_first(str(clip), names)])}, or 1 to {len(names)}"
-        if names
-        else "none"
-    )
-    raise FormatError(path, f"no clip {clip if isinstance(clip, int) else quoted(clip)}: expected {known}")
+    known = "none"
+    if names:
+        known = f"{listed([quoted(name) for name in _nearest_first(str(part), names)])}, or 1 to {len(names)}"
+    raise FormatError(path, f"no {kind} {part if isinstance(part, int) else quoted(part)}: expected {known}")
+
+
+def _note_others(path: Path, names: Sequence[str], kind: str) -> None:
+    if len(names) > 1:
+        message = "%s: reading the first of %d %ss, %s; the next is %s%s%s"
+        log.warning(message, path, len(names), kind, quoted(names[0]), path.name, MARK, names[1])
+        log.info("%s: %ss: %s", path, kind, ", ".join(map(quoted, names)))
+
+
+def choice(path: Path, parts: Contents, clip: Clip, figure: Figure) -> tuple[int | None, int | None]:
+    """The indices of a clip, None for none, and of a figure, None for the format's default.
+
+    Of a figure without a clip the first clip that moves it. A clip may be the name of a figure. FormatError like
+    :func:`chosen`, and for a clip that does not move the figure.
+    """
+    titles = tuple(parts.figures)
+    if figure is None and is_name_of(clip, titles) and not is_name_of(clip, parts.clips):
+        figure = clip
+        clip = None
+    if figure is None:
+        return (chosen(path, parts.clips, clip) if parts.clips or clip is not None else None), None
+    place = chosen(path, titles, figure, "figure")
+    moving = parts.figures[titles[place]]
+    if clip is None:
+        return (parts.clips.index(moving[0]) if moving else None), place
+    at = chosen(path, parts.clips, clip)
+    if parts.clips[at] not in moving:
+        raise _does_not_move(path, parts.clips[at], titles[place], moving)
+    return at, place
+
+
+def _does_not_move(path: Path, clip: str, figure: str, moving: Sequence[str]) -> FormatError:
+    known = listed([quoted(name) for name in moving]) if moving else "none"
+    return FormatError(path, f"its clip {quoted(clip)} does not move the figure {quoted(figure)}: expected {known}")
 
 
 def _nearest_first(clip: str, names: Sequence[str]) -> list[str]:

@@ -28,6 +28,11 @@ class Gaits:
         names, speeds = config.texts("gaits"), config.table("speeds", 5)
         if not names or len(speeds) != len(names) or not ((speeds >= 0) & (speeds <= 100)).all():
             raise BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait")
+        slowest, usual, forward = speeds[:, :3].T
+        if not ((slowest <= usual) & (usual <= forward)).all():
+            raise BundleError(
+                "manifest, config.speeds: must rise from the slowest to the usual and the fastest forward"
+            )
         return Gaits(names, speeds, settings)
 
     @cached_property

@@ -207,7 +207,7 @@ class Answers:
         unit = asked.settings.get("unit_in")
         if unit is not None and unit not in METRES:
             raise RequestError(f"unit_in: expected one of {', '.join(METRES)}, not {unit!r}")
-        options = {**asked.some("clip", "partial"), **({"unit": unit} if unit else {})}
+        options = {**asked.some("clip", "figure", "partial"), **({"unit": unit} if unit else {})}
         return await self._readers.motion(asked.files["file"], self._bounds, options)
 
     # ---- predict

@@ -32,6 +32,7 @@ SHAPING = {
 READING = {
     "format": Parameter("text", "Type of the file, where its name does not say it.", tuple(one[1:] for one in TAKES)),
     "clip": Parameter("text", "Clip of a file with several: its name, or its number from 1."),
+    "figure": Parameter("text", "Skeleton of a file with several: its name, or its number from 1."),
     "unit_in": Parameter("text", "Length unit of a file that does not state it.", tuple(METRES)),
     "partial": Parameter("flag", "Take the complete frames of a truncated file."),
 }

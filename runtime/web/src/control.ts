@@ -115,6 +115,9 @@ function configOf({ config, motion: { channels } }: Manifest, codes: number): { 
   if (!Array.isArray(speeds) || speeds.length !== names.length || !speeds.every(within)) {
     throw new BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait");
   }
+  if (!speeds.every(([slowest, usual, forward]) => slowest <= usual && usual <= forward)) {
+    throw new BundleError("manifest, config.speeds: must rise from the slowest to the usual and the fastest forward");
+  }
   if (!(Number.isInteger(odd) && odd >= 0 && odd <= codes)) throw new BundleError(`manifest, config.odd: must be 0 to ${codes}`);
   const bones = channels.filter((name) => name.endsWith(".xx")).map((name) => name.slice(0, -3));
   if (`${bones}` !== `${BONES}`) throw new BundleError("manifest, motion.channels: must be those of the humanoid, in its order");

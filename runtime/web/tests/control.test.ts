@@ -154,6 +154,9 @@ test("settings and tables that are out of range are refused", () => {
   const { manifest, steerer } = model;
   const made = (config: object) => new ControlModel({ ...manifest, config: { ...manifest.config, ...config } }, steerer.matcher.tables);
   for (const config of [{ gaits: [] }, { speeds: [[1, 2]] }, { odd: 99 }, { gaits: "walk" }]) assert.throws(() => made(config), BundleError);
+  const speeds = structuredClone(manifest.config.speeds as number[][]);
+  speeds[0]![0] = 50;
+  assert.throws(() => made({ speeds }), /config.speeds: must rise from the slowest/);
 });
 
 test("figures come and go, and each moves as it would alone", () => {
