@@ -131,7 +131,7 @@ function header(lines: string[], end: number): { start: number; frames: number; 
 function rate(word: string, line: number): number {
   const seconds = numbers(word, line)[0]!;
   const fps = 1 / seconds;
-  if (!(fps >= 1e-3 && fps <= 1e6)) throw new FormatError(`line ${line}: frame time ${word} s is out of range`);
+  if (!(fps >= 1e-3 && fps <= 1e5)) throw new FormatError(`line ${line}: frame time ${word} s is out of range`);
   const [, digits = "", power = "0"] = /^[^.e]*(?:\.([0-9]*))?(?:e(.*))?$/i.exec(word) ?? [];
   const precision = 0.51 * 10 ** (Number(power) - digits.length);
   const near = [-1, 0, 1].map((step) => Math.round(fps) + step).filter((one) => one > 0 && Math.abs(1 / one - seconds) <= precision);

@@ -16,6 +16,7 @@ test("BVH texts that are wrong are refused with the line", () => {
     [mixamo.slice(0, -200), /whole frames|declares/],
     [mixamo.replace(/Frames: *\d+/, "Frames: 900000000"), /declares 900000000 frames but holds/],
     [mixamo.replace(/Frame Time: *\S+/, "Frame Time: 0"), /out of range/],
+    [mixamo.replace(/Frame Time: *\S+/, "Frame Time: 0.000005"), /out of range/],
     [mixamo.replace(/OFFSET .*/, "OFFSET 1 2"), /line \d+: expected three numbers/],
     [mixamo.replace(/OFFSET .*/, "OFFSET 1 2 nan"), /line \d+: "nan" is not a finite number/],
     [mixamo.replace("Zrotation", "Wrotation"), /channel "Wrotation"/],
