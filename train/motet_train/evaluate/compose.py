@@ -1,5 +1,5 @@
-"""Compositions: how well places, facings, poses and times are met, and what it costs the feet; beside the same prompts
-drawn without them, as a story that is moved to the start."""
+"""Compositions: how well places, facings, poses and times are met, and what this costs the feet; compared with the same
+prompts drawn without constraints, as a story moved to the start."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,50 +22,73 @@ COMPOSE_GOALS: Goals = {"place.worst": (None, 10.0), "pose.worst": (None, 5.0), 
 
 
 def compositions() -> list[list[Moment]]:
-    """Those of compositions.txt, in order; poses.bvh has ten poses of people kept back, as different as there are."""
+    """The compositions of compositions.txt, in order; poses.bvh has ten held-out poses, as different as possible."""
     scripts = (FOLDER / "compositions.txt").read_text(encoding="utf-8").splitlines()
     return [parse_plan(script, lambda path: read_motion(FOLDER / path)) for script in scripts]
 
 
 def compose_report(writer: CodesModel, seed: int = 0) -> dict[str, Report]:
-    """Of the compositions, and "unconstrained" of the same prompts: see :func:`_figures`. refused: how many
-    compositions are; they are in neither."""
-    made, plain, refused = [], [], 0
+    """The figures of all compositions, and "unconstrained" those of the same prompts (see :func:`_figures`). refused:
+    the number of refused compositions, which count in neither."""
+    composed = []
+    unconstrained = []
+    refused = 0
     for moments in compositions():
         try:
-            found = writer.compose(moments, seed=seed)
+            composition = writer.compose(moments, seed=seed)
         except MotionError:
             refused += 1
             continue
-        made.append((found.motion, found.met))
-        free = _unconstrained(writer, moments, seed)
-        plain.append((free, met(free, moments)))
-    return {"composed": {**_figures(made), "refused": {"count": refused}}, "unconstrained": _figures(plain)}
+        composed.append((composition.motion, composition.met))
+        story = _unconstrained(writer, moments, seed)
+        unconstrained.append((story, met(story, moments)))
+    return {
+        "composed": {**_figures(composed), "refused": {"count": refused}},
+        "unconstrained": _figures(unconstrained),
+    }
 
 
 def _unconstrained(writer: CodesModel, moments: list[Moment], seed: int) -> Motion:
     """The prompts of a composition as a story, moved to its start."""
-    told = [(one.text, one.at) for one in moments if one.text is not None]
-    stops = [at for _, at in told[1:]] + [moments[-1].at]
-    seconds = [stop - at for (_, at), stop in zip(told, stops, strict=True)]
-    return moved(writer.story([text for text, _ in told], seconds=seconds, seed=seed).motion, moments[0])
+    sentences = []
+    starts = []
+    for moment in moments:
+        if moment.text is not None:
+            sentences.append(moment.text)
+            starts.append(moment.at)
+    stops = [*starts[1:], moments[-1].at]
+    seconds = [stop - start for start, stop in zip(starts, stops, strict=True)]
+    story = writer.story(sentences, seconds=seconds, seed=seed)
+    return moved(story.motion, moments[0])
 
 
-def _figures(found: Sequence[tuple[Motion, Sequence[Met]]]) -> Report:
-    """How far off what is asked for is, centimetres (of poses the mean of joints, and the worst joint), degrees and
-    seconds; the speed of standing feet, m/s, how joints tremble, m/s2, and the largest leap, degrees a frame."""
-    every = [one for _, own in found for one in own if one.at > 0]
+def _figures(compositions: Sequence[tuple[Motion, Sequence[Met]]]) -> Report:
+    """Errors of places in centimetres, of facings in degrees, of poses in centimetres (the mean over joints, and the
+    worst joint), and of times in seconds; the speed of standing feet, m/s, how joints tremble, m/s^2, and the largest
+    leap, degrees a frame."""
+    # how well each goal is met; those at the very start are met by construction
+    goals = [goal for _, goals_met in compositions for goal in goals_met if goal.at > 0]
     report: Report = {}
-    for what in ("place", "facing", "pose"):
-        own = [one for one in every if one.what == what]
-        mean, worst = float(np.mean([one.off for one in own])), max(one.off for one in own)
-        report[what] = {"count": len(own), "mean": mean, "worst": worst}
-    report["pose"]["worst_joint"] = max(one.worst for one in every if one.what == "pose")
-    report["late"] = {"mean": float(np.mean([one.late for one in every])), "worst": max(one.late for one in every)}
-    joints = [(positions(motion), motion.fps) for motion, _ in found]
+    for kind in ("place", "facing", "pose"):
+        errors = [goal.off for goal in goals if goal.what == kind]
+        report[kind] = {"count": len(errors), "mean": float(np.mean(errors)), "worst": max(errors)}
+    report["pose"]["worst_joint"] = max(goal.worst for goal in goals if goal.what == "pose")
+    delays = [goal.late for goal in goals]
+    report["late"] = {"mean": float(np.mean(delays)), "worst": max(delays)}
+
+    # quality of the motions
+    speeds = []
+    accelerations = []
+    leaps = []
+    for motion, _ in compositions:
+        points = positions(motion)
+        root = points[:, 0]
+        speeds.append(speed(points[:, BALLS], root, motion.fps))
+        accelerations.append(acceleration(points, root, motion.fps))
+        leaps.append(leap(motion))
     report["feet"] = {
-        "speed": float(np.nanmean([speed(at[:, BALLS], at[:, 0], fps) for at, fps in joints])),
-        "tremble": float(np.mean([acceleration(at, at[:, 0], fps) for at, fps in joints])),
-        "leap": max(leap(motion) for motion, _ in found),
+        "speed": float(np.nanmean(speeds)),
+        "tremble": float(np.mean(accelerations)),
+        "leap": max(leaps),
     }
     return report

@@ -1,4 +1,4 @@
-"""The one writer of pictures: axes, stick figures, strips, files. They are drawn without pyplot and need no display."""
+"""The writer of all pictures: axes, stick figures, strips and files. It uses no pyplot and needs no display."""
 
 import io
 from collections.abc import Callable, Mapping, Sequence
@@ -22,13 +22,13 @@ SPACING = 0.6
 """Body heights from one stick figure to the next."""
 
 Drawings = Mapping[str, Callable[[], Figure]]
-"""Name of a figure -> what draws it."""
+"""Name of a figure -> the function that draws it."""
 
 Bones = Sequence[tuple[int, int]]
 
 
 def save(drawings: Drawings, folder: Path) -> list[Path]:
-    """Draw figures into NAME.png of a folder, which is made; the files. OutputError where that is not possible."""
+    """Draw figures as NAME.png into a folder, made if needed, and return the files; OutputError if that fails."""
     make_folder(folder)
     paths = [folder / f"{name}.png" for name in drawings]
     for path, draw in zip(paths, drawings.values(), strict=True):
@@ -39,7 +39,7 @@ def save(drawings: Drawings, folder: Path) -> list[Path]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder for figures, with the folders around it; OutputError where that is not possible."""
+    """Make a folder for figures, with its parents; OutputError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -55,22 +55,23 @@ def panels(rows: int, columns: int, size: tuple[float, float], title: str = "") 
 
 
 def in_profile(points: Array, skeleton: Skeleton) -> Array:
-    """Places (K, J, 3) of joints seen along x: (K, J, 2) in body heights."""
-    seen: Array = points[..., [2, 1]] / skeleton.height
-    return seen
+    """Positions (K, J, 3) of joints seen along x: (K, J, 2) in body heights."""
+    profile: Array = points[..., [2, 1]] / skeleton.height
+    return profile
 
 
 def bones_of(skeleton: Skeleton) -> Bones:
-    """Each bone as the joints at its ends."""
+    """Each bone as the indices of the joints at its ends."""
     return [(joint.parent, i) for i, joint in enumerate(skeleton.joints) if joint.parent >= 0]
 
 
 def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any], width: float = 0.9) -> None:
-    """Draw poses (K, J, 2) in body heights, each :data:`SPACING` to the right of the one before.
+    """Draw poses (K, J, 2) in body heights from left to right, :data:`SPACING` apart.
 
-    colours: for each pose one, or one for each of its bones.
+    colours: one for each pose, or one for each of its bones.
     """
-    placed = points + SPACING * np.arange(len(points))[:, None, None] * [1, 0]
+    shifts = SPACING * np.arange(len(points))
+    placed = points + shifts[:, None, None] * [1, 0]
     for pose, colour in zip(placed[:, np.array(bones)], colours, strict=True):
         axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=width))
     axes.autoscale_view()
@@ -79,9 +80,9 @@ def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any
 
 
 def strips(motions: Sequence[Motion], titles: Sequence[str], title: str, count: int = 9) -> Figure:
-    """Motions that can be played, each as a strip of ``count`` poses of the player's body under its title.
+    """Playable motions, each as a strip of ``count`` poses of the player's body under its title.
 
-    They stand at even times from left to right, seen from a little in front of the side they first turn to.
+    The poses are evenly spaced in time, seen from slightly in front of the side that the figure first turns to.
     """
     picture, rows = panels(len(motions), 1, (9, 2.0 * len(motions)), title)
     for axes, motion, text in zip(rows, motions, titles, strict=True):
@@ -91,35 +92,44 @@ def strips(motions: Sequence[Motion], titles: Sequence[str], title: str, count: 
 
 
 def bodies(axes: Axes, motion: Motion, count: int) -> None:
-    """Draw ``count`` poses of a motion that can be played with the player's body, each :data:`SPACING` to the right."""
-    for n, (triangles, inks, shadow) in enumerate(shapes(motion, count)):
-        for parts, colours in ((shadow, "0.85"), (triangles, inks / 255)):
-            placed = list(np.add(parts, [SPACING * n, 0]))
-            axes.add_collection(PolyCollection(placed, facecolors=colours, edgecolors=colours, linewidths=0.3))
+    """Draw ``count`` poses of a playable motion with the player's body, :data:`SPACING` apart."""
+    for number, (triangles, inks, shadow) in enumerate(shapes(motion, count)):
+        shift = [SPACING * number, 0]
+        _polygons(axes, np.add(shadow, shift), "0.85")
+        _polygons(axes, np.add(triangles, shift), inks / 255)
     axes.set(xlim=(-SPACING, SPACING * count), ylim=(-0.15, 1.25), aspect="equal")
     axes.axis("off")
 
 
-def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit: str) -> Figure:
-    """Errors (N,) of systems, a panel for each action or measure, against the true time at ``fps`` (as figures 3 and 4
-    of Li et al. 2018).
+def _polygons(axes: Axes, polygons: Array, colours: Any) -> None:
+    axes.add_collection(PolyCollection(list(polygons), facecolors=colours, edgecolors=colours, linewidths=0.3))
 
-    A panel ends a little above the largest error of what is not constant velocity, which soon leaves it.
+
+def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit: str) -> Figure:
+    """Errors (N,) of systems over time at ``fps``, a panel for each action or measure, as figures 3 and 4 of Li et al.
+    2018.
+
+    A panel ends slightly above the largest error of all but constant velocity, which soon leaves it.
     """
+    names = list(next(iter(errors.values())))
+    looks = looks_of(names)
+    legend_outside = len(looks) > 4  # more names do not fit into a panel
     columns = min(3, len(errors))
     rows = -(-len(errors) // columns)
-    looks = looks_of(list(next(iter(errors.values()))))
-    beside = len(looks) > 4  # whose names have no room in a panel
-    figure, axes = panels(rows, columns, (4.2 * columns + 2.6 * beside, 3.2 * rows))
-    for axis in axes[len(errors) :]:
-        axis.remove()
+    width = 4.2 * columns + (2.6 if legend_outside else 0)
+    figure, axes = panels(rows, columns, (width, 3.2 * rows))
+    for unused in axes[len(errors) :]:
+        unused.remove()
+
     for axis, (title, systems) in zip(axes, errors.items(), strict=False):
         for name, error in systems.items():
-            axis.plot((np.arange(len(error)) + 1) / fps * 1000, error, label=name, **looks[name])
-        shown = [error for name, error in systems.items() if not name.startswith(CONSTANT)] or list(systems.values())
-        top = 1.1 * max(float(error.max()) for error in shown)
-        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, top))
-    if beside:
+            milliseconds = (np.arange(len(error)) + 1) / fps * 1000
+            axis.plot(milliseconds, error, label=name, **looks[name])
+        bounded = [error for name, error in systems.items() if not name.startswith(CONSTANT)]
+        highest = max(float(error.max()) for error in bounded or systems.values())
+        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, 1.1 * highest))
+
+    if legend_outside:
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right upper")
     else:
         axes[0].legend()
@@ -127,8 +137,13 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
 
 
 def looks_of(names: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Colour and style of each system's line: floors are grey; other styles where the ten colours begin again."""
+    """Colour and style of each system's line: floors are grey; line styles change once the ten colours are used up."""
     styles = ("-", "--", ":", "-.", (0, (1, 3)))
-    floors, others = ([name for name in names if (name in FLOORS) == is_floor] for is_floor in (True, False))
-    greys = {name: {"color": "0.6", "linewidth": 1.8, "linestyle": styles[n]} for n, name in enumerate(floors)}
-    return greys | {name: {"color": f"C{n % 10}", "linestyle": styles[n // 10 % 4]} for n, name in enumerate(others)}
+    floors = [name for name in names if name in FLOORS]
+    others = [name for name in names if name not in FLOORS]
+    looks: dict[str, dict[str, Any]] = {}
+    for number, name in enumerate(floors):
+        looks[name] = {"color": "0.6", "linewidth": 1.8, "linestyle": styles[number]}
+    for number, name in enumerate(others):
+        looks[name] = {"color": f"C{number % 10}", "linestyle": styles[number // 10 % 4]}
+    return looks

@@ -1,5 +1,5 @@
-"""Gaps cut into trials of people never seen: how far what fills them is from what was there, how feet stand and how
-sharply joints move, of a model and of plain ways through."""
+"""Gaps cut into trials of unseen people: how far filled frames are from the recorded ones, how feet stand and how
+sharply joints move, for a model and for simple interpolations."""
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
@@ -14,24 +14,24 @@ from motet.motion.rotations import Array
 from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, straight
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store, split
-from motet_train.evaluate.positions import jerk, length
+from motet_train.evaluate.positions import Flags, jerk, length
 from motet_train.evaluate.tables import Goals, Report, gathered
 from motet_train.models.kinematics import SixdPlaces, tree_of
 
 FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
 
 MARGIN = 3
-"""Frames before and after a gap whose joints are looked at with it, so that joins count."""
+"""Frames before and after a gap that are measured with it, so that the seams count."""
 
 FILL_GOALS: Goals = {"gap_1.of_interpolation": (None, 0.5)}
-"""Figure -> (least, most) that the model that comes with motet is to reach."""
+"""Figure -> (least, most): the goals of the bundle that ships with motet."""
 
 PLAIN_WAYS: Mapping[str, "Fill"] = {
     "hermite": bridge,
     "interpolation": straight,
     "standing": lambda past, after, count: np.repeat(past[-1:], count, axis=0),
 }
-"""Plain ways: joints by slerp and the root on a cubic Hermite curve, or on a line; and the last frame held."""
+"""Baselines: slerp of the joints with the root on a cubic Hermite curve, or on a line; and the last frame held."""
 
 Fill = Callable[[Array, Array, int], Array]
 
@@ -47,9 +47,10 @@ class Window(NamedTuple):
 def fill_report(model: FillModel, store: Store) -> Report:
     """The figures of a model on the test part of a store in ``root_sixd``; DataError for another store.
 
-    Of each gap, "gap_0.5" and so on: joints' mean distance in the world "cm", and in gaps where the figure is on its
-    way, .5 m/s from one end to the other, "cm_going"; the speed of feet that stood "slide" in cm a second, "jerk" over
-    the recorded; each of the model as it is, of :data:`PLAIN_WAYS` with their names behind, and of the recording.
+    For each gap length, "gap_0.5" and so on: the mean distance of joints in the world, "cm"; the same for gaps across
+    which the figure travels at .5 m/s or more, "cm_going"; the speed of the feet that stand in the recording, "slide"
+    in cm a second; and "jerk" relative to the recording. Plain keys are the model's; those of :data:`PLAIN_WAYS` and of
+    the recording have its name as a suffix.
     """
     if store.representation != "root_sixd":
         raise DataError(f"gaps are measured in root_sixd (motet prepare --for codes), not in {store.representation}")
@@ -58,16 +59,16 @@ def fill_report(model: FillModel, store: Store) -> Report:
 
 def _parts(model: FillModel, store: Store) -> Iterator[Report]:
     joints = SixdPlaces(tree_of(store.contract((0,))))
+    systems: dict[str, Fill] = {"": model.frames_between, **PLAIN_WAYS}
     for seconds in (0.5, 1.0, 2.0):
         windows = list(_windows(model, store, round(seconds * model.fps)))
         if not windows:
             raise DataError(f"no test trial is long enough for a gap of {seconds:g} s")
-        systems: dict[str, Fill] = {"": model.frames_between, **PLAIN_WAYS}
         yield {f"gap_{seconds:g}": _figures(joints, systems, windows, model.fps)}
 
 
 def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
-    """Gaps side by side in the trials that the model did not see."""
+    """Adjacent gaps in the trials that were held out in training."""
     by = str(model.manifest.training.get("split", {}).get("by", "subject"))
     context = model.context
     for record in split(store.records, 0, by).test:
@@ -79,40 +80,53 @@ def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
 
 
 def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
-    true = _places(joints, windows, [one.truth for one in windows])
-    feet = true[:, :, FOOT_JOINTS]
-    # the ankle of a foot that stands is 8 cm above the ground
-    low_and_slow = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
-    stands = standing(feet[:, 1:, :, 1], length(np.diff(feet, axis=1)) * fps, low_and_slow)
+    recorded = _places(joints, windows, [window.truth for window in windows])
+    recorded_jerk = jerk(recorded, fps)
+    stands = _standing_feet(recorded, fps)
 
-    def slide(places: Array) -> float:
-        """Centimetres a second over the ground of feet while those recorded stand."""
-        over = ground_speeds(places[:, :, FOOT_JOINTS], fps)
-        return 100 * float(over[stands].mean()) if stands.any() else np.nan
+    # gaps across which the figure travels
+    crossings = np.array([(window.after[0] - window.past[-1])[[0, 2]] for window in windows])
+    steps_across = len(windows[0].truth) + 1
+    going = length(crossings) * fps / steps_across > 0.5
 
-    ways = length(np.array([(one.after[0] - one.past[-1])[[0, 2]] for one in windows]))
-    going = ways * fps / (len(windows[0].truth) + 1) > 0.5
-    found = {"gaps": float(len(windows)), "gaps_going": float(going.sum()), "jerk_recorded": jerk(true, fps)}
+    figures = {"gaps": float(len(windows)), "gaps_going": float(going.sum()), "jerk_recorded": recorded_jerk}
     for name, fill in systems.items():
-        places = _places(joints, windows, [fill(one.past, one.after, len(one.truth)) for one in windows])
-        off = length(places - true)[:, MARGIN:-MARGIN]
-        tail = f"_{name}" if name else ""
-        found[f"cm{tail}"] = 100 * float(off.mean())
-        found[f"cm_going{tail}"] = 100 * float(off[going].mean()) if going.any() else np.nan
-        found[f"slide{tail}"] = slide(places)
-        found[f"jerk{tail}"] = jerk(places, fps) / found["jerk_recorded"]
-    found["slide_recorded"] = slide(true)
-    found["of_interpolation"] = found["cm"] / found["cm_interpolation"]
-    found["of_interpolation_going"] = found["cm_going"] / found["cm_going_interpolation"]
-    return found
+        filled = [fill(window.past, window.after, len(window.truth)) for window in windows]
+        places = _places(joints, windows, filled)
+        errors = length(places - recorded)[:, MARGIN:-MARGIN]
+        suffix = f"_{name}" if name else ""
+        figures[f"cm{suffix}"] = 100 * float(errors.mean())
+        figures[f"cm_going{suffix}"] = 100 * float(errors[going].mean()) if going.any() else np.nan
+        figures[f"slide{suffix}"] = _slide(places, stands, fps)
+        figures[f"jerk{suffix}"] = jerk(places, fps) / recorded_jerk
+    figures["slide_recorded"] = _slide(recorded, stands, fps)
+    figures["of_interpolation"] = figures["cm"] / figures["cm_interpolation"]
+    figures["of_interpolation_going"] = figures["cm_going"] / figures["cm_going_interpolation"]
+    return figures
+
+
+def _standing_feet(places: Array, fps: float) -> Flags:
+    """Whether each of :data:`FOOT_JOINTS` stands after each step (W, T - 1, 4), by joints (W, T, J, 3)."""
+    feet = places[:, :, FOOT_JOINTS]
+    speeds = length(np.diff(feet, axis=1)) * fps
+    # the ankle of a standing foot is 8 cm above the ground
+    low_and_slow = ContactSettings(heights=(0.15, 0.15), speeds=(0.2, 0.2))
+    return standing(feet[:, 1:, :, 1], speeds, low_and_slow)
+
+
+def _slide(places: Array, stands: Flags, fps: float) -> float:
+    """The mean speed over the ground of feet while those recorded stand, centimetres a second; NaN if none does."""
+    speeds = ground_speeds(places[:, :, FOOT_JOINTS], fps)
+    return 100 * float(speeds[stands].mean()) if stands.any() else np.nan
 
 
 def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> Array:
     """Joints (W, MARGIN + N + MARGIN, J, 3) in metres."""
-    rows = [
-        np.concatenate([one.past[-MARGIN:], gap, one.after[:MARGIN]]) for one, gap in zip(windows, filled, strict=True)
-    ]
+    rows = []
+    for window, gap in zip(windows, filled, strict=True):
+        rows.append(np.concatenate([window.past[-MARGIN:], gap, window.after[:MARGIN]]))
     frames = torch.from_numpy(np.stack(rows).astype(np.float32))
     with torch.inference_mode():
-        found: Array = (joints(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]).numpy().astype(np.float64)
-    return found
+        root = frames[..., None, :ROOT_PLACE]
+        places: Array = (joints(frames[..., ROOT_PLACE:]) + root).numpy().astype(np.float64)
+    return places

@@ -1,4 +1,4 @@
-"""The one writer of figures: reports, groups of figures with stable keys, as JSON and as text; tables of cells."""
+"""The writer of all reports: groups of figures with stable keys, as JSON and as text, and tables of cells."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import zip_longest
@@ -9,14 +9,14 @@ import numpy as np
 from tqdm import tqdm
 
 Report = dict[str, dict[str, float]]
-"""Group -> key -> figure. A measure is a function of a model and data that gives one, or gives it part by part."""
+"""Group -> key -> figure. A measure is a function of a model and data that returns a report, or yields its parts."""
 
 Goals = Mapping[str, tuple[float | None, float | None]]
-"""Name of a figure, "GROUP.KEY" -> (least, most) that is to be reached."""
+"""Name of a figure, "GROUP.KEY" -> the lowest and highest value that meet the goal, None for no bound."""
 
 
 def gathered(parts: Iterable[Report], name: str) -> Report:
-    """The parts of a report in one, with a bar while they are measured."""
+    """Merge the parts of a report, with a progress bar while they are measured."""
     report: Report = {}
     for part in tqdm(parts, desc=name, unit=" parts", disable=None, leave=False):
         report |= part
@@ -37,43 +37,58 @@ def json_ready(figures: Any) -> Any:
 def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
     """Rows of cells as text, each column as wide as its widest cell; a row of one cell is a heading of any width.
 
-    left: the columns that stand to the left; the others stand to the right.
+    left: the left-aligned columns; all others are right-aligned.
     """
-    columns = zip_longest(*(row for row in rows if len(row) > 1), fillvalue="")
-    pads = [(str.ljust if i in left else str.rjust, max(map(len, cells))) for i, cells in enumerate(columns)]
-
-    def line(row: Sequence[str]) -> str:
-        padded = [pad(cell, width) for cell, (pad, width) in zip(row, pads, strict=False)]
-        return "   ".join(padded).rstrip() if len(row) > 1 else "".join(row)
-
-    return "\n".join(map(line, rows))
+    table_rows = [row for row in rows if len(row) > 1]
+    columns = zip_longest(*table_rows, fillvalue="")
+    widths = [max(map(len, cells)) for cells in columns]
+    lines = []
+    for row in rows:
+        if len(row) > 1:
+            cells = []
+            for column, cell in enumerate(row):
+                width = widths[column]
+                cells.append(cell.ljust(width) if column in left else cell.rjust(width))
+            lines.append("   ".join(cells).rstrip())
+        else:
+            lines.append("".join(row))
+    return "\n".join(lines)
 
 
 def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[str, Report] | None = None) -> str:
-    """One line per figure that any report has, one column per report, and the goal beside those that have one.
+    """One line per figure that any report has, one column per report, and the goal of those that have one.
 
-    beside: further columns, which need not reach goals.
+    beside: further columns, to which goals do not apply.
     """
-    columns = [*reports.values(), *(beside or {}).values()]
-    rows = [["", *short_names(list(reports)), *(beside or {}), ""]]
-    groups = dict.fromkeys(group for report in reports.values() for group in report)
-    for group in groups:
-        for key in dict.fromkeys(key for report in reports.values() for key in report.get(group, {})):
-            values = [report.get(group, {}).get(key) for report in columns]
-            shown = ["" if value is None else f"{value:.4g}" for value in values]
-            own = [value for value in values[: len(reports)] if value is not None]
-            rows.append([f"{group}.{key}", *shown, _goal(goals, f"{group}.{key}", own)])
+    others = beside or {}
+    columns = [*reports.values(), *others.values()]
+    rows = [["", *short_names(list(reports)), *others, ""]]
+    for group, key in _figure_keys(list(reports.values())):
+        values = [report.get(group, {}).get(key) for report in columns]
+        cells = ["" if value is None else f"{value:.4g}" for value in values]
+        judged = [value for value in values[: len(reports)] if value is not None]
+        name = f"{group}.{key}"
+        rows.append([name, *cells, _goal(goals, name, judged)])
     return aligned(rows, left=(0, len(columns) + 1))
 
 
+def _figure_keys(reports: Sequence[Report]) -> list[tuple[str, str]]:
+    """Group and key of each figure that any report has, group by group, in the order of the reports."""
+    groups: dict[str, dict[str, None]] = {}
+    for report in reports:
+        for group, figures in report.items():
+            groups.setdefault(group, {}).update(dict.fromkeys(figures))
+    return [(group, key) for group, keys in groups.items() for key in keys]
+
+
 def short_names(names: Sequence[str]) -> list[str]:
-    """Names of runs and bundles without their folders, where they stay different."""
+    """Names of runs and bundles without their folders, unless that makes two of them equal."""
     short = [Path(name).name or name for name in names]
     return short if len(set(short)) == len(names) else list(names)
 
 
 def reached(goals: Goals, name: str, value: float) -> bool:
-    """Whether a figure is within its goal; a figure that is not a number is not."""
+    """Whether a figure meets its goal; NaN does not."""
     least, most = goals[name]
     return (least is None or value >= least) and (most is None or value <= most)
 
@@ -82,5 +97,11 @@ def _goal(goals: Goals, name: str, values: Sequence[float]) -> str:
     if name not in goals:
         return ""
     least, most = goals[name]
-    text = f">= {least:g}" if most is None else f"<= {most:g}" if least is None else f"{least:g} to {most:g}"
-    return f"{text:<12}" + ("" if all(reached(goals, name, value) for value in values) else "  NOT REACHED")
+    if most is None:
+        bounds = f">= {least:g}"
+    elif least is None:
+        bounds = f"<= {most:g}"
+    else:
+        bounds = f"{least:g} to {most:g}"
+    missed = not all(reached(goals, name, value) for value in values)
+    return f"{bounds:<12}" + ("  NOT REACHED" if missed else "")
