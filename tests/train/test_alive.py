@@ -9,7 +9,7 @@ import pytest
 
 from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
-from motet_train.evaluate.predict.liveliness import SPANS, Seen, alive_table, figures, gait, going, measured
+from motet_train.evaluate.predict.liveliness import SPANS, Trajectory, alive_table, figures, gait, going, measured
 from motet_train.evaluate.tables import json_ready
 
 FPS = 30.0
@@ -24,8 +24,8 @@ def puppet(seconds: float, speed: float, swing: float = 20.0, start: float = 0.0
     return Motion(values, CHANNELS, ("m",) * 3 + ("deg",) * 2, FPS, HUMANOID)
 
 
-def seen(*parts: Motion) -> Seen:
-    return Seen(np.concatenate([Seen.of(part).points for part in parts]), FPS)
+def seen(*parts: Motion) -> Trajectory:
+    return Trajectory(np.concatenate([Trajectory.of(part).points for part in parts]), FPS)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def seen(*parts: Motion) -> Seen:
     [(3, 1.2, "walks"), (1.2, 1.2, "walks"), (0.8, 1.2, None), (3, 0.45, None), (3, 2.1, "runs"), (3, 0.0, None)],
 )
 def test_who_goes_walks_or_runs(seconds: float, speed: float, kind: str | None) -> None:
-    assert gait(Seen.of(puppet(seconds, speed))) == kind
+    assert gait(Trajectory.of(puppet(seconds, speed))) == kind
 
 
 def test_who_stops_at_the_end_does_not_go_but_who_stood_before_does() -> None:
@@ -55,12 +55,12 @@ def test_recordings_that_the_writer_knows_are_left_out() -> None:
 
 
 def test_the_figures_of_a_puppet_are_known() -> None:
-    given = Seen.of(puppet(3, 1.0))
+    given = Trajectory.of(puppet(3, 1.0))
 
-    def followed(speed: float, swing: float) -> Seen:
-        points = Seen.of(puppet(30, speed, swing, start=3.0)).points
+    def followed(speed: float, swing: float) -> Trajectory:
+        points = Trajectory.of(puppet(30, speed, swing, start=3.0)).points
         points[..., 2] += given.points[-1, 0, 2] + speed / FPS - points[0, 0, 2]
-        return Seen(np.concatenate([given.points[-1:], points]), FPS)
+        return Trajectory(np.concatenate([given.points[-1:], points]), FPS)
 
     same, slow = followed(1.0, 20.0), followed(0.8, 10.0)
     found = figures([(given, same), (given, same), (given, slow)])

@@ -120,7 +120,8 @@ def test_floors_of_recorded_motions_go_on_as_their_names_say() -> None:
     decays = {DAMPED: (np.zeros(5), np.zeros(5)), DAMPED + OF_JOINTS: (np.ones(5), np.zeros(5))}
     found = floors(windows, decays)
     assert list(found) == list(FLOORS)
-    last, step = windows.given[:, 1:], windows.given[:, 1:] - windows.given[:, :1]
+    last = windows.last_two[:, 1:]
+    step = last - windows.last_two[:, :1]
     count = np.arange(1.0, 6)[:, None, None]
     np.testing.assert_allclose(found[ZERO], np.broadcast_to(last, windows.truth.shape), atol=1e-9)
     np.testing.assert_allclose(found[CONSTANT + OF_JOINTS], last + count * step, atol=1e-9)

@@ -1,9 +1,10 @@
-"""Floors: predictions that nobody had to train, which every predictor has to beat.
+"""Floors: predictions without training, which every predictor has to beat.
 
-The last pose held; its last step repeated (constant velocity); and repeated ever smaller (damped velocity). All three
-are one: after k frames the last step has been gone ``d + d^2 + ... + d^k`` times, with a decay d of 0, of 1, and, for
-each k, of what is best on training data. In recorded motions steps are those of rotations and the root's path, or of
-joints' positions. Letters in shapes: W windows, N predicted frames, J joints. Lengths are centimetres.
+The last pose is held; its last step is repeated (constant velocity); or repeated with a decay (damped velocity). All
+three are one formula: after k frames the last step has been repeated ``d + d^2 + ... + d^k`` times, where the decay d
+is 0, 1, or for each k the best on training data. In recorded motions a step is one of the rotations and the root's
+path, or one of the joints' positions. Letters in shapes: W windows, N predicted frames, J joints. Lengths are
+centimetres.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,50 +23,51 @@ from motet_train.evaluate.positions import length
 
 ZERO, CONSTANT, DAMPED = "zero velocity", "constant velocity", "damped velocity"
 OF_JOINTS = " of joints"
-"""What follows the name of a floor whose velocities are those of joints' positions, not of rotations and the root."""
+"""Suffix of a floor that extrapolates the joints' positions, not their rotations and the root."""
 
 FLOORS = (ZERO, CONSTANT, DAMPED, CONSTANT + OF_JOINTS, DAMPED + OF_JOINTS)
 
 DECAYS = np.linspace(0.0, 1.0, 21)
-"""Those that are tried."""
+"""The candidates for the damped floors."""
 
 REPORTED = (1, 3, 7, 9, 13, 24)
-"""Output frames of which errors are reported, from 0: those of the protocol of Martinez et al. 2017."""
+"""Output frames whose errors are reported, from 0, as in the protocol of Martinez et al. 2017."""
 
 Decays = Mapping[str, tuple[Array, Array]]
-"""Damped floor -> decays (N,) of the root's path, and of everything relative to it."""
+"""Damped floor -> decays (N,) of the root's path, and of the joints relative to it."""
 
 
 def key(floor: str) -> str:
-    """The name of a floor as JSON has it."""
+    """The name of a floor in JSON."""
     return floor.replace(" ", "_")
 
 
 def reach(decays: Array | float, frames: int) -> Array:
-    """How many times the last step has been gone after each frame (N,); decays: one, or one for each frame (N,)."""
+    """How many times the last step has been repeated after each frame (N,). decays: one, or one for each frame (N,)."""
     powers = np.broadcast_to(decays, frames)[:, None] ** np.arange(1.0, frames + 1)
     return np.cumsum(powers, axis=1).diagonal()
 
 
 def gone_on(last_two: Array, steps: Array) -> Array:
-    """The last two vectors (W, 2, ...) to those (W, N, ...) that go on by ``steps`` (N,) times the last step."""
+    """Extrapolate the last two vectors (W, 2, ...) to (W, N, ...) by ``steps`` (N,) times the last step."""
     step = last_two[:, 1] - last_two[:, 0]
-    found: Array = last_two[:, 1, None] + step[:, None] * steps.reshape(-1, *[1] * (step.ndim - 1))
-    return found
+    factors = steps.reshape(-1, *[1] * (step.ndim - 1))
+    vectors: Array = last_two[:, 1, None] + step[:, None] * factors
+    return vectors
 
 
 def turned_on(last_two: Array, steps: Array) -> Array:
-    """Rotations (W, 2, J, 3, 3) to those (W, N, J, 3, 3) that turn on by ``steps`` (N,) times the last turn, about its
-    axis."""
+    """Extrapolate the last two rotations (W, 2, J, 3, 3) to (W, N, J, 3, 3), by ``steps`` (N,) times the last
+    turn, about the same axis."""
     step = rotmat_to_rotvec(product(last_two[:, 1], inverse(last_two[:, 0])))
     turns = rotvec_to_rotmat(step[:, None] * steps[:, None, None])
     return product(turns, np.broadcast_to(last_two[:, 1, None], turns.shape))
 
 
 def best(errors: Sequence[Array]) -> Array:
-    """The decay (N,) with the smallest error at each frame; errors (N,) are those of each of :data:`DECAYS`."""
-    found: Array = DECAYS[np.argmin(errors, axis=0)]
-    return found
+    """The decay (N,) with the smallest error at each frame. errors: (N,) for each of :data:`DECAYS`."""
+    decays: Array = DECAYS[np.argmin(errors, axis=0)]
+    return decays
 
 
 def by_frame(errors: Array) -> dict[str, float]:
@@ -74,107 +76,132 @@ def by_frame(errors: Array) -> dict[str, float]:
 
 
 def cells(figures: Mapping[str, float], digits: int) -> list[str]:
-    """Figures by frame as text; nothing for a NaN."""
+    """Figures by frame as text, empty for NaN."""
     return [f"{value:.{digits}f}" if np.isfinite(value) else "" for value in figures.values()]
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Parts of motions of figures with the same joints: the last two frames that are given, and what follows.
+    """Parts of motions of figures with the same joints: the last two input frames and the frames to predict.
 
-    rotations (W, 2, J, 3, 3) and translations (W, 2, J, 3) relative to the parents; given (W, 2, J, 3) and truth
-    (W, N, J, 3): places in the world.
+    rotations (W, 2, J, 3, 3) and translations (W, 2, J, 3): the last two, relative to the parents. last_two (W, 2, J,
+    3) and truth (W, N, J, 3): positions in the world.
     """
 
     skeleton: Skeleton
     rotations: Array
     translations: Array
-    given: Array
+    last_two: Array
     truth: Array
 
     @staticmethod
     def of(windows: Sequence[Motion], frames: int) -> "Windows":
-        """Of motions that end with what is to be predicted, ``frames`` of each; DataError where there is none."""
+        """From motions that end with the ``frames`` to predict; DataError without a motion."""
         if not windows:
             raise DataError("no motion is long enough for a window")
-        lasts = [motion[: len(motion) - frames][-2:] for motion in windows]
+        rotations = []
+        translations = []
+        last_two = []
+        truth = []
+        for motion in windows:
+            first = len(motion) - frames
+            last = motion[:first][-2:]
+            rotations.append(local_rotations(last))
+            translations.append(local_translations(last) * skeleton_of(last).unit_factor(0.01))
+            last_two.append(places(last))
+            truth.append(places(motion[first:]))
         return Windows(
             skeleton_of(windows[0]),
-            np.stack([local_rotations(last) for last in lasts]),
-            np.stack([local_translations(last) * skeleton_of(last).unit_factor(0.01) for last in lasts]),
-            np.stack([places(last) for last in lasts]),
-            np.stack([places(motion[len(motion) - frames :]) for motion in windows]),
+            np.stack(rotations),
+            np.stack(translations),
+            np.stack(last_two),
+            np.stack(truth),
         )
 
+    @property
+    def frames(self) -> int:
+        """N."""
+        return int(self.truth.shape[1])
+
     def path(self, decays: Array | float) -> Array:
-        """Places (W, N, 1, 3) of a root that goes on."""
-        return gone_on(self.given[:, :, :1], reach(decays, self.truth.shape[1]))
+        """Positions (W, N, 1, 3) of an extrapolated root."""
+        return gone_on(self.last_two[:, :, :1], reach(decays, self.frames))
 
     def turned(self, decays: Array | float) -> Array:
-        """Places (W, N, J, 3) relative to the root's of joints whose rotations, and the root's, turn on."""
-        frames = self.truth.shape[1]
-        turned = turned_on(self.rotations, reach(decays, frames))
-        bones = np.repeat(self.translations[:, 1:], frames, axis=1)
+        """Positions (W, N, J, 3) relative to the root of joints whose rotations, and the root's, are extrapolated."""
+        rotations = turned_on(self.rotations, reach(decays, self.frames))
+        bones = np.repeat(self.translations[:, 1:], self.frames, axis=1)
         bones[:, :, 0] = 0.0
-        flat = turned.reshape(-1, *turned.shape[2:]), bones.reshape(-1, *bones.shape[2:])
-        return chained(self.skeleton, *flat)[1].reshape(bones.shape)
+        flat_rotations = rotations.reshape(-1, *rotations.shape[2:])
+        flat_bones = bones.reshape(-1, *bones.shape[2:])
+        _, joints = chained(self.skeleton, flat_rotations, flat_bones)
+        return joints.reshape(bones.shape)
 
     def moved(self, decays: Array | float) -> Array:
-        """As :meth:`turned`, of joints whose places relative to the root's go on in a line."""
-        return gone_on(self.given - self.given[:, :, :1], reach(decays, self.truth.shape[1]))
+        """Like :meth:`turned`, for joints whose positions relative to the root are extrapolated linearly."""
+        relative = self.last_two - self.last_two[:, :, :1]
+        return gone_on(relative, reach(decays, self.frames))
 
 
 RELATIVE: Mapping[str, Callable[[Windows, Array | float], Array]] = {"": Windows.turned, OF_JOINTS: Windows.moved}
-"""End of a floor's name -> what it says of joints relative to the root."""
+"""Suffix of a floor -> its prediction of the joints relative to the root."""
 
 
 def places(motion: Motion) -> Array:
-    """Places (T, J, 3) of joints in centimetres."""
+    """Positions (T, J, 3) of joints in centimetres."""
     return positions(motion) * skeleton_of(motion).unit_factor(0.01)
 
 
-def apart(found: Array, truth: Array) -> tuple[Array, Array]:
+def apart(predicted: Array, truth: Array) -> tuple[Array, Array]:
     """Mean distances (..., T) of joints (..., T, J, 3) in the world, and relative to the root."""
-    difference = found - truth
-    return length(difference).mean(axis=-1), length(difference - difference[..., :1, :]).mean(axis=-1)
+    difference = predicted - truth
+    relative = difference - difference[..., :1, :]
+    return length(difference).mean(axis=-1), length(relative).mean(axis=-1)
 
 
 def floors(windows: Windows, decays: Decays) -> dict[str, Array]:
-    """What each floor predicts: places (W, N, J, 3)."""
-    found = {ZERO: windows.moved(0.0) + windows.path(0.0)}
-    for end, relative in RELATIVE.items():
-        path, rest = decays[DAMPED + end]
-        found[CONSTANT + end] = relative(windows, 1.0) + windows.path(1.0)
-        found[DAMPED + end] = relative(windows, rest) + windows.path(path)
-    return {name: found[name] for name in FLOORS}
+    """The predictions of all floors: positions (W, N, J, 3)."""
+    predictions = {ZERO: windows.moved(0.0) + windows.path(0.0)}
+    for suffix, relative in RELATIVE.items():
+        path_decays, relative_decays = decays[DAMPED + suffix]
+        predictions[CONSTANT + suffix] = relative(windows, 1.0) + windows.path(1.0)
+        predictions[DAMPED + suffix] = relative(windows, relative_decays) + windows.path(path_decays)
+    return {name: predictions[name] for name in FLOORS}
 
 
 def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> dict[str, tuple[Array, Array]]:
     """The decays that are best on windows of a store's training motions, those that are not ``held_out``.
 
-    Those of what is relative to the root are chosen first, by the distances relative to it, then those of its path.
-    DataError where no training motion is long enough.
+    First the decays of the joints relative to the root are chosen by the distances relative to it, then those of its
+    path by the distances in the world. DataError if no training motion is long enough.
     """
-    windows, found = Windows.of(training_windows(store, held_out, fps, frames), frames), {}
-    for end, relative in RELATIVE.items():
-        rest = best([apart(relative(windows, decay), windows.truth)[1].mean(axis=0) for decay in DECAYS])
-        there = relative(windows, rest)
-        path = best([apart(there + windows.path(decay), windows.truth)[0].mean(axis=0) for decay in DECAYS])
-        found[DAMPED + end] = path, rest
-    return found
+    windows = Windows.of(training_windows(store, held_out, fps, frames), frames)
+    decays = {}
+    for suffix, relative in RELATIVE.items():
+        pose_errors = [apart(relative(windows, decay), windows.truth)[1].mean(axis=0) for decay in DECAYS]
+        relative_decays = best(pose_errors)
+        joints = relative(windows, relative_decays)
+        world_errors = [apart(joints + windows.path(decay), windows.truth)[0].mean(axis=0) for decay in DECAYS]
+        decays[DAMPED + suffix] = best(world_errors), relative_decays
+    return decays
 
 
 def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: int, most: int = 512) -> list[Motion]:
-    """About ``most`` evenly spaced windows of training motions at ``fps``: two frames and ``frames`` to come."""
-    playable, test = named(store.representation).motion, set(held_out)
-    long = int(np.ceil((frames + 1) * store.fps / fps)) + 1
-    starts = [
-        (number, start)
-        for number, entry in enumerate(store.records)
-        if entry.name not in test
-        for start in range(0, entry.spans[0][1] - entry.spans[0][0] - long + 1, long)
-    ]
-    return [
-        playable(store.motion(number)[start : start + long]).resample(fps, to_end=True)[-frames - 2 :]
-        for number, start in starts[:: max(1, len(starts) // most)]
-    ]
+    """About ``most`` evenly spaced windows of training motions at ``fps``: two frames and the ``frames`` to predict."""
+    # adjacent stretches of training motions that are long enough after resampling
+    frames_needed = int(np.ceil((frames + 1) * store.fps / fps)) + 1
+    stretches = []
+    for number, entry in enumerate(store.records):
+        if entry.name in held_out:
+            continue
+        first, last = entry.spans[0]
+        for start in range(0, last - first - frames_needed + 1, frames_needed):
+            stretches.append((number, start))
+
+    playable = named(store.representation).motion
+    every = max(1, len(stretches) // most)
+    windows = []
+    for number, start in stretches[::every]:
+        stretch = store.motion(number)[start : start + frames_needed]
+        windows.append(playable(stretch).resample(fps, to_end=True)[-frames - 2 :])
+    return windows

@@ -1,12 +1,12 @@
-"""What is predicted for half a minute: whether who walked walks on, as fast, as lively, and on feet that stand.
+"""Half a minute of prediction: whether a walker walks on as fast, as lively, and on feet that stand.
 
-It is asked of recordings, held out in training of predictor and writer, whose end **goes**: in no half second of their
-last two the root's mean speed over the ground is under .5 m/s; those from 2 m/s on are runs, the others walks. The
-whole recording is given. What follows is measured over :data:`SPANS`:
+The measure takes recordings, held out in training of predictor and writer, that still **go** at their end: in no half
+second of their last two seconds is the root's mean speed over the ground below .5 m/s. Those of 2 m/s or more are runs,
+the others walks. The whole recording is the input. Its continuation is measured over :data:`SPANS`:
 
-speed: the root's mean speed over the ground, relative to that of the given motion's last two seconds.
+speed: the root's mean speed over the ground, relative to that of the last two seconds of the input.
 kept: the share of motions whose speed is within 15 % of that.
-energy: the mean speed of all joints as seen from the root, relative to the same.
+energy: the mean speed of all joints relative to the root, divided by that of the last two seconds of the input.
 slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evaluate.positions`), centimetres.
 """
 
@@ -30,33 +30,43 @@ from motet_train.evaluate.tables import Report, aligned, short_names
 SPANS = ((0, 1), (1, 5), (5, 30))
 """Seconds after the recording's end."""
 
+KEPT = 0.15
+"""Largest relative change of a speed that counts as kept."""
+
 CONTINUED = {"still": "standing still", "alone": "{name}, alone", "beyond": "{name}, then the writer"}
-"""Standing still, the predictor alone, and with what continues beyond its horizon; and what tables call them."""
+"""System -> its name in tables: standing still, the predictor alone, and with a continuation beyond its horizon."""
 
 Figures = dict[str, Report]
 """Group of recordings -> system -> its figures, see :func:`figures`; "recorded" and "samples" are among the systems."""
 
 
 @dataclass(frozen=True)
-class Seen:
-    """Positions (T, J, 3) of the humanoid's joints, metres, at so many frames a second."""
+class Trajectory:
+    """Positions (T, J, 3) of the humanoid's joints in metres, at ``fps`` frames a second."""
 
     points: Array
     fps: float
 
     @staticmethod
-    def of(motion: Motion) -> "Seen":
-        """MotionError for a figure that is no human's."""
-        return Seen(positions(motion if motion.skeleton == HUMANOID else on_humanoid(motion)), motion.fps)
+    def of(motion: Motion) -> "Trajectory":
+        """The joints of a motion; MotionError for a figure that is not human."""
+        on_bones = motion if motion.skeleton == HUMANOID else on_humanoid(motion)
+        return Trajectory(positions(on_bones), motion.fps)
 
-    def part(self, start: float, stop: float) -> "Seen":
-        """The part between two times in seconds, and the frame before it, where there is one."""
-        first, last = round(start * self.fps), round(stop * self.fps)
-        return Seen(self.points[max(0, first - 1) : last], self.fps)
+    def part(self, start: float, stop: float) -> "Trajectory":
+        """The part between two times in seconds, with the frame before it if there is one."""
+        first = round(start * self.fps)
+        last = round(stop * self.fps)
+        return Trajectory(self.points[max(0, first - 1) : last], self.fps)
 
-    def end(self) -> "Seen":
-        """The last two seconds, by which the pace is known; or all of it, where it is shorter."""
-        return Seen(self.points[-round(2 * self.fps) - 1 :], self.fps)
+    def end(self) -> "Trajectory":
+        """The last two seconds, which define the pace, or all of a shorter one."""
+        return Trajectory(self.points[-round(2 * self.fps) - 1 :], self.fps)
+
+    @property
+    def relative(self) -> Array:
+        """The joints (T, J, 3) relative to the root."""
+        return self.points - self.points[:, :1]
 
     @property
     def paces(self) -> Array:
@@ -65,35 +75,40 @@ class Seen:
 
     @property
     def energy(self) -> float:
-        """The mean speed of all joints as seen from the root, m/s."""
-        return float(length(np.diff(self.points - self.points[:, :1], axis=0)).mean() * self.fps)
+        """The mean speed of all joints relative to the root, m/s."""
+        return float(length(np.diff(self.relative, axis=0)).mean() * self.fps)
 
 
-def gait(seen: Seen) -> str | None:
-    """ "walks" or "runs" for a recording of a second at least whose end goes, else None."""
-    paces = seen.end().paces
-    if len(paces) < round(seen.fps) - 1:
+def gait(trajectory: Trajectory) -> str | None:
+    """ "walks" or "runs" if a recording lasts a second or more and goes at its end, else None."""
+    paces = trajectory.end().paces
+    if len(paces) < round(trajectory.fps) - 1:
         return None
-    halves = np.array_split(paces, max(1, round(2 * len(paces) / seen.fps)))
+    halves = np.array_split(paces, max(1, round(2 * len(paces) / trajectory.fps)))
     if min(half.mean() for half in halves) < 0.5:
         return None
     return "runs" if paces.mean() >= 2.0 else "walks"
 
 
 def going(trials: Mapping[str, Motion], writer: CodesModel) -> dict[str, dict[str, Motion]]:
-    """Of "walks" and of "runs" the recordings that go, but for those that the writer was trained on.
+    """The recordings that are "walks" and "runs" at their end, without those that the writer was trained on.
 
-    Where the writer says which motions it was tested on, others are left out; pieces count as the whole they are of.
+    If the writer names its test motions, all others are left out; a piece counts as the recording it was cut from.
     """
-    divided = writer.manifest.training.get("split", {})
-    unseen = {name.partition(".")[0] for name in divided.get("test", ())}
-    asked = {name: motion for name, motion in trials.items() if not unseen or name.partition(".")[0] in unseen}
-    kinds = {name: gait(Seen.of(motion)) for name, motion in asked.items()}
-    return {kind: {name: asked[name] for name in asked if kinds[name] == kind} for kind in ("walks", "runs")}
+    split = writer.manifest.training.get("split", {})
+    unseen = {name.partition(".")[0] for name in split.get("test", ())}
+    groups: dict[str, dict[str, Motion]] = {"walks": {}, "runs": {}}
+    for name, motion in trials.items():
+        if unseen and name.partition(".")[0] not in unseen:
+            continue
+        kind = gait(Trajectory.of(motion))
+        if kind is not None:
+            groups[kind][name] = motion
+    return groups
 
 
 def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motion]) -> Figures:
-    """The figures of the recordings that go; empty where none does, or where none is of a human."""
+    """The figures of the recordings that go at their end; empty without any, or if one is not of a human."""
     try:
         groups = going(trials, writer)
     except MotionError:
@@ -102,79 +117,122 @@ def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motio
 
 
 def _group(model: PredictModel, writer: CodesModel, motions: Sequence[Motion]) -> Report:
-    found: dict[str, list[tuple[Seen, Seen]]] = {system: [] for system in CONTINUED}
-    samples, count = list[dict[str, float]](), round(SPANS[-1][1] * model.fps)
+    frames = round(SPANS[-1][1] * model.fps)
+    inputs = []
+    continuations: dict[str, list[Trajectory]] = {system: [] for system in CONTINUED}
+    samples = []
     for motion in tqdm(motions, unit=" motions", disable=None, leave=False):
         whole = motion.resample(model.fps, to_end=True)
-        given = Seen.of(whole)
-        alone, beyond = (Seen.of(model.predict(whole, frames=count, beyond=one)).points for one in (None, writer))
-        still = np.repeat(given.points[-1:], count, axis=0)
-        for system, points in zip(CONTINUED, (still, alone, beyond), strict=True):
-            found[system].append((given, Seen(np.concatenate([given.points[-1:], points]), model.fps)))
-        samples.append(_apart(model, writer, whole))
-    recorded = {"recordings": float(len(motions)), "slide_cm": _slide(given for given, _ in found["still"])}
-    means = {key: float(np.mean([one[key] for one in samples])) for key in samples[0]}
-    return {"recorded": recorded, **{system: figures(pairs) for system, pairs in found.items()}, "samples": means}
+        recorded = Trajectory.of(whole)
+        last_frame = recorded.points[-1:]
+        inputs.append(recorded)
+
+        alone = model.predict(whole, frames=frames, beyond=None)
+        beyond = model.predict(whole, frames=frames, beyond=writer)
+        points = {
+            "still": np.repeat(last_frame, frames, axis=0),
+            "alone": Trajectory.of(alone).points,
+            "beyond": Trajectory.of(beyond).points,
+        }
+        for system, following in points.items():
+            joined = np.concatenate([last_frame, following])
+            continuations[system].append(Trajectory(joined, model.fps))
+        samples.append(_sample_distances(model, writer, whole))
+
+    report = {"recorded": {"recordings": float(len(motions)), "slide_cm": _slide(inputs)}}
+    for system, trajectories in continuations.items():
+        report[system] = figures(list(zip(inputs, trajectories, strict=True)))
+    report["samples"] = {key: float(np.mean([sample[key] for sample in samples])) for key in samples[0]}
+    return report
 
 
-def figures(pairs: Sequence[tuple[Seen, Seen]]) -> dict[str, float]:
-    """For given motions and what follows each, its first frame the last one given: medians of the speeds and energies
-    of each span, the share of motions that keep their speed, and slides."""
-    found = {}
+def figures(pairs: Sequence[tuple[Trajectory, Trajectory]]) -> dict[str, float]:
+    """Figures of pairs of an input and its continuation, whose first frame is the input's last: for each span the
+    medians of relative speeds and energies, the share of motions that keep their speed, and the slide."""
+    ends = [recorded.end() for recorded, _ in pairs]
+    report = {}
     for start, stop in SPANS:
-        parts = [(given.end(), following.part(start, stop)) for given, following in pairs]
-        speeds = np.array([part.paces.mean() / given.paces.mean() for given, part in parts])
-        key = f"{start}_{stop}_s"
-        found[f"speed_{key}"] = float(np.median(speeds))
-        found[f"kept_{key}"] = float(np.mean(np.abs(speeds - 1) <= 0.15))
-        found[f"energy_{key}"] = float(np.median([part.energy / given.energy for given, part in parts]))
-        found[f"slide_cm_{key}"] = _slide(part for _, part in parts)
-    return found
+        parts = [following.part(start, stop) for _, following in pairs]
+        speeds = []
+        energies = []
+        for end, part in zip(ends, parts, strict=True):
+            speeds.append(part.paces.mean() / end.paces.mean())
+            energies.append(part.energy / end.energy)
+        span = f"{start}_{stop}_s"
+        report[f"speed_{span}"] = float(np.median(speeds))
+        report[f"kept_{span}"] = float(np.mean(np.abs(np.array(speeds) - 1) <= KEPT))
+        report[f"energy_{span}"] = float(np.median(energies))
+        report[f"slide_cm_{span}"] = _slide(parts)
+    return report
 
 
-def _slide(parts: Iterable[Seen]) -> float:
+def _slide(parts: Iterable[Trajectory]) -> float:
     """The mean over all stances of the balls of the feet, centimetres; NaN without any."""
-    stood = [stances(part.points[:, BALLS], part.points[:, 0], part.fps) for part in parts]
-    return 100 * slide(stance for places in stood for stance in places)
+    every_stance = []
+    for part in parts:
+        every_stance += stances(part.points[:, BALLS], part.points[:, 0], part.fps)
+    return 100 * slide(every_stance)
 
 
-def _apart(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[str, float]:
-    """How far apart joints of three futures are, centimetres, at the end of the first two spans: in the world ("place")
-    and as seen from the root ("pose")."""
-    frames, found = round(SPANS[1][1] * model.fps), {}
-    futures = [Seen.of(one).points for one in model.futures(motion, frames=frames, beyond=writer, samples=3)]
+def _sample_distances(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[str, float]:
+    """Mean distances between joints of three futures, centimetres, at the end of the first two spans: in the world
+    ("place") and relative to the root ("pose")."""
+    frames = round(SPANS[1][1] * model.fps)
+    futures = model.futures(motion, frames=frames, beyond=writer, samples=3)
+    trajectories = [Trajectory.of(future) for future in futures]
+    distances = {}
     for _, stop in SPANS[:2]:
-        poses = [points[round(stop * model.fps) - 1] for points in futures]
-        for key, seen in (("place", poses), ("pose", [pose - pose[:1] for pose in poses])):
-            found[f"{key}_cm_{stop}_s"] = 100 * float(np.mean([length(a - b).mean() for a, b in combinations(seen, 2)]))
-    return found
+        frame = round(stop * model.fps) - 1
+        places = [trajectory.points[frame] for trajectory in trajectories]
+        poses = [trajectory.relative[frame] for trajectory in trajectories]
+        distances[f"place_cm_{stop}_s"] = _mean_distance_cm(places)
+        distances[f"pose_cm_{stop}_s"] = _mean_distance_cm(poses)
+    return distances
 
 
-def alive_table(found: Mapping[str, Figures]) -> str:
-    """The figures of several models, by name, as text; "" where there are none."""
+def _mean_distance_cm(points: Sequence[Array]) -> float:
+    """The mean distance, centimetres, between the same joints (J, 3) of every two of several poses in metres."""
+    return 100 * float(np.mean([length(first - second).mean() for first, second in combinations(points, 2)]))
+
+
+def alive_table(figures: Mapping[str, Figures]) -> str:
+    """The figures of several models, by name, as text; "" without any."""
+    kinds = dict.fromkeys(kind for groups in figures.values() for kind in groups)
     rows: list[Sequence[str]] = []
-    for kind in dict.fromkeys(kind for figures in found.values() for kind in figures):
-        shown = {name: figures[kind] for name, figures in found.items() if kind in figures}
-        rows += [[""]] if rows else []
-        rows += _rows(kind, dict(zip(short_names(list(shown)), shown.values(), strict=True)))
+    for kind in kinds:
+        reports = {name: groups[kind] for name, groups in figures.items() if kind in groups}
+        names = short_names(list(reports))
+        if rows:
+            rows.append([""])
+        rows += _rows(kind, dict(zip(names, reports.values(), strict=True)))
     return aligned(rows)
 
 
 def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
-    written = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
     recorded = next(iter(reports.values()))["recorded"]
+    spans = ", ".join(f"{start}-{stop}" for start, stop in SPANS)
     rows: list[Sequence[str]] = [
-        [f"{recorded['recordings']:.0f} {kind} continued; after {', '.join(f'{a}-{b}' for a, b in SPANS)} s"],
+        [f"{recorded['recordings']:.0f} {kind} continued; after {spans} s"],
         ["", "speed / given", "within 15%", "energy / given", "slide, cm"],
         ["  the recordings", "", "", "", f"{recorded['slide_cm']:.1f}"],
     ]
+
+    # standing still is the same for all models, so only the first has its row
+    formats = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
+    systems = list(CONTINUED)
     for number, (name, report) in enumerate(reports.items()):
-        for system in list(CONTINUED)[min(number, 1) :]:
-            own = report[system]
-            cells = ["  ".join(f"{own[f'{key}_{a}_{b}_s']:{how}}" for a, b in SPANS) for key, how in written.items()]
+        for system in systems if number == 0 else systems[1:]:
+            cells = []
+            for key, form in formats.items():
+                values = [report[system][f"{key}_{start}_{stop}_s"] for start, stop in SPANS]
+                cells.append("  ".join(f"{value:{form}}" for value in values))
             rows.append([f"  {CONTINUED[system].format(name=name)}", *cells])
+
     rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
+    stops = [stop for _, stop in SPANS[:2]]
     for name, report in reports.items():
-        far = [f"{report['samples'][f'{key}_cm_{stop}_s']:.0f}" for key in ("place", "pose") for _, stop in SPANS[:2]]
-        rows.append([f"  {name} after {SPANS[0][1]}, {SPANS[1][1]} s", "  ".join(far[:2]), "", "  ".join(far[2:]), ""])
+        samples = report["samples"]
+        places = "  ".join(f"{samples[f'place_cm_{stop}_s']:.0f}" for stop in stops)
+        poses = "  ".join(f"{samples[f'pose_cm_{stop}_s']:.0f}" for stop in stops)
+        rows.append([f"  {name} after {stops[0]}, {stops[1]} s", places, "", poses, ""])
     return rows

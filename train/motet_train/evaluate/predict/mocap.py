@@ -1,5 +1,5 @@
-"""Predictions of recorded motions: how far each joint is from where it really was, in trials that were held out, by
-kinds of motions; and whether a predictor's errors are what it expects them to be.
+"""Predictions of recorded motions: the distance of each joint from its recorded position, in held-out trials, by kind
+of motion; and whether a predictor's errors are as large as it expects.
 
 Letters in shapes: W windows, N predicted frames.
 """
@@ -35,14 +35,14 @@ from motet_train.evaluate.predict.floors import (
 from motet_train.evaluate.tables import aligned
 
 TITLES = {"place_cm": "joints in the world, cm", "pose_cm": "joints relative to the root, cm"}
-"""Measures, and what tables call them."""
+"""Measure -> its title in tables."""
 
 PLACE, POSE = TITLES
 
 COUNTS = ("people", "recordings", "windows")
 
 QUARTERS = ("least expected", "second", "third", "most expected")
-"""Of the windows, by what is expected at a frame."""
+"""Quarters of the windows by the expected error at a frame."""
 
 MOTION_KINDS: Mapping[str, str] = {
     "boxing": "boxing|boxers?|punch|punches|punching|jabs?",
@@ -50,34 +50,42 @@ MOTION_KINDS: Mapping[str, str] = {
     "climbing": "climb|climbs|climbing|climber|ladder",
     "walks and runs": "walk|walks|walking|run|runs|running|jog|jogs|jogging",
 }
-"""Kind -> its words, fixed before anything was measured by them. An action belongs to the first kind of which a word is
-in it, before its first comma; where a record names none, what counts is that half of its sentences have a word of the
-kind."""
+"""Kind -> its words, fixed before anything was measured by them. An action belongs to the first kind that has a word in
+it before its first comma. A record without an action belongs to the first kind with a word in half of its sentences."""
 
 REST = "everything else"
 
 
 def kind_of(entry: Entry) -> str:
-    """The kind of a record of a store, :data:`REST` where no word fits."""
+    """The kind of a record of a store, :data:`REST` if no word matches."""
     texts = [entry.action.partition(",")[0]] if entry.action else entry.sentences
+    if not texts:
+        return REST
     words = [re.findall(r"[a-z]+", text.lower()) for text in texts]
     for kind, pattern in MOTION_KINDS.items():
-        if texts and 2 * sum(any(re.fullmatch(pattern, word) for word in own) for own in words) >= len(texts):
+        matching = [text_words for text_words in words if _any_matches(pattern, text_words)]
+        if 2 * len(matching) >= len(texts):
             return kind
     return REST
 
 
+def _any_matches(pattern: str, words: Sequence[str]) -> bool:
+    return any(re.fullmatch(pattern, word) for word in words)
+
+
 def by_kind(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
-    """The records of each kind that has some, in the order of :data:`MOTION_KINDS`, everything else last."""
-    found = {kind: [entry for entry in entries if kind_of(entry) == kind] for kind in (*MOTION_KINDS, REST)}
-    return {kind: members for kind, members in found.items() if members}
+    """The records of each kind that has any, in the order of :data:`MOTION_KINDS`, everything else last."""
+    kinds: dict[str, list[Entry]] = {kind: [] for kind in (*MOTION_KINDS, REST)}
+    for entry in entries:
+        kinds[kind_of(entry)].append(entry)
+    return {kind: members for kind, members in kinds.items() if members}
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """The distances of all systems in each window, floors first, and the window's recording by name.
+    """The distances of all systems in each window, floors first.
 
-    distances: system -> measure -> (W, N) in centimetres. seeds: the frames given, of each window.
+    names: each window's recording. distances: system -> measure -> (W, N) in centimetres. seeds: each window's input.
     """
 
     names: tuple[str, ...]
@@ -85,102 +93,126 @@ class Measured:
     seeds: tuple[Motion, ...]
 
     def windows(self, entries: Collection[Entry]) -> NDArray[np.intp]:
-        """The numbers of the windows of some recordings."""
+        """The indices of the windows of some recordings."""
         return np.flatnonzero(np.isin(self.names, [entry.name for entry in entries]))
 
     def part(self, name: str, entries: Sequence[Entry]) -> dict[str, Any]:
         """The figures of a system, and of floors by their names, in the windows of some recordings."""
-        own = self.windows(entries)
+        windows = self.windows(entries)
+        people = {entry.subject for entry in entries}
+        counts = dict(zip(COUNTS, (len(people), len(entries), len(windows)), strict=True))
+        figures: dict[str, Any] = {**counts, **self._means(name, windows)}
+        for floor in FLOORS:
+            figures[key(floor)] = self._means(floor, windows)
+        return figures
 
-        def means(system: str) -> dict[str, Any]:
-            return {measure: by_frame(errors[own].mean(axis=0)) for measure, errors in self.distances[system].items()}
-
-        counts = dict(zip(COUNTS, (len({entry.subject for entry in entries}), len(entries), len(own)), strict=True))
-        return {**counts, **means(name), **{key(floor): means(floor) for floor in FLOORS}}
+    def _means(self, system: str, windows: NDArray[np.intp]) -> dict[str, Any]:
+        """Measure -> a system's mean distances at the reported frames in some windows."""
+        return {measure: by_frame(errors[windows].mean(axis=0)) for measure, errors in self.distances[system].items()}
 
 
-def mocap_report(models: Mapping[str, PredictModel], found: Measured, trials: Sequence[Entry]) -> dict[str, Any]:
+def mocap_report(models: Mapping[str, PredictModel], results: Measured, trials: Sequence[Entry]) -> dict[str, Any]:
     """The figures of each model: mean distances of joints in the world, "place_cm", and relative to the root,
-    "pose_cm", in all windows, of floors by their names, by "kinds" of motions; and the "calibration" of one that knows
-    its errors."""
-    kinds = by_kind([entry for entry in trials if entry.name in found.names])
+    "pose_cm", in all windows, those of the floors, and both by "kinds" of motions; and for models that predict their
+    errors the "calibration"."""
+    kinds = by_kind([entry for entry in trials if entry.name in results.names])
+    kind_windows = {kind: results.windows(members) for kind, members in kinds.items()}
     reports: dict[str, Any] = {}
     for name, model in models.items():
-        reports[name] = found.part(name, trials)
-        reports[name]["kinds"] = {kind: found.part(name, members) for kind, members in kinds.items()}
+        reports[name] = results.part(name, trials)
+        reports[name]["kinds"] = {kind: results.part(name, members) for kind, members in kinds.items()}
         if model.knows_errors:
-            expected, own = model.expected_errors(found.seeds), found.distances[name][PLACE]
-            windows = {kind: found.windows(members) for kind, members in kinds.items()}
-            reports[name]["calibration"] = calibration(expected.astype(np.float64), own, windows)
+            expected = model.expected_errors(results.seeds).astype(np.float64)
+            true = results.distances[name][PLACE]
+            reports[name]["calibration"] = calibration(expected, true, kind_windows)
     return reports
 
 
 def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.intp]]) -> dict[str, Any]:
-    """Of expected and measured errors (W, N) in centimetres, at the reported frames.
+    """Expected and measured errors (W, N) in centimetres, compared at the reported frames.
 
-    "ratio": measured over expected, which ought to be 1, of "all" windows and of each of ``kinds``, kind -> numbers of
-    its windows. "quarters" of the windows, those with the least expected errors first: the means of both, which ought
-    to rise alike. "rank_correlation": Spearman's, NaN where one of the two does not vary.
+    "ratio": measured over expected, ideally 1, in "all" windows and in each of ``kinds``, kind -> indices of its
+    windows. "quarters" of the windows, smallest expected errors first: the means of both, which should rise alike.
+    "rank_correlation": Spearman's, NaN where one of the two is constant.
     """
-    groups = {"all": np.arange(len(true)), **kinds}
+    all_windows = np.arange(len(true))
+
+    ratios = {}
+    for kind, windows in {"all": all_windows, **kinds}.items():
+        ratios[kind] = by_frame(true[windows].mean(axis=0) / expected[windows].mean(axis=0))
+
+    # each frame's windows in the order of the errors expected there
     order = np.argsort(expected, axis=0, kind="stable")
-    both = {"expected_cm": expected, "measured_cm": true}
-    rising = {key: np.take_along_axis(errors, order, axis=0) for key, errors in both.items()}
-    parts = [part for part in np.array_split(np.arange(len(true)), len(QUARTERS)) if len(part)]
-    varied = [np.ptp(one) > 0 and np.ptp(other) > 0 for one, other in zip(expected.T, true.T, strict=True)]
-    ranks = [
-        spearmanr(*pair).statistic if varies else np.nan
-        for varies, *pair in zip(varied, expected.T, true.T, strict=True)
-    ]
-    return {
-        "ratio": {kind: by_frame(true[own].mean(axis=0) / expected[own].mean(axis=0)) for kind, own in groups.items()},
-        "quarters": [{key: by_frame(errors[part].mean(axis=0)) for key, errors in rising.items()} for part in parts],
-        "rank_correlation": by_frame(np.array(ranks)),
-    }
+    expected_rising = np.take_along_axis(expected, order, axis=0)
+    true_rising = np.take_along_axis(true, order, axis=0)
+    quarters = []
+    for part in np.array_split(all_windows, len(QUARTERS)):
+        if len(part):
+            expected_mean = by_frame(expected_rising[part].mean(axis=0))
+            true_mean = by_frame(true_rising[part].mean(axis=0))
+            quarters.append({"expected_cm": expected_mean, "measured_cm": true_mean})
+
+    correlations = []
+    for expected_at_frame, true_at_frame in zip(expected.T, true.T, strict=True):
+        if np.ptp(expected_at_frame) > 0 and np.ptp(true_at_frame) > 0:
+            correlations.append(spearmanr(expected_at_frame, true_at_frame).statistic)
+        else:
+            correlations.append(np.nan)
+    return {"ratio": ratios, "quarters": quarters, "rank_correlation": by_frame(np.array(correlations))}
 
 
-def calibration_rows(found: Mapping[str, Any]) -> list[list[str]]:
+def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
     """Rows of a table, after a head with the frames."""
     rows = [["measured mean error over the expected one, joints in the world"]]
-    rows += [[f"  {kind}", *cells(ratio, 2)] for kind, ratio in found["ratio"].items()]
+    for kind, ratio in figures["ratio"].items():
+        rows.append([f"  {kind}", *cells(ratio, 2)])
     rows.append(["quarters of the windows by the expected error: expected, cm; and measured, cm"])
-    for words, quarter in zip(QUARTERS, found["quarters"], strict=False):
-        rows += [[f"  {words}: {key.removesuffix('_cm')}", *cells(errors, 2)] for key, errors in quarter.items()]
+    for title, quarter in zip(QUARTERS, figures["quarters"], strict=False):
+        for measure, errors in quarter.items():
+            rows.append([f"  {title}: {measure.removesuffix('_cm')}", *cells(errors, 2)])
     rows.append(["correlation of the ranks of expected and measured errors (Spearman)"])
-    return [*rows, ["  all windows", *cells(found["rank_correlation"], 2)]]
+    rows.append(["  all windows", *cells(figures["rank_correlation"], 2)])
+    return rows
 
 
 def mocap_text(reports: Mapping[str, Any], fps: float) -> str:
-    """The distances of all motions and of each kind, and the calibration of those that know their errors."""
+    """The distances in all motions and in each kind, and the calibration of models that predict their errors."""
+    milliseconds = [f"{(frame + 1) / fps * 1000:.0f}" for frame in REPORTED]
+    rows = [["output frame", *map(str, REPORTED)], ["milliseconds", *milliseconds]]
+
     first = next(iter(reports.values()))
-    times = [f"{(frame + 1) / fps * 1000:.0f}" for frame in REPORTED]
-    rows = [["output frame", *map(str, REPORTED)], ["milliseconds", *times]]
     for kind in ("all", *first["kinds"]):
         parts = {name: report["kinds"].get(kind, report) for name, report in reports.items()}
-        beside = next(iter(parts.values()))
-        rows.append([f"{kind}: " + ", ".join(f"{beside[count]} {count}" for count in COUNTS)])
+        shared = next(iter(parts.values()))  # counts and floors are the same for all models
+        counts = ", ".join(f"{shared[count]} {count}" for count in COUNTS)
+        rows.append([f"{kind}: {counts}"])
         for measure in TITLES if kind == "all" else (PLACE,):
             rows.append([TITLES[measure]])
-            rows += [[f"  {floor}", *cells(beside[key(floor)][measure], 1)] for floor in FLOORS]
-            rows += [[f"  {name}", *cells(part[measure], 1)] for name, part in parts.items()]
+            for floor in FLOORS:
+                rows.append([f"  {floor}", *cells(shared[key(floor)][measure], 1)])
+            for name, part in parts.items():
+                rows.append([f"  {name}", *cells(part[measure], 1)])
+
     for name, report in reports.items():
-        rows += [[name], *calibration_rows(report["calibration"])] if "calibration" in report else []
+        if "calibration" in report:
+            rows += [[name], *calibration_rows(report["calibration"])]
     return aligned(rows)
 
 
 def held_out(models: Mapping[str, PredictModel], store: Store) -> dict[Entry, Motion]:
-    """The records of a store that all models held out, and their motions; DataError where none of them is there."""
+    """The records of a store that all models held out, and their motions; DataError if the store has none of them."""
     test = set.intersection(*map(_tested, models.values()))
     playable = named(store.representation).motion
-    found = {entry: playable(store.motion(i)) for i, entry in enumerate(store.records) if entry.name in test}
-    if not found:
+    motions = {entry: playable(store.motion(i)) for i, entry in enumerate(store.records) if entry.name in test}
+    if not motions:
         raise DataError("none of the trials held out in training was found")
-    return found
+    return motions
 
 
 def chosen_decays(models: Mapping[str, PredictModel], store: Store) -> Decays:
-    """The decays of damped velocity, from the motions that no model holds out for its test."""
-    first, test = next(iter(models.values())), set.union(*map(_tested, models.values()))
+    """The decays of damped velocity, chosen on the motions that no model holds out for its test."""
+    first = next(iter(models.values()))
+    test = set.union(*map(_tested, models.values()))
     return chosen(store, sorted(test), first.fps, first.horizon)
 
 
@@ -191,32 +223,43 @@ def _tested(model: PredictModel) -> set[str]:
 def measured(models: Mapping[str, PredictModel], motions: Mapping[str, Motion], decays: Decays) -> Measured:
     """All systems in the windows that begin every ``horizon`` frames, floors first.
 
-    Models must have the same frame rate, seed and horizon; DataError where the motions are too short.
+    All models must have the same frame rate, seed and horizon; DataError if the motions are too short.
     """
     first = next(iter(models.values()))
-    given, horizon = first.seed_frames, first.horizon
-    whole = {name: motion.resample(first.fps, to_end=True) for name, motion in motions.items()}
-    cut = [
-        (name, motion[start : start + given + horizon])
-        for name, motion in whole.items()
-        for start in range(0, len(motion) - given - horizon + 1, horizon)
-    ]
-    if not cut:
-        raise DataError(f"the motions are shorter than {given + horizon} frames at the model's rate")
-    windows, seeds = Windows.of([window for _, window in cut], horizon), [window[:given] for _, window in cut]
-    found = floors(windows, decays)
+    seed_frames = first.seed_frames
+    window_frames = seed_frames + first.horizon
+
+    # overlapping windows of all motions
+    names = []
+    windows = []
+    for name, motion in motions.items():
+        whole = motion.resample(first.fps, to_end=True)
+        for start in range(0, len(whole) - window_frames + 1, first.horizon):
+            names.append(name)
+            windows.append(whole[start : start + window_frames])
+    if not windows:
+        raise DataError(f"the motions are shorter than {window_frames} frames at the model's rate")
+    seeds = [window[:seed_frames] for window in windows]
+
+    # the predictions of floors and models, and their distances from the truth
+    truth_windows = Windows.of(windows, first.horizon)
+    predictions = floors(truth_windows, decays)
     for name, model in models.items():
-        found[name] = np.stack([places(one) for one in model.predict(seeds, frames=horizon)])
-    distances = {
-        name: dict(zip(TITLES, apart(predicted, windows.truth), strict=True)) for name, predicted in found.items()
-    }
-    return Measured(tuple(name for name, _ in cut), distances, tuple(seeds))
+        predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
+    distances = {}
+    for name, predicted in predictions.items():
+        in_world, relative = apart(predicted, truth_windows.truth)
+        distances[name] = {PLACE: in_world, POSE: relative}
+    return Measured(tuple(names), distances, tuple(seeds))
 
 
 def shown(models: Mapping[str, PredictModel], motion: Motion) -> dict[str, Motion]:
-    """One horizon from the middle of a motion: the truth, and each model's prediction. Models are as above."""
+    """One horizon from the middle of a motion: the truth, and each model's prediction, with models as in
+    :func:`measured`."""
     first = next(iter(models.values()))
     whole = motion.resample(first.fps, to_end=True)
     middle = max(first.seed_frames, (len(whole) - first.horizon) // 2)
-    found = {name: model.predict(whole[:middle], frames=first.horizon) for name, model in models.items()}
-    return {"truth": whole[middle:][: first.horizon], **found}
+    motions = {"truth": whole[middle:][: first.horizon]}
+    for name, model in models.items():
+        motions[name] = model.predict(whole[:middle], frames=first.horizon)
+    return motions
