@@ -101,7 +101,7 @@ def _print_descriptions(folder: Path) -> None:
 def _print_actions(folder: Path) -> None:
     """How many of every third trial are said to be the same action from the AMC and from another figure's BVH."""
     # not above: tests of the runtime take the rest of this file, without the packages of evaluation
-    from motet_train.evaluate.language.attributes import ACTIONS, said
+    from motet_train.evaluate.language.attributes import ACTIONS, mentioned
 
     model, same, different = motet.load_as(DescribeModel, "describe"), 0, []
     for path in sorted((folder / "cmu-asfamc" / "amc").glob("*.amc"))[::3]:
@@ -109,7 +109,7 @@ def _print_actions(folder: Path) -> None:
         amc = whole[: int(MAX_SECONDS * whole.fps)]
         motet.write(folder / "other.bvh", from_humanoid(to_humanoid(amc).motion, STOCKY))
         pair = [model.describe(motion)[0].text for motion in (amc, read_motion(folder / "other.bvh"))]
-        if said(ACTIONS, pair[0]) == said(ACTIONS, pair[1]):
+        if mentioned(ACTIONS, pair[0]) == mentioned(ACTIONS, pair[1]):
             same += 1
         else:
             different.append(f"{path.stem}  {pair[0]} | {pair[1]}")

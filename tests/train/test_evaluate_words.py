@@ -7,7 +7,7 @@ import pytest
 from language_models import small_store, told
 
 from motet_train.data.errors import DataError
-from motet_train.evaluate.language.attributes import VERBS, common_side, common_turning, said, side, words_right
+from motet_train.evaluate.language.attributes import VERBS, common_side, common_turning, mentioned, side, words_right
 from motet_train.evaluate.language.describe import (
     agreement,
     bleu,
@@ -102,7 +102,7 @@ def test_agreement_holds_each_sentence_out() -> None:
     ],
 )
 def test_verbs_that_a_sentence_says(sentence: str, verbs: set[str]) -> None:
-    assert said(VERBS, sentence) == verbs
+    assert mentioned(VERBS, sentence) == verbs
 
 
 @pytest.mark.parametrize(

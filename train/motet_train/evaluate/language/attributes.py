@@ -1,4 +1,4 @@
-"""What a sentence says of a motion: walk, run or jump; left or right; whether it turns. Small tables of English."""
+"""Attributes of motions in sentences: walk, run or jump; left or right; turns. Small tables of English words."""
 
 import re
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ import numpy as np
 from motet_train.evaluate.language.split_store import plain
 
 Patterns = dict[str, str]
-"""Name of an attribute -> regular expression of the words that say it."""
+"""Name of an attribute -> regular expression of the words that express it."""
 
 VERBS: Patterns = {
     "walk": r"walk\w*|stroll\w*|strid\w*|on foot|(?:several|few|slow) steps|steps? forwards?",
@@ -32,37 +32,43 @@ ACTIONS: Patterns = VERBS | {
 }
 
 
-def said(table: Patterns, *sentences: str) -> frozenset[str]:
-    """The attributes that any of some sentences names, but for words after "instead of" and "without"."""
+def mentioned(table: Patterns, *sentences: str) -> frozenset[str]:
+    """The attributes that any of some sentences mentions, except words after "instead of" and "without"."""
     texts = [re.sub(r"(?:instead of|without) \w+", "", plain(sentence)) for sentence in sentences]
-    return frozenset(key for key, words in table.items() for text in texts if re.search(rf"\b(?:{words})\b", text))
+    attributes = set()
+    for attribute, words in table.items():
+        if any(re.search(rf"\b(?:{words})\b", text) for text in texts):
+            attributes.add(attribute)
+    return frozenset(attributes)
 
 
 def side(sentence: str) -> frozenset[str]:
-    """Left or right; nothing where a sentence names both, as with "the left and the right foot in turn"."""
-    found = said(SIDES, sentence)
-    return found if len(found) == 1 else frozenset()
+    """Left or right; empty if a sentence mentions both, as in "the left and the right foot in turn"."""
+    sides = mentioned(SIDES, sentence)
+    return sides if len(sides) == 1 else frozenset()
 
 
 def turning(sentence: str) -> bool:
     """Whether a sentence about walking or running says that the path is not straight."""
-    return bool(said(TURNS, sentence) or side(sentence))
+    return bool(mentioned(TURNS, sentence) or side(sentence))
 
 
-def common(found: Sequence[frozenset[str]]) -> frozenset[str]:
-    """The attributes that at least half of a motion's sentences name."""
-    return frozenset(name for name in frozenset().union(*found) if 2 * sum(name in one for one in found) >= len(found))
+def common(attributes: Sequence[frozenset[str]]) -> frozenset[str]:
+    """The attributes that at least half of a motion's sentences mention, by those of each sentence."""
+    every: frozenset[str] = frozenset().union(*attributes)
+    counts = {name: sum(name in mentions for mentions in attributes) for name in every}
+    return frozenset(name for name in every if 2 * counts[name] >= len(attributes))
 
 
 def common_verbs(sentences: Sequence[str]) -> frozenset[str]:
-    """Walk, run, jump: what half of the sentences agree on."""
-    return common([said(VERBS, sentence) for sentence in sentences])
+    """Walk, run, jump: those that half of the sentences agree on."""
+    return common([mentioned(VERBS, sentence) for sentence in sentences])
 
 
 def common_side(sentences: Sequence[str]) -> str | None:
-    """The one side that half of the sentences agree on."""
-    found = common([side(sentence) for sentence in sentences])
-    return next(iter(found)) if len(found) == 1 else None
+    """The side that half of the sentences agree on, None unless it is a single one."""
+    sides = common([side(sentence) for sentence in sentences])
+    return next(iter(sides)) if len(sides) == 1 else None
 
 
 def common_turning(sentences: Sequence[str]) -> bool | None:
@@ -74,25 +80,30 @@ def common_turning(sentences: Sequence[str]) -> bool | None:
 
 
 def action_right(text: str, sentences: Sequence[str]) -> bool:
-    """Whether a sentence about a motion names an action, and none that nobody named."""
-    named = said(ACTIONS, text)
-    return bool(named) and named <= said(ACTIONS, *sentences)
+    """Whether a description mentions an action, and only actions that a reference sentence mentions."""
+    actions = mentioned(ACTIONS, text)
+    return bool(actions) and actions <= mentioned(ACTIONS, *sentences)
 
 
 def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) -> dict[str, float]:
-    """The shares of hypotheses that are right, NaN of none; and of how many, "_of".
+    """The shares of hypotheses that are right, NaN without any, and their numbers with the suffix "_of".
 
-    "verbs": a verb is named that people agree on, and none that nobody named. "sides": the one side is named that
-    people agree on. "turns", of walking and running: what people agree on is said about turning.
+    "verbs": a verb that people agree on is mentioned, and none that nobody mentioned. "sides": the side that people
+    agree on is mentioned. "turns", for walking and running: the description agrees with people about turning.
     """
-    found: dict[str, list[bool]] = {"verbs": [], "sides": [], "turns": []}
+    right: dict[str, list[bool]] = {"verbs": [], "sides": [], "turns": []}
     for text, sentences in zip(hypotheses, references, strict=True):
-        if verbs := common_verbs(sentences):
-            named = said(VERBS, text)
-            found["verbs"].append(bool(named & verbs) and named <= said(VERBS, *sentences))
-        if agreed := common_side(sentences):
-            found["sides"].append(side(text) == {agreed})
-        if (turns := common_turning(sentences)) is not None:
-            found["turns"].append(turning(text) == turns)
-    shares = {key: sum(right) / len(right) if right else np.nan for key, right in found.items()}
-    return shares | {f"{key}_of": float(len(right)) for key, right in found.items()}
+        agreed_verbs = common_verbs(sentences)
+        if agreed_verbs:
+            verbs = mentioned(VERBS, text)
+            right["verbs"].append(bool(verbs & agreed_verbs) and verbs <= mentioned(VERBS, *sentences))
+        agreed_side = common_side(sentences)
+        if agreed_side:
+            right["sides"].append(side(text) == {agreed_side})
+        agreed_turning = common_turning(sentences)
+        if agreed_turning is not None:
+            right["turns"].append(turning(text) == agreed_turning)
+
+    shares = {key: sum(flags) / len(flags) if flags else np.nan for key, flags in right.items()}
+    counts = {f"{key}_of": float(len(flags)) for key, flags in right.items()}
+    return shares | counts

@@ -1,146 +1,200 @@
-"""Whether a describe model knows when it is right, and when something else begins, on validation motions."""
+"""Whether a describe model knows when it is right, and when another action begins, on validation motions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.models.describe import ConfidenceSettings, DescribeModel, Description
+from motet.models.describe import ConfidenceSettings, DescribeModel, Description, Part
 from motet.models.language import RULES
 from motet.motion.motion import Motion
-from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, said
+from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, mentioned
 from motet_train.evaluate.language.split_store import SplitStore
 
 ENOUGH = 20
-"""Descriptions by which a limit is chosen at least."""
+"""Descriptions needed to choose a limit."""
+
+CHAIN = 3
+"""Motions of a timeline."""
+
+SHORTEST, LONGEST = 2.0, 12.0
+"""Seconds that a motion of a timeline lasts."""
 
 Truths = NDArray[np.bool_]
 
 
 def confidence(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> dict[str, float]:
-    """Of the best descriptions of some records (``of``): the shares that are right, and confident.
+    """The shares of the best descriptions of some records (``of``) that are right, and confident.
 
-    "right_if_confident", "right_if_not": the shares that are right of those two. "kept": the share of right ones that
-    are confident. "auc": how often a right one is more probable than a wrong one; "auc_word": by the mean of its words.
-    Right is what names an action, and none that nobody named
-    (:func:`motet_train.evaluate.language.attributes.action_right`). NaN where there are none.
+    "right_if_confident", "right_if_not": the shares of confident and of other ones that are right. "kept": the share of
+    right ones that are confident. "auc": how often a right one is more probable than a wrong one; "auc_word": the same
+    by the mean over its words. See :func:`motet_train.evaluate.language.attributes.action_right` for right. NaN for a
+    share of nothing.
     """
-    found, right = judged(model, corpus, records)
-    sure = np.array([one.confident for one in found])
-    scores = np.array([one.log_probability for one in found])
-    words = np.array([len(RULES.words(one.text)) + 1 for one in found])  # with the end
+    descriptions, right = judged(model, corpus, records)
+    sure = np.array([description.confident for description in descriptions])
+    scores = np.array([description.log_probability for description in descriptions])
+    words = [len(RULES.words(description.text)) + 1 for description in descriptions]  # with the end
     return {
-        "of": float(len(found)),
-        "right": _share(right),
-        "confident": _share(sure),
-        "right_if_confident": _share(right[sure]),
-        "right_if_not": _share(right[~sure]),
-        "kept": _share(sure[right]),
+        "of": float(len(descriptions)),
+        "right": share(right),
+        "confident": share(sure),
+        "right_if_confident": share(right[sure]),
+        "right_if_not": share(right[~sure]),
+        "kept": share(sure[right]),
         "auc": _auc(scores, right),
-        "auc_word": _auc(scores / words, right),
+        "auc_word": _auc(scores / np.array(words), right),
     }
 
 
 def judged(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> tuple[list[Description], Truths]:
     """The best description of each record, and whether it is right."""
-    found = [row[0] for row in model.describe(corpus.motions(records))]
-    pairs = zip(found, corpus.references(records), strict=True)
-    return found, np.array([action_right(one.text, sentences) for one, sentences in pairs], dtype=np.bool_)
+    descriptions = [row[0] for row in model.describe(corpus.motions(records))]
+    right = []
+    for description, sentences in zip(descriptions, corpus.references(records), strict=True):
+        right.append(action_right(description.text, sentences))
+    return descriptions, np.array(right, dtype=np.bool_)
 
 
 def calibrated(scores: NDArray[np.float64], right: Truths) -> ConfidenceSettings:
-    """The limit that is most often right: right descriptions are at or above it, and wrong ones below.
+    """The limit that is right most often, with right descriptions at or above it and wrong ones below.
 
-    scores: (N,) log-probabilities. Between two of them the limit is half-way; of equally good limits it is the lowest.
-    With less than :data:`ENOUGH` descriptions it is the default.
+    scores: (N,) log-probabilities. The limit lies half-way between two of them; of equally good limits it is the
+    lowest. With fewer than :data:`ENOUGH` descriptions it is the default.
     """
     if len(scores) < ENOUGH:
         return ConfidenceSettings()
+    # by how much each description above the limit improves the count of correct decisions
     order = np.argsort(scores, kind="stable")
-    believed = np.where(right[order], 1, -1)  # what each adds to the number of those told correctly
-    start = int(np.append(np.cumsum(believed[::-1])[::-1], 0).argmax())
-    ends = [2 * scores[order[0]], *scores[order], 0.0]
-    return ConfidenceSettings(max(-1000.0, float(ends[start] + ends[start + 1]) / 2))
+    gains = np.where(right[order], 1, -1)
+    gains_above = np.append(np.cumsum(gains[::-1])[::-1], 0)
+    best = int(gains_above.argmax())
+    bounds = [2 * scores[order[0]], *scores[order], 0.0]
+    limit = float(bounds[best] + bounds[best + 1]) / 2
+    return ConfidenceSettings(max(-1000.0, limit))
+
+
+class Moment(NamedTuple):
+    """A moment of a timeline: the record that goes on, and the part of the described timeline there."""
+
+    record: int
+    part: Part
+
+
+class Timelines(NamedTuple):
+    """Described timelines. joins_found: how many joins have a cut. cuts: of all timelines. moments: every tenth of a
+    second."""
+
+    joins_found: int
+    cuts: int
+    moments: list[Moment]
+
+
+def timelines_of(model: DescribeModel, corpus: SplitStore, chains: Iterable[Sequence[int]], within: float) -> Timelines:
+    """Describe chains of records as timelines. within: seconds between a join and a cut that finds it."""
+    joins_found = 0
+    cuts = 0
+    moments = []
+    for chain in chains:
+        motions = corpus.motions(chain)
+        parts = model.timeline(joined(motions))
+        ends = np.cumsum([motion.duration for motion in motions])
+        joins_found += matched(ends[:-1].tolist(), [part.start for part in parts[1:]], within)
+        cuts += len(parts) - 1
+        for time in np.arange(0.05, ends[-1], 0.1):
+            place = min(int(np.searchsorted(ends, time)), len(chain) - 1)
+            part = next((part for part in parts if time < part.stop), parts[-1])
+            moments.append(Moment(chain[place], part))
+    return Timelines(joins_found, cuts, moments)
 
 
 def timeline_figures(
     model: DescribeModel, corpus: SplitStore, records: Sequence[int], seed: int = 0, count: int = 60
 ) -> dict[str, float]:
-    """Of ``count`` timelines, three motions of 2 to 12 s, joined at random, neighbours of different actions: which
-    joins are found, and what is said rightly.
+    """Figures of ``count`` timelines, three motions of 2 to 12 s joined at random, neighbours of different actions.
 
-    "joins_found", "cuts_right": the shares of joins that have a cut within a second, and of cuts that have a join.
-    "parts": how many a timeline has. "time_right": the share of time at which an action is named that people named of
-    what goes on, and no other; "time_confident", "time_right_if_confident": of parts that are confident.
-    "alone_right": of the same motions, each described alone. Nothing where no motions differ.
+    "joins_found", "cuts_right": the shares of joins with a cut within a second, and of cuts with a join. "parts": how
+    many a timeline has. "time_right": the share of time with a right description
+    (:func:`motet_train.evaluate.language.attributes.action_right`); "time_confident", "time_right_if_confident": the
+    same by confident parts. "alone_right": the share of the same motions that are described correctly alone. Empty if
+    no two motions differ.
     """
-    others, random = _others(corpus, records), np.random.default_rng(seed)
-    found, cuts, right, sure, alone = 0, 0, list[bool](), list[bool](), list[bool]()
-    for _ in range(count if others else 0):
-        chain = _chain(others, random)
-        motions, references = corpus.motions(chain), corpus.references(chain)
-        parts = model.timeline(joined(motions))
-        ends = np.cumsum([motion.duration for motion in motions])
-        found += matched(ends[:-1].tolist(), [part.start for part in parts[1:]])
-        cuts += len(parts) - 1
-        for moment in np.arange(0.05, ends[-1], 0.1):
-            part = next((part for part in parts if moment < part.stop), parts[-1])
-            place = min(int(np.searchsorted(ends, moment)), len(chain) - 1)
-            right.append(action_right(part.text, references[place]))
-            sure.append(part.confident)
-        alone += judged(model, corpus, chain)[1].tolist()
+    others = _others(corpus, records)
     if not others:
         return {}
+    random = np.random.default_rng(seed)
+    chains = [_chain(others, random) for _ in range(count)]
+    timelines = timelines_of(model, corpus, chains, within=1.0)
+    right = []
+    sure = []
+    for record, part in timelines.moments:
+        right.append(action_right(part.text, corpus.sentences(record)))
+        sure.append(part.confident)
+    alone: list[bool] = []
+    for chain in chains:
+        alone += judged(model, corpus, chain)[1].tolist()
+    cuts = timelines.cuts
     return {
-        "joins_found": found / (count * 2),
-        "cuts_right": found / cuts if cuts else np.nan,
+        "joins_found": timelines.joins_found / (count * (CHAIN - 1)),
+        "cuts_right": timelines.joins_found / cuts if cuts else np.nan,
         "parts": cuts / count + 1,
-        "time_right": _share(np.array(right)),
-        "time_confident": _share(np.array(sure)),
-        "time_right_if_confident": _share(np.array(right)[sure]),
-        "alone_right": _share(np.array(alone)),
+        "time_right": share(np.array(right)),
+        "time_confident": share(np.array(sure)),
+        "time_right_if_confident": share(np.array(right)[sure]),
+        "alone_right": share(np.array(alone)),
     }
+
+
+def fits_timeline(motion: Motion) -> bool:
+    """Whether a motion is long and short enough for a timeline."""
+    return SHORTEST <= motion.duration <= LONGEST
 
 
 def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence[tuple[str, int]]]:
-    """For each record the records of other actions, each as often as it has actions, with the action."""
-    named = {record: [said(ACTIONS, sentence) for sentence in corpus.sentences(record)] for record in records}
-    agreed = {record: common(found) for record, found in named.items() if 2.0 <= corpus.motion(record).duration <= 12.0}
-    anyone = {record: frozenset().union(*found) for record, found in named.items()}
-    found = {
-        one: [
-            (action, two)
-            for two in agreed
-            if agreed[one].isdisjoint(anyone[two]) and agreed[two].isdisjoint(anyone[one])
-            for action in sorted(agreed[two])
-        ]
-        for one in agreed
-        if agreed[one]
-    }
-    return {record: rest for record, rest in found.items() if rest}
+    """For each record the records of other actions, once for each of their actions, with the action."""
+    mentioned_actions: dict[int, frozenset[str]] = {}
+    agreed_actions: dict[int, frozenset[str]] = {}
+    for record in records:
+        actions = [mentioned(ACTIONS, sentence) for sentence in corpus.sentences(record)]
+        mentioned_actions[record] = frozenset().union(*actions)
+        if fits_timeline(corpus.motion(record)):
+            agreed_actions[record] = common(actions)
+
+    others: dict[int, list[tuple[str, int]]] = {}
+    for record, agreed in agreed_actions.items():
+        rest = []
+        for other, other_agreed in agreed_actions.items():
+            differ = agreed.isdisjoint(mentioned_actions[other]) and other_agreed.isdisjoint(mentioned_actions[record])
+            if differ:
+                rest += [(action, other) for action in sorted(other_agreed)]
+        if agreed and rest:
+            others[record] = rest
+    return others
 
 
 def _chain(others: Mapping[int, Sequence[tuple[str, int]]], random: np.random.Generator) -> list[int]:
-    """Three records one after the other: first the action is drawn, so that rare ones come as often, then the
-    motion."""
+    """Three records in a row: each action is drawn before its motion, so that rare ones are as frequent."""
     chain = [int(random.choice(list(others)))]
-    while len(chain) < 3:
-        actions = sorted({action for action, _ in others[chain[-1]]})
-        chosen = actions[random.integers(len(actions))]
-        chain.append(int(random.choice([record for action, record in others[chain[-1]] if action == chosen])))
+    while len(chain) < CHAIN:
+        candidates = others[chain[-1]]
+        actions = sorted({action for action, _ in candidates})
+        drawn = actions[random.integers(len(actions))]
+        chain.append(int(random.choice([record for action, record in candidates if action == drawn])))
     return chain
 
 
 def joined(motions: Sequence[Motion]) -> Motion:
-    """Features one after the other, with a leap from each pose to the next: where the figure goes is in rates."""
+    """Features of motions in a row; the pose jumps between them, and the path continues since it is in rates."""
     return replace(motions[0], values=np.concatenate([motion.values for motion in motions]))
 
 
 def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) -> int:
-    """How many joins have a cut of their own within a second or other time, the nearest first."""
+    """How many joins have a cut of their own within a time in seconds, matched nearest first."""
     pairs = sorted((abs(join - cut), join, cut) for join in joins for cut in cuts)
-    free_joins, free_cuts = set(joins), set(cuts)
+    free_joins = set(joins)
+    free_cuts = set(cuts)
     for distance, join, cut in pairs:
         if distance <= within + 1e-9 and join in free_joins and cut in free_cuts:
             free_joins.remove(join)
@@ -148,12 +202,13 @@ def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) 
     return len(joins) - len(free_joins)
 
 
-def _share(truths: Truths) -> float:
+def share(truths: Truths) -> float:
+    """The share of true flags, NaN without any flags."""
     return float(truths.mean()) if len(truths) else np.nan
 
 
 def _auc(scores: NDArray[np.float64], right: Truths) -> float:
-    """How often the score of a right one is above that of a wrong one; equal ones count half."""
-    from sklearn.metrics import roc_auc_score  # for this alone, so that training does not load it
+    """How often the score of a right description is above that of a wrong one; equal ones count half."""
+    from sklearn.metrics import roc_auc_score  # imported here, so that training does not load it
 
     return float(roc_auc_score(right, scores)) if right.any() and not right.all() else np.nan

@@ -1,10 +1,11 @@
 """How well motions are described: corpus BLEU-4 of ranked hypotheses (Papineni et al. 2002; Plappert et al. 2017,
-section 5.3.3, tables 2 and 3), what a model has to beat, answers looked up among the training motions, and all figures
-of a describe model in one nested object with stable keys."""
+section 5.3.3, tables 2 and 3), the floors a model has to beat, sentences looked up among the training motions, and all
+figures of a describe model as one report."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
+from typing import TypeVar
 
 import numpy as np
 from sacrebleu.metrics.bleu import BLEU
@@ -24,146 +25,201 @@ from motet_train.evaluate.tables import Report, gathered
 RANKS = 5
 """Hypotheses for each motion, as in the paper."""
 
+ORDERS = (1, 2, 3, 4)
+"""Longest n-grams of the BLEU scores on unseen references."""
+
+Hypothesis = TypeVar("Hypothesis")
+
 References = Sequence[Sequence[str]]
-"""For each motion what was said about it, normalised."""
+"""The normalised sentences about each motion."""
 
 
 def bleu(hypotheses: Sequence[str], references: References, marks: bool = False, longest: int = 4) -> float:
-    """Corpus BLEU of one sentence for each motion, 0 to 1: not smoothed, closest reference length.
+    """Corpus BLEU of one sentence for each motion, 0 to 1: without smoothing, closest reference length.
 
-    longest: n-grams up to so many words count.
-    marks: keep SOS and EOS in hypotheses and references, as the authors did. Both are matched in every sentence, which
-    makes the figure higher; later papers leave them out.
+    marks: keep SOS and EOS in hypotheses and references, as the authors did. Both match in every sentence, which raises
+        the score; later papers leave them out.
+    longest: the number of words in the longest n-grams.
     """
     form = f"{SOS} {{}} {EOS}" if marks else "{}"
-    streams = zip_longest(*(map(form.format, said) for said in references))
+    texts = [form.format(plain(hypothesis)) for hypothesis in hypotheses]
+    marked = [[form.format(sentence) for sentence in sentences] for sentences in references]
+    streams = [list(stream) for stream in zip_longest(*marked)]
     metric = BLEU(smooth_method="none", tokenize="none", force=True, max_ngram_order=longest)
-    score: float = metric.corpus_score([form.format(plain(t)) for t in hypotheses], list(map(list, streams))).score
-    return min(score / 100, 1.0)  # which rounding may exceed
+    score: float = metric.corpus_score(texts, streams).score
+    return min(score / 100, 1.0)  # rounding may exceed 1
+
+
+def ranked(row: Sequence[Hypothesis], rank: int) -> Hypothesis:
+    """The hypothesis of a rank, from 0, or the last of a row that has fewer."""
+    return row[min(rank, len(row) - 1)]
 
 
 def ranks(hypotheses: Sequence[Sequence[str]], references: References, marks: bool = False) -> dict[str, float]:
     """BLEU of the first, second, ... fifth hypothesis of every motion, as "1" to "5" (a row of table 2).
 
-    A motion with fewer hypotheses takes part with its last one.
+    A motion with fewer hypotheses counts with its last one.
     """
-    return {
-        str(rank + 1): bleu([row[min(rank, len(row) - 1)] for row in hypotheses], references, marks)
-        for rank in range(RANKS)
-    }
+    scores = {}
+    for rank in range(RANKS):
+        texts = [ranked(row, rank) for row in hypotheses]
+        scores[str(rank + 1)] = bleu(texts, references, marks)
+    return scores
 
 
 def agreement(references: References) -> float:
-    """What people reach: each motion's first, second, ... sentence against its others; the mean of these BLEU.
+    """The score of people: BLEU of each motion's first, second, ... sentence against its others, averaged.
 
-    Motions with a single sentence are left out; NaN if there is no other. One with fewer sentences than the
-    most talked about takes part with as many as it has.
+    Motions with a single sentence are left out; NaN without any other. A motion with fewer sentences than the maximum
+    counts only for the sentences it has.
     """
-    several = [said for said in references if len(said) > 1]
+    several = [sentences for sentences in references if len(sentences) > 1]
     if not several:
         return np.nan
-    values, counts = [], []
+    scores = []
+    weights = []
     for place in range(max(map(len, several))):
-        rows = [said for said in several if len(said) > place]
-        values.append(bleu([said[place] for said in rows], [[*said[:place], *said[place + 1 :]] for said in rows]))
-        counts.append(len(rows))
-    return float(np.average(values, weights=counts))
+        rows = [sentences for sentences in several if len(sentences) > place]
+        hypotheses = [sentences[place] for sentences in rows]
+        others = [[*sentences[:place], *sentences[place + 1 :]] for sentences in rows]
+        scores.append(bleu(hypotheses, others))
+        weights.append(len(rows))
+    return float(np.average(scores, weights=weights))
 
 
 def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
-    """For each motion the training record that looks most like it."""
-    train, looks = corpus.described(corpus.parts.train), Looks(corpus)
-    found = pairwise_distances_argmin(looks.features(motions), looks.features(corpus.motions(train)))
-    return [train[i] for i in found]
+    """For each motion the training record that looks most similar."""
+    train = corpus.described(corpus.parts.train)
+    looks = Looks(corpus)
+    features = looks.features(motions)
+    train_features = looks.features(corpus.motions(train))
+    nearest_rows = pairwise_distances_argmin(features, train_features)
+    return [train[row] for row in nearest_rows]
 
 
-def copied_bleu(said: References, references: References, longest: int = 4) -> float:
-    """BLEU of repeating what was said about other motions: the mean over their sentences."""
-    copies = ([sentences[place % len(sentences)] for sentences in said] for place in range(max(map(len, said))))
-    return float(np.mean([bleu(copy, references, longest=longest) for copy in copies]))
+def copied_bleu(copied: References, references: References, longest: int = 4) -> float:
+    """BLEU of repeating sentences about other motions, one list for each motion: the mean over their sentences."""
+    scores = []
+    for place in range(max(map(len, copied))):
+        hypotheses = [sentences[place % len(sentences)] for sentences in copied]
+        scores.append(bleu(hypotheses, references, longest=longest))
+    return float(np.mean(scores))
 
 
 def frequent_sentence(corpus: SplitStore) -> str:
-    """The most frequent sentence about training motions, of several the first by name."""
-    counts = Counter(sentence for said in corpus.references(corpus.parts.train) for sentence in said)
+    """The most frequent sentence about training motions, the first in alphabetical order of several."""
+    counts: Counter[str] = Counter()
+    for sentences in corpus.references(corpus.parts.train):
+        counts.update(sentences)
     return min(counts, key=lambda sentence: (-counts[sentence], sentence))
 
 
 def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
     """For each sentence the training record with the most similar sentence.
 
-    Alike by the cosine of their words, weighted by TF-IDF: the safe choice of applications.
+    Similarity is the cosine between TF-IDF vectors of their words, the standard baseline.
     """
-    known = [(record, said) for record in corpus.parts.train for said in corpus.sentences(record)]
+    records = []
+    train_sentences = []
+    for record in corpus.parts.train:
+        for sentence in corpus.sentences(record):
+            records.append(record)
+            train_sentences.append(sentence)
     vectors = TfidfVectorizer(token_pattern=r"\S+")
-    table = vectors.fit_transform([said for _, said in known])
-    alike = (vectors.transform(sentences) @ table.T).toarray()
-    return [known[i][0] for i in alike.argmax(axis=1)]
+    table = vectors.fit_transform(train_sentences)
+    similarities = (vectors.transform(sentences) @ table.T).toarray()
+    return [records[row] for row in similarities.argmax(axis=1)]
 
 
 def describe_report(model: DescribeModel, corpus: SplitStore) -> Report:
-    """Table 2, with and without SOS and EOS; floors and ceiling; what the best description of test motions gets right.
+    """Table 2, with and without SOS and EOS; floors and ceiling; how often the best descriptions are right.
 
-    "confidence" and "timeline" are of validation motions, as the constants behind them were chosen on these.
-    "bleu_unseen" is of those references alone that nobody said, word for word, about a training motion: where people
-    describe from a pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out.
-    Since a phrase of four words either stands there or does not, "unseen" has BLEU-1 to BLEU-4 of the best description
-    by the same references, and beside it that of copying what was said about the nearest training motion.
-    Training BLEU is of 200 motions, always the same. A figure that does not exist is NaN.
+    "confidence" and "timeline" use validation motions, since their constants were chosen on these. "bleu_unseen" uses
+    only references that do not occur, word for word, among those of training motions: where people describe from a
+    pool of phrases, BLEU rewards knowing the pool. Motions without such a reference are left out. "unseen" has BLEU-1
+    to BLEU-4 of the best description for the same references, since a four-word phrase is all or nothing, and next to
+    them the scores of copying the sentences of the nearest training motion. Training BLEU uses 200 motions, always the
+    same. Undefined figures are NaN.
     """
     return corpus.origin(model.manifest) | gathered(_described(model, corpus), model.manifest.name)
 
 
 def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
-    test, found = corpus.described(corpus.parts.test), dict[str, list[list[str]]]()
-    for part, records in (("train", corpus.described(corpus.parts.train, 200)), ("test", test)):
-        found[part] = [[one.text for one in row] for row in model.describe(corpus.motions(records), RANKS)]
-        said = corpus.references(records)
-        yield {f"bleu_{part}": ranks(found[part], said), f"bleu_{part}_marked": ranks(found[part], said, marks=True)}
+    train = corpus.described(corpus.parts.train, 200)
+    test = corpus.described(corpus.parts.test)
+    train_scores, _ = _table_2(model, corpus, "train", train)
+    yield train_scores
+    test_scores, hypotheses = _table_2(model, corpus, "test", test)
+    yield test_scores
+
     references = corpus.references(test)
     copied = corpus.references(nearest_motions(corpus, corpus.motions(test)))
-    yield _unseen(found["test"], copied, references, corpus.unseen(test))
-    best = [row[0] for row in found["test"]]
+    yield _unseen(hypotheses, copied, references, corpus.unseen(test))
+
+    best = [row[0] for row in hypotheses]
     floors = {
         "nearest": copied_bleu(copied, references),
         "frequent": bleu([frequent_sentence(corpus)] * len(references), references),
         "human": agreement(references),
     }
-    own = bleu(best, references)
-    yield {"floor": floors, "gain": {key: own - floors[key] for key in ("nearest", "frequent")}}
+    score = bleu(best, references)
+    yield {"floor": floors, "gain": {key: score - floors[key] for key in ("nearest", "frequent")}}
     yield {"words": words_right(best, references), "likelihood": {"test": _log_probability(model, corpus, test)}}
-    if validation := [record for record in corpus.parts.validation if corpus.sentences(record)]:
+
+    validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
+    if validation:
         yield {"confidence": confidence(model, corpus, validation)}
         yield {"timeline": timeline_figures(model, corpus, validation)}
 
 
+def _table_2(
+    model: DescribeModel, corpus: SplitStore, part: str, records: Sequence[int]
+) -> tuple[Report, list[list[str]]]:
+    """The rows of table 2 for a part of the data, and the hypotheses of each of its motions."""
+    hypotheses = []
+    for row in model.describe(corpus.motions(records), RANKS):
+        hypotheses.append([description.text for description in row])
+    references = corpus.references(records)
+    scores = {
+        f"bleu_{part}": ranks(hypotheses, references),
+        f"bleu_{part}_marked": ranks(hypotheses, references, marks=True),
+    }
+    return scores, hypotheses
+
+
 def _unseen(hypotheses: list[list[str]], copied: References, references: References, unseen: References) -> Report:
-    """BLEU on references that stand in no training sentence, and how many do; beside the floor."""
-    kept = [i for i, said in enumerate(unseen) if said]
+    """BLEU on references that occur in no training sentence, their number, and the floor."""
+    motions = [i for i, sentences in enumerate(unseen) if sentences]
     sentences = sum(map(len, references))
-    counts = {
+    wording = {
         "test_sentences": float(sentences),
         "test_sentences_seen": 1 - sum(map(len, unseen)) / sentences,
-        "test_motions_unseen": float(len(kept)),
+        "test_motions_unseen": float(len(motions)),
     }
-    if not kept:
-        return {"wording": counts, "bleu_unseen": dict.fromkeys(map(str, range(1, RANKS + 1)), np.nan)}
-    rows, said, asked = ([row[i] for i in kept] for row in (hypotheses, copied, unseen))
-    by_length = {f"bleu_{n}": bleu([row[0] for row in rows], asked, longest=n) for n in (1, 2, 3, 4)}
-    floor = {f"nearest_{n}": copied_bleu(said, asked, n) for n in (1, 2, 3, 4)}
-    return {"wording": counts, "bleu_unseen": ranks(rows, asked), "unseen": by_length | floor}
+    if not motions:
+        ranks_without = {str(rank + 1): np.nan for rank in range(RANKS)}
+        return {"wording": wording, "bleu_unseen": ranks_without}
+
+    unseen_references = [unseen[i] for i in motions]
+    rows = [hypotheses[i] for i in motions]
+    best = [row[0] for row in rows]
+    nearest = [copied[i] for i in motions]
+    scores = {f"bleu_{n}": bleu(best, unseen_references, longest=n) for n in ORDERS}
+    floors = {f"nearest_{n}": copied_bleu(nearest, unseen_references, n) for n in ORDERS}
+    return {"wording": wording, "bleu_unseen": ranks(rows, unseen_references), "unseen": scores | floors}
 
 
 def _log_probability(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> float:
-    """Log-probability of a word of the records' sentences given their motions, EOS included."""
-    total, count = 0.0, 0
+    """The mean log-probability of a word, EOS included, in the records' sentences given their motions."""
+    total = 0.0
+    count = 0
     with unknown_words_allowed():
         for record in records:
             motion = corpus.motion(record)
             for sentence in corpus.sentences(record):
                 try:
                     total += model.score(motion, sentence)
-                except TextError:  # of unknown words only
+                except TextError:  # all its words are unknown
                     continue
                 count += len(RULES.words(sentence)) + 1
     return total / count if count else np.nan

@@ -1,5 +1,5 @@
-"""All figures of a generate model in one nested object with stable keys: the chain from a sentence to a motion and back
-(Plappert et al. 2017, section 5.4.3, tables 3 and 4), and whether motions do what was asked: walk, run, turn, jump."""
+"""All figures of a generate model as one report: the chain from a sentence to a motion and back (Plappert et al. 2017,
+section 5.4.3, tables 3 and 4), and whether motions do what the sentence says: walk, run, turn, jump."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from motet.models.generate import Generated, GenerateModel
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.evaluate.language.attributes import common_side, common_turning, common_verbs
-from motet_train.evaluate.language.describe import RANKS, bleu, ranks, retrieved
+from motet_train.evaluate.language.describe import RANKS, bleu, ranked, ranks, retrieved
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report, gathered
@@ -30,37 +30,43 @@ LANGUAGE_GOALS: Goals = {
     "asked.jumps": (0.9, None),
     "motion.frozen": (None, 0.1),
 }
-"""Figure -> (least, most) that the default recipes of describe and generate are to reach."""
+"""Figure -> (least, most): the goals of the default recipes of describe and generate."""
 
 
 def generate_report(model: GenerateModel, corpus: SplitStore, describe: DescribeModel | None = None) -> Report:
-    """Tables 3 and 4 between their bounds; prompts; measures of generated motions beside the data's.
+    """Tables 3 and 4 with their bounds; prompts; measures of generated and of recorded motions.
 
-    "motion" is measured on the likeliest motion for each test sentence, "motion_data" on the motions they are about.
+    "motion" measures the most likely motion for each test sentence, "motion_data" the motions that these describe.
 
     describe: the model that closes the chain, trained on the same part of the corpus; without it the tables are left
-        out. Relative performance is chained BLEU over its first training BLEU, as in the paper (there .387).
+        out. Relative performance is chained BLEU divided by its first training BLEU, as in the paper (there .387).
     """
     return corpus.origin(model.manifest) | gathered(_generated(model, corpus, describe), model.manifest.name)
 
 
 def _generated(model: GenerateModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
-    test, train = corpus.described(corpus.parts.test), corpus.described(corpus.parts.train, 40)
-    found = answers(model, corpus, test)
+    test = corpus.described(corpus.parts.test)
+    train = corpus.described(corpus.parts.train, 40)
+    test_answers = answers(model, corpus, test)
     if describe is not None:
-        yield _chain(describe, corpus, {"train": answers(model, corpus, train), "test": found})
-    known = kinds(corpus)
-    limits, quiet = thresholds(known), quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
+        yield _chain(describe, corpus, {"train": answers(model, corpus, train), "test": test_answers})
+
+    travels = kinds(corpus)
+    limits = thresholds(travels)
+    quiet = quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
     yield {"threshold": {"quiet": quiet, **limits}}
     if measurable(limits):
-        yield {"asked": prompted(model, limits), "asked_data": recognised(known, limits)}
-    motions = {"motion": [row[0].features for row in found.rows], "motion_data": corpus.motions(found.records)}
-    yield {key: measures(shown, corpus.contract, quiet) for key, shown in motions.items()}
+        yield {"asked": prompted(model, limits), "asked_data": recognised(travels, limits)}
+
+    generated = [row[0].features for row in test_answers.rows]
+    recorded = corpus.motions(test_answers.records)
+    yield {"motion": measures(generated, corpus.contract, quiet)}
+    yield {"motion_data": measures(recorded, corpus.contract, quiet)}
     yield {"likelihood": {"train": _likelihood(model, corpus, train), "test": _likelihood(model, corpus, test)}}
 
 
 class Answers(NamedTuple):
-    """Motions for sentences. records: for each sentence the one it describes. rows: ranked motions."""
+    """Motions for sentences. records: the record that each sentence describes. rows: ranked motions."""
 
     records: Sequence[int]
     sentences: Sequence[str]
@@ -68,20 +74,26 @@ class Answers(NamedTuple):
 
 
 def answers(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> Answers:
-    """Ranked motions for every sentence of the records; one of which the model knows no word is left out.
+    """Ranked motions for every sentence of the records, except those without a word that the model knows.
 
-    As many hypotheses as the model keeps by default, as users get them; from one that keeps less than five the last
-    stands for those that lack.
+    The number of hypotheses is the model's default, as for users; where it is below five, the last one stands for the
+    missing ones.
     """
-    asked = known_sentences(model, corpus, records)
+    known = known_sentences(model, corpus, records)
+    sentences = [sentence for _, sentence in known]
     with unknown_words_allowed():
-        rows = model.generate([sentence for _, sentence in asked])
-    return Answers([record for record, _ in asked], [sentence for _, sentence in asked], rows)
+        rows = model.generate(sentences)
+    return Answers([record for record, _ in known], sentences, rows)
 
 
 def known_sentences(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> list[tuple[int, str]]:
-    """Every record with every sentence of it that the model can take."""
-    return [(record, said) for record in records for said in corpus.sentences(record) if knows(model, said)]
+    """Every record with each of its sentences that the model accepts."""
+    known = []
+    for record in records:
+        for sentence in corpus.sentences(record):
+            if knows(model, sentence):
+                known.append((record, sentence))
+    return known
 
 
 def knows(model: GenerateModel, sentence: str, every_word: bool = False) -> bool:
@@ -92,56 +104,63 @@ def knows(model: GenerateModel, sentence: str, every_word: bool = False) -> bool
         return False
 
 
-def chained(describe: DescribeModel, found: Answers, corpus: SplitStore) -> dict[str, float]:
+def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> dict[str, float]:
     """A row of table 3: BLEU of the descriptions of the first to the fifth motion, "1" to "5".
 
-    One entry for each sentence that a motion was made for; references are all that was said about its record.
+    Each sentence with a generated motion counts once; its references are all sentences of its record.
     """
-    texts = [
-        best_descriptions(describe, [row[min(rank, len(row) - 1)].features for row in found.rows])
-        for rank in range(RANKS)
-    ]
-    return ranks(list(zip(*texts, strict=True)), corpus.references(found.records))
+    texts = []
+    for rank in range(RANKS):
+        motions = [ranked(row, rank).features for row in answers.rows]
+        texts.append(best_descriptions(describe, motions))
+    return ranks(list(zip(*texts, strict=True)), corpus.references(answers.records))
 
 
-def bounds_chained(describe: DescribeModel, found: Answers, corpus: SplitStore) -> dict[str, float]:
-    """The same with motions that are not generated.
+def bounds_chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> dict[str, float]:
+    """The same for recorded motions.
 
-    retrieval: the training motion about which the most alike sentence was said, the floor. data: the very motion that
-    the sentence is about, what a perfect model would get.
+    retrieval: the training motion with the most similar sentence, the floor. data: the motion that the sentence
+    describes, the score of a perfect model.
     """
-    records = {"retrieval": retrieved(corpus, found.sentences), "data": found.records}
-    texts = {key: best_descriptions(describe, corpus.motions(chosen)) for key, chosen in records.items()}
-    return {key: bleu(row, corpus.references(found.records)) for key, row in texts.items()}
+    references = corpus.references(answers.records)
+    scores = {}
+    for key, records in {"retrieval": retrieved(corpus, answers.sentences), "data": answers.records}.items():
+        scores[key] = bleu(best_descriptions(describe, corpus.motions(records)), references)
+    return scores
 
 
 def best_descriptions(describe: DescribeModel, motions: Sequence[Motion]) -> list[str]:
-    """The best description of each motion; nothing for one that is too short to be described."""
+    """The best description of each motion; empty for a motion that is too short to be described."""
     usable = [i for i, motion in enumerate(motions) if round(motion.duration * describe.fps) >= 2]
     rows = describe.describe([motions[i] for i in usable]) if usable else []
-    texts = {i: row[0].text for i, row in zip(usable, rows, strict=True)}
-    return [texts.get(i, "") for i in range(len(motions))]
+    texts = [""] * len(motions)
+    for i, row in zip(usable, rows, strict=True):
+        texts[i] = row[0].text
+    return texts
 
 
-def _chain(describe: DescribeModel, corpus: SplitStore, found: Mapping[str, Answers]) -> Report:
+def _chain(describe: DescribeModel, corpus: SplitStore, answers: Mapping[str, Answers]) -> Report:
     train = corpus.described(corpus.parts.train, 200)
-    base = bleu(best_descriptions(describe, corpus.motions(train)), corpus.references(train))
-    rows = {part: chained(describe, own, corpus) for part, own in found.items()}
-    bounds = bounds_chained(describe, found["test"], corpus)
+    train_bleu = bleu(best_descriptions(describe, corpus.motions(train)), corpus.references(train))
+    rows = {part: chained(describe, part_answers, corpus) for part, part_answers in answers.items()}
+    bounds = bounds_chained(describe, answers["test"], corpus)
 
-    def relative(row: Mapping[str, float], ending: str = "") -> dict[str, float]:
-        return {f"{key}{ending}": value / base if base else np.nan for key, value in row.items()}
+    report: Report = {f"chain_{part}": row for part, row in rows.items()}
+    for part, row in rows.items():
+        report[f"relative_{part}"] = {rank: _relative(score, train_bleu) for rank, score in row.items()}
+    relative_bounds = {f"{key}_relative": _relative(score, train_bleu) for key, score in bounds.items()}
+    report["bound"] = {"describe_train": train_bleu, **bounds, **relative_bounds}
+    return report
 
-    return {
-        **{f"chain_{part}": row for part, row in rows.items()},
-        **{f"relative_{part}": relative(row) for part, row in rows.items()},
-        "bound": {"describe_train": base, **bounds, **relative(bounds, "_relative")},
-    }
+
+def _relative(score: float, train_bleu: float) -> float:
+    return score / train_bleu if train_bleu else np.nan
 
 
 def _likelihood(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> float:
-    """Log-likelihood of a frame of the records' motions given each of their sentences, the ending frame included."""
-    total, frames = 0.0, 0
+    """The mean log-likelihood of a frame, the ending frame included, of the records' motions given their sentences."""
+    total = 0.0
+    frames = 0
     with unknown_words_allowed():
         for record, sentence in known_sentences(model, corpus, records):
             motion = corpus.motion(record)
@@ -153,8 +172,8 @@ def _likelihood(model: GenerateModel, corpus: SplitStore, records: Sequence[int]
 class Travel(NamedTuple):
     """How a motion moves over the ground.
 
-    speed: the median forward, m/s, which a stop does not change. turn: the sum to the left, degrees. rise: the highest
-    above the median height of the root, m.
+    speed: the median forward speed, m/s, robust against a stop. turn: the total turn to the left, degrees. rise: the
+    highest root height above the median, m.
     """
 
     speed: float
@@ -163,96 +182,135 @@ class Travel(NamedTuple):
 
 
 Thresholds = Mapping[str, float]
-"""What counts as what, see :func:`thresholds`."""
+"""Limits between kinds of motions, see :func:`thresholds`."""
 
 
-class Asked(NamedTuple):
-    """A sentence, whether a motion is what it says, and the thresholds that this takes."""
+class KindPrompt(NamedTuple):
+    """A sentence, the test of its motions, and the thresholds that the test needs."""
 
     sentence: str
-    is_so: Callable[[Travel, Thresholds], bool]
+    passes: Callable[[Travel, Thresholds], bool]
     needs: tuple[str, ...]
 
 
-ASKED: Mapping[str, Asked] = {
-    "walks": Asked("a person walks", lambda travel, than: than["slow"] <= travel.speed < than["run"], ("slow", "run")),
-    "runs": Asked("a person runs", lambda travel, than: travel.speed >= than["run"], ("run",)),
-    "left": Asked("a person walks and turns left", lambda travel, than: travel.turn >= than["turn"], ("turn",)),
-    "right": Asked("a person walks and turns right", lambda travel, than: travel.turn <= -than["turn"], ("turn",)),
-    "jumps": Asked("a person jumps", lambda travel, than: travel.rise >= than["rise"], ("rise",)),
+ASKED: Mapping[str, KindPrompt] = {
+    "walks": KindPrompt(
+        "a person walks",
+        lambda travel, limits: limits["slow"] <= travel.speed < limits["run"],
+        ("slow", "run"),
+    ),
+    "runs": KindPrompt(
+        "a person runs",
+        lambda travel, limits: travel.speed >= limits["run"],
+        ("run",),
+    ),
+    "left": KindPrompt(
+        "a person walks and turns left",
+        lambda travel, limits: travel.turn >= limits["turn"],
+        ("turn",),
+    ),
+    "right": KindPrompt(
+        "a person walks and turns right",
+        lambda travel, limits: travel.turn <= -limits["turn"],
+        ("turn",),
+    ),
+    "jumps": KindPrompt(
+        "a person jumps",
+        lambda travel, limits: travel.rise >= limits["rise"],
+        ("rise",),
+    ),
 }
 
 
 def travel(motion: Motion) -> Travel:
-    """How a motion with the root block moves; what its first frame says of velocities repeats the second."""
+    """How a motion with the root block moves; the velocities of its first frame repeat the second and do not count."""
     block = motion.select(ROOT_BLOCK, ROOT_BLOCK_UNITS).values
-    steps, height = block[1:], block[:, 3]
-    forward = float(np.median(steps[:, 0])) if len(steps) else 0.0
-    return Travel(forward, float(steps[:, 2].sum() / motion.fps), float(height.max() - np.median(height)))
+    steps = block[1:]
+    height = block[:, 3]
+    speed = float(np.median(steps[:, 0])) if len(steps) else 0.0
+    turn = float(steps[:, 2].sum() / motion.fps)
+    rise = float(height.max() - np.median(height))
+    return Travel(speed, turn, rise)
 
 
 def kinds(corpus: SplitStore) -> dict[str, list[Travel]]:
-    """How the training motions move that people say walk, run, jump, go straight, turn left, turn right.
+    """How training motions move that people describe as walk, run, jump, straight, turning left or turning right.
 
-    Empty without a root block. A motion that does two of walking, running and jumping is none of them.
+    Empty lists without a root block. A motion with two of walking, running and jumping counts as none of them.
     """
-    found: dict[str, list[Travel]] = {key: [] for key in (*ASKED, "straight")}
+    travels: dict[str, list[Travel]] = {key: [] for key in (*ASKED, "straight")}
     if not set(ROOT_BLOCK) <= set(corpus.store.channels):
-        return found
+        return travels
     for record in corpus.described(corpus.parts.train):
         sentences = corpus.sentences(record)
-        verbs, turning, side = common_verbs(sentences), common_turning(sentences), common_side(sentences)
-        own = [f"{verb}s" for verb in verbs if len(verbs) == 1]
+        verbs = common_verbs(sentences)
+        turning = common_turning(sentences)
+        side = common_side(sentences)
+        record_kinds = [f"{verb}s" for verb in verbs] if len(verbs) == 1 else []
         if turning is False:
-            own.append("straight")
+            record_kinds.append("straight")
         elif turning and side:
-            own.append(side)
-        for kind in own:
-            found[kind].append(travel(corpus.motion(record)))
-    return found
+            record_kinds.append(side)
+        for kind in record_kinds:
+            travels[kind].append(travel(corpus.motion(record)))
+    return travels
 
 
-def thresholds(found: Mapping[str, Sequence[Travel]]) -> dict[str, float]:
-    """The thresholds between :func:`kinds`, but for those without training motions of a kind.
+def thresholds(travels: Mapping[str, Sequence[Travel]]) -> dict[str, float]:
+    """The thresholds between :func:`kinds`, except those between kinds without training motions.
 
-    slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, between the median speeds of walks
-    and of runs. turn: degrees, between the median turns of straight and of turning ones. rise: m, between the median
-    rises of walks and of jumps.
+    slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, half-way between the median speeds of
+    walks and of runs. turn: degrees, half-way between the median turns of straight and of turning motions. rise: m,
+    half-way between the median rises of walks and of jumps.
     """
-    walks, runs, jumps = (found[key] for key in ("walks", "runs", "jumps"))
-    limits = {"slow": np.percentile([t.speed for t in walks], 10) / 2 if walks else np.nan}
-    samples = {
-        "run": ([t.speed for t in walks], [t.speed for t in runs]),
-        "turn": ([abs(t.turn) for t in found["straight"]], [abs(t.turn) for t in (*found["left"], *found["right"])]),
-        "rise": ([t.rise for t in walks], [t.rise for t in jumps]),
+    walks = travels["walks"]
+    walk_speeds = [walk.speed for walk in walks]
+    run_speeds = [run.speed for run in travels["runs"]]
+    straight_turns = [abs(straight.turn) for straight in travels["straight"]]
+    turns = [abs(turn.turn) for turn in (*travels["left"], *travels["right"])]
+    walk_rises = [walk.rise for walk in walks]
+    jump_rises = [jump.rise for jump in travels["jumps"]]
+    limits = {
+        "slow": float(np.percentile(walk_speeds, 10) / 2) if walks else np.nan,
+        "run": _half_way(walk_speeds, run_speeds),
+        "turn": _half_way(straight_turns, turns),
+        "rise": _half_way(walk_rises, jump_rises),
     }
-    limits |= {key: np.mean([np.median(one) for one in pair]) for key, pair in samples.items() if all(pair)}
-    return {key: float(limit) for key, limit in limits.items() if np.isfinite(limit)}
+    return {key: limit for key, limit in limits.items() if np.isfinite(limit)}
 
 
-def measurable(limits: Thresholds) -> dict[str, Asked]:
-    """Those of ASKED whose thresholds exist."""
-    return {key: asked for key, asked in ASKED.items() if all(name in limits for name in asked.needs)}
+def _half_way(lower: list[float], upper: list[float]) -> float:
+    """The value half-way between two medians; NaN if there is nothing on one side."""
+    if not lower or not upper:
+        return np.nan
+    return float(np.mean([np.median(lower), np.median(upper)]))
 
 
-def recognised(found: Mapping[str, Sequence[Travel]], limits: Thresholds) -> dict[str, float]:
-    """What a model can reach: for each measurable one of ASKED the share of the training motions of that kind that
-    count as such; NaN where there are none."""
-    return {
-        key: float(np.mean([asked.is_so(t, limits) for t in found[key]])) if found[key] else np.nan
-        for key, asked in measurable(limits).items()
-    }
+def measurable(limits: Thresholds) -> dict[str, KindPrompt]:
+    """The entries of ASKED whose thresholds exist."""
+    return {key: prompt for key, prompt in ASKED.items() if set(prompt.needs) <= set(limits)}
+
+
+def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> dict[str, float]:
+    """The ceiling of a model: for each measurable entry of ASKED the share of the training motions of that kind that
+    pass its test; NaN without such motions."""
+    shares = {}
+    for key, prompt in measurable(limits).items():
+        passed = [prompt.passes(recorded, limits) for recorded in travels[key]]
+        shares[key] = float(np.mean(passed)) if passed else np.nan
+    return shares
 
 
 def prompted(model: GenerateModel, limits: Thresholds, seeds: int = 10) -> dict[str, float]:
-    """For each measurable one of ASKED the share of seeds whose likeliest motion is what the sentence says.
+    """For each measurable entry of ASKED the share of seeds whose most likely motion passes its test.
 
-    A sentence of which the model knows no word counts as failed.
+    A sentence without a word that the model knows counts as failed.
     """
     shares = {}
-    for key, asked in measurable(limits).items():
-        known = knows(model, asked.sentence)
+    for key, prompt in measurable(limits).items():
+        known = knows(model, prompt.sentence)
         with unknown_words_allowed():
-            rows = model.generate([asked.sentence] * seeds, seed=range(seeds)) if known else []
-        shares[key] = sum(asked.is_so(travel(row[0].features), limits) for row in rows) / seeds
+            rows = model.generate([prompt.sentence] * seeds, seed=range(seeds)) if known else []
+        passed = [prompt.passes(travel(row[0].features), limits) for row in rows]
+        shares[key] = sum(passed) / seeds
     return shares

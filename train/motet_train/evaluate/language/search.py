@@ -1,4 +1,4 @@
-"""How well a model finds: motions by sentences that no training saw, and motions by motions."""
+"""How well a search model finds motions by sentences that were not in training, and by motions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -9,7 +9,9 @@ from scipy.spatial.distance import cdist
 
 from motet.models.describe import DescribeModel
 from motet.models.language import RULES
-from motet.models.search import Index, IndexSettings, Member, SearchModel
+from motet.models.search import Hit, Index, IndexSettings, Member, SearchModel
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet_train.data.sentences import alike
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
@@ -22,120 +24,184 @@ Numbers = NDArray[np.int64]
 
 
 def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None = None) -> Report:
-    """Ranks of test motions, asked for by sentences, and nearest training motions of test motions; beside floors.
+    """Ranks of test motions for sentences, and nearest training motions of test motions, with floors.
 
-    "asked": how many sentences there are, the share of them that are about what a training motion shows ("known"), and
-    the "first_5" of "text" for who knows what is said and no more ("best_5").
-    "text": the sentences of test motions whose wordings no training saw ask for their own among all test motions:
-    shares that are among the first, and the median rank. "text_alike": any motion counts of which the same was said.
-    "words_": the floor of them: the training motion with the most similar sentence (TF-IDF), and the test motions that
-    are nearest to it. "like": :func:`_likeness`. "likelihood_": by a describe model of the same split,
-    where one is given. "motion": the share of test motions whose nearest training motion is one of which the same was
-    said, of those ("of") that have any.
+    "asked": the number of sentences, the share of them whose subject a training motion shows ("known"), and the
+    "first_5" of "text" for a searcher that understands sentences perfectly ("best_5").
+    "text": the sentences of test motions whose wordings are not in training search for their own motion among all test
+    motions: the shares that are among the first, and the median rank. "text_alike": any motion with an equal
+    description counts. "words_": their floor, the training motion with the most similar sentence (TF-IDF), and the test
+    motions that are nearest to it. "likelihood_": the same by a describe model of the same split, if there is one.
+    "like": see :func:`_likeness`. "motion": the share of test motions whose nearest training motion has an equal
+    description, among those ("of") for which there is one.
     """
-    return corpus.origin(model.manifest) | gathered(_found(model, corpus, describe), model.manifest.name)
+    return corpus.origin(model.manifest) | gathered(_search_parts(model, corpus, describe), model.manifest.name)
 
 
-def _found(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
-    entries, parts, looks = corpus.store.records, corpus.parts, Looks(corpus)
-    rows, sentences = _asked(corpus, parts.test)
-    said = np.array(alike([[*map(RULES.normalise, (*entry.sentences, *entry.unseen))] for entry in entries]))
-    test, train = said[list(parts.test)], said[list(parts.train)]  # numbers of what was said of each
-    takes = np.array([entries[record].take or entries[record].name for record in parts.test])
+def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
+    parts = corpus.parts
+    rows, sentences = _queries(corpus, parts.test)
+    groups = _description_groups(corpus)
+    test_groups = groups[list(parts.test)]
+    train_groups = groups[list(parts.train)]
+    takes = _takes(corpus, parts.test)
 
-    def ranked(name: str, order: NDArray[np.intp]) -> Report:
-        """Of own motions and of those alike; order: for each sentence (Q, N) the test motions, best first."""
+    def ranked(prefix: str, order: NDArray[np.intp]) -> Report:
+        """Ranks of each sentence's motion and of those described alike. order: (Q, N) test motions, best first."""
         return {
-            f"{name}text": _ranks(takes[order] == takes[rows][:, None]),
-            f"{name}text_alike": _ranks(test[order] == test[rows][:, None]),
+            f"{prefix}text": _ranks(takes[order] == takes[rows][:, None]),
+            f"{prefix}text_alike": _ranks(test_groups[order] == test_groups[rows][:, None]),
         }
 
-    best = np.minimum(1, 5 / (test[rows][:, None] == test).sum(axis=1)).mean()
-    known = np.isin(test[rows], train).mean()
-    yield {"asked": {"sentences": float(len(rows)), "known": float(known), "best_5": float(best)}}
+    yield {"asked": _query_figures(test_groups[rows], test_groups, train_groups)}
+
+    # the model itself
     index = _index(model, corpus, parts.test)
     with unknown_words_allowed():
-        found = [index.search(sentence, len(index.members)) for sentence in sentences]
-    yield ranked("", np.array([[int(hit.path.name) for hit in hits] for hits in found]))
-    asked, seen, known_looks = (
-        looks.features(corpus.motions(records)) for records in (retrieved(corpus, sentences), parts.test, parts.train)
-    )
-    yield ranked("words_", cdist(asked, seen).argsort(axis=1, kind="stable"))
+        hits = [index.search(sentence, len(index.members)) for sentence in sentences]
+    yield ranked("", np.array([_places(row) for row in hits]))
+
+    # the floor: by words to a training motion, from there by features
+    looks = Looks(corpus)
+    query_features = looks.features(corpus.motions(retrieved(corpus, sentences)))
+    test_features = looks.features(corpus.motions(parts.test))
+    train_features = looks.features(corpus.motions(parts.train))
+    yield ranked("words_", cdist(query_features, test_features).argsort(axis=1, kind="stable"))
+
     if describe is not None:
-        motions = [describe.prepared(motion) for motion in corpus.motions(parts.test)]
-        with unknown_words_allowed():
-            scores = np.array([[describe.score(motion, sentence) for motion in motions] for sentence in sentences])
+        scores = _likelihoods(describe, corpus.motions(parts.test), sentences)
         yield ranked("likelihood_", (-scores).argsort(axis=1, kind="stable"))
+
+    # motions by motions
     index = _index(model, corpus, parts.train)
-    by_model = [int(index.search(motion, 1)[0].path.name) for motion in corpus.motions(parts.test)]
-    by_features = cdist(seen, known_looks).argmin(axis=1)
-    yield {"like": _likeness(model, corpus, said)}
-    yield {"motion": _shares({"alike": train[by_model], "features_alike": train[by_features]}, test, train)}
+    by_model = [_places(index.search(motion, 1))[0] for motion in corpus.motions(parts.test)]
+    by_features = cdist(test_features, train_features).argmin(axis=1)
+    yield {"like": _likeness(model, corpus, groups)}
+    nearest_groups = {"alike": train_groups[by_model], "features_alike": train_groups[by_features]}
+    yield {"motion": _shares(nearest_groups, test_groups, train_groups)}
 
 
-def _likeness(model: SearchModel, corpus: SplitStore, said: Numbers) -> dict[str, float]:
-    """How well a score tells that nothing found is like what was asked for: sentences for motions of their own part,
-    motions for training motions. Each asks twice, the second time where none has the same description.
-
-    "_least": the score that 95 % of the first hits that are right have in the validation part. Of the test part's first
-    hits, with the model's settings: the share of right ones that are like what was asked for ("_kept"), and of wrong
-    ones that are not ("_told").
-    """
-    how, found = model.settings(IndexSettings), dict[str, float]()
-    for kind, least in (("text", how.like_text), ("motion", how.like_motion)):
-        if corpus.parts.validation:
-            score, right = _firsts(model, corpus, corpus.parts.validation, said, kind)
-            found[f"{kind}_least"] = float(np.percentile(score[right], 5)) if right.any() else np.nan
-        score, right = _firsts(model, corpus, corpus.parts.test, said, kind)
-        found[f"{kind}_kept"] = float((score[right] >= least).mean()) if right.any() else np.nan
-        found[f"{kind}_told"] = float((score[~right] < least).mean()) if not right.all() else np.nan
-    return found
+def _description_groups(corpus: SplitStore) -> Numbers:
+    """A number (N,) for each record, equal for records that share a sentence, directly or through others."""
+    descriptions = []
+    for entry in corpus.store.records:
+        descriptions.append([RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
+    return np.array(alike(descriptions))
 
 
-def _firsts(
-    model: SearchModel, corpus: SplitStore, part: Sequence[int], said: Numbers, kind: str
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The scores of the first hits of a part's sentences or motions (Q,), and whether they are right."""
-    held = part if kind == "text" else corpus.parts.train
-    rows, queries = _asked(corpus, part) if kind == "text" else (range(len(part)), corpus.motions(part))
-    index, groups = _index(model, corpus, held), said[list(held)]
+def _takes(corpus: SplitStore, part: Sequence[int]) -> NDArray[np.str_]:
+    """The take of each motion of a part; pieces of one take count as the same motion."""
+    entries = [corpus.store.records[record] for record in part]
+    return np.array([entry.take or entry.name for entry in entries])
+
+
+def _query_figures(query_groups: Numbers, test_groups: Numbers, train_groups: Numbers) -> dict[str, float]:
+    """The number of sentences, the share with a known subject, and the best "first_5"."""
+    motions_alike = (query_groups[:, None] == test_groups).sum(axis=1)
+    return {
+        "sentences": float(len(query_groups)),
+        "known": float(np.isin(query_groups, train_groups).mean()),
+        "best_5": float(np.minimum(1, 5 / motions_alike).mean()),
+    }
+
+
+def _likelihoods(describe: DescribeModel, motions: Sequence[Motion], sentences: Sequence[str]) -> Array:
+    """The log-likelihoods (Q, N) of sentences given motions."""
+    prepared = [describe.prepared(motion) for motion in motions]
+    rows = []
     with unknown_words_allowed():
-        found = [index.search(query, len(index.members)) for query in queries]
-    firsts = []
-    for row, hits in zip(rows, found, strict=True):
-        alike = [bool(groups[int(hit.path.name)] == said[part[row]]) for hit in hits]
-        firsts.append((hits[0].score, alike[0]))
-        firsts += [(hit.score, False) for hit, same in zip(hits, alike, strict=True) if not same][:1]
-    scores, right = zip(*firsts, strict=True)
+        for sentence in sentences:
+            rows.append([describe.score(motion, sentence) for motion in prepared])
+    return np.array(rows)
+
+
+def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> dict[str, float]:
+    """How well a score tells that no hit matches the query: sentences search for motions of their own part, motions for
+    training motions. Each counts twice, the second time without the motions that have an equal description.
+
+    "_least": the score that 95 % of the right first hits reach in the validation part. In the test part, by the model's
+    settings: the share of right first hits that are accepted ("_kept"), and of wrong ones that are rejected ("_told").
+    """
+    settings = model.settings(IndexSettings)
+    figures: dict[str, float] = {}
+    for kind, least in (("text", settings.like_text), ("motion", settings.like_motion)):
+        if corpus.parts.validation:
+            scores, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
+            figures[f"{kind}_least"] = float(np.percentile(scores[right], 5)) if right.any() else np.nan
+        scores, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
+        figures[f"{kind}_kept"] = float((scores[right] >= least).mean()) if right.any() else np.nan
+        figures[f"{kind}_told"] = float((scores[~right] < least).mean()) if not right.all() else np.nan
+    return figures
+
+
+def _first_hits(
+    model: SearchModel, corpus: SplitStore, part: Sequence[int], groups: Numbers, kind: str
+) -> tuple[Array, NDArray[np.bool_]]:
+    """The scores (Q,) of the first hits of a part's sentences or motions, and whether they are right."""
+    rows: Sequence[int]
+    queries: Sequence[str | Motion]
+    if kind == "text":
+        searched = part
+        rows, queries = _queries(corpus, part)
+    else:
+        searched = corpus.parts.train
+        rows = range(len(part))
+        queries = corpus.motions(part)
+    index = _index(model, corpus, searched)
+    searched_groups = groups[list(searched)]
+    with unknown_words_allowed():
+        hits = [index.search(query, len(index.members)) for query in queries]
+
+    scores = []
+    right = []
+    for row, ranked_hits in zip(rows, hits, strict=True):
+        matches = searched_groups[_places(ranked_hits)] == groups[part[row]]
+        scores.append(ranked_hits[0].score)
+        right.append(bool(matches[0]))
+        # the first hit if no motion had an equal description
+        if not matches.all():
+            scores.append(ranked_hits[int(matches.argmin())].score)
+            right.append(False)
     return np.array(scores), np.array(right)
 
 
-def _asked(corpus: SplitStore, part: Sequence[int]) -> tuple[list[int], list[str]]:
-    """The sentences that ask, with a word that a training sentence has, and of which motion of a part each is."""
+def _places(hits: Sequence[Hit]) -> list[int]:
+    """The place in the index of each hit, see :func:`_index`."""
+    return [int(hit.path.name) for hit in hits]
+
+
+def _queries(corpus: SplitStore, part: Sequence[int]) -> tuple[list[int], list[str]]:
+    """The sentences to search by, with at least one word known from training, and the row in a part of each."""
     known = corpus.words(corpus.parts.train)
     kept = [corpus.kept(record) for record in part]
-    said = kept if any(kept) else corpus.unseen(part)
-    rows = [(row, s) for row, own in enumerate(said) for s in own if not known.isdisjoint(s.split())]
-    return [row for row, _ in rows], [sentence for _, sentence in rows]
+    rows = []
+    queries = []
+    for row, sentences in enumerate(kept if any(kept) else corpus.unseen(part)):
+        for sentence in sentences:
+            if not known.isdisjoint(sentence.split()):
+                rows.append(row)
+                queries.append(sentence)
+    return rows, queries
 
 
 def _ranks(right: NDArray[np.bool_]) -> dict[str, float]:
-    """Of which of the found (Q, N) are right, best first: the shares among the first, and the median rank."""
+    """By which hits (Q, N), best first, are right: the shares among the first, and the median rank."""
     ranks = right.argmax(axis=1) + 1
     shares = {f"first_{count}": float((ranks <= count).mean()) for count in (1, 5, 10)}
     return {**shares, "median_rank": float(np.median(ranks))}
 
 
-def _shares(found: Mapping[str, Numbers], test: Numbers, train: Numbers) -> dict[str, float]:
-    """Which of what was found is about what test motions show, of those that a training motion shows."""
+def _shares(nearest: Mapping[str, Numbers], test: Numbers, train: Numbers) -> dict[str, float]:
+    """The share of nearest motions described like the test motion, among those whose description is in training."""
     known = np.isin(test, train)
-    shares = {key: float((own == test)[known].mean()) if known.any() else np.nan for key, own in found.items()}
+    shares = {key: float((groups == test)[known].mean()) if known.any() else np.nan for key, groups in nearest.items()}
     return {**shares, "of": float(known.sum())}
 
 
 def _index(model: SearchModel, corpus: SplitStore, records: Sequence[int]) -> Index:
     """An index of some records, whose paths are their places."""
-    members, vectors = [], []
+    members = []
+    vectors = []
     for place, motion in enumerate(corpus.motions(records)):
         parts = model.windows(motion, model.settings(IndexSettings).window)
         windows = tuple((start, start + part.duration) for start, part in parts)

@@ -1,4 +1,4 @@
-"""A prepared corpus, divided as it was when a model was trained on it."""
+"""A prepared corpus, divided as in the training of a model."""
 
 import warnings
 from collections.abc import Iterable, Iterator
@@ -21,7 +21,7 @@ from motet_train.evaluate.tables import Report
 
 @dataclass(frozen=True, eq=False)
 class SplitStore:
-    """A store and the parts that a model was trained, validated and is tested on."""
+    """A store and its parts for training, validation and test."""
 
     store: Store
     parts: Split
@@ -40,11 +40,11 @@ class SplitStore:
         return [self.motion(record) for record in records]
 
     def sentences(self, record: int) -> tuple[str, ...]:
-        """What was said about a record, normalised: words with one space between them; nothing that has no words."""
+        """The normalised sentences about a record, words separated by one space; those without words are left out."""
         return _plain(self.store.records[record].sentences)
 
     def kept(self, record: int) -> tuple[str, ...]:
-        """The sentences about a record that are kept for measuring, normalised."""
+        """The normalised sentences about a record that are reserved for evaluation."""
         return _plain(self.store.records[record].unseen)
 
     def references(self, records: Iterable[int]) -> list[tuple[str, ...]]:
@@ -52,63 +52,90 @@ class SplitStore:
         return [self.sentences(record) for record in records]
 
     def described(self, records: Iterable[int], most: int | None = None) -> tuple[int, ...]:
-        """The records that have sentences, or ``most`` of them, the same ones every time; DataError if none has."""
-        found = np.array([record for record in records if self.sentences(record)], dtype=np.intp)
-        if not len(found):
+        """The records that have sentences, or the same random ``most`` of them every time; DataError without any."""
+        described = np.array([record for record in records if self.sentences(record)], dtype=np.intp)
+        if not len(described):
             raise DataError("no motion in this part of the data has a sentence")
-        if most is not None and len(found) > most:
-            found = np.sort(np.random.default_rng(0).choice(found, most, replace=False))
-        return tuple(found.tolist())
+        if most is not None and len(described) > most:
+            described = np.sort(np.random.default_rng(0).choice(described, most, replace=False))
+        return tuple(described.tolist())
 
     def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
-        """The sentences of several records that no training saw: those kept for it and the new ones."""
-        known = {sentence for said in self.references(self.parts.train) for sentence in said}
-        said = ((*self.kept(record), *self.sentences(record)) for record in records)
-        return [tuple(sentence for sentence in found if sentence not in known) for found in said]
+        """The sentences of several records that are not in training: the reserved ones and new ones."""
+        known = {sentence for sentences in self.references(self.parts.train) for sentence in sentences}
+        unseen = []
+        for record in records:
+            sentences = (*self.kept(record), *self.sentences(record))
+            unseen.append(tuple(sentence for sentence in sentences if sentence not in known))
+        return unseen
 
     def words(self, records: Iterable[int]) -> set[str]:
-        """The words said about some records."""
-        return {word for said in self.references(records) for sentence in said for word in sentence.split()}
+        """The words of the sentences of some records."""
+        words: set[str] = set()
+        for sentences in self.references(records):
+            for sentence in sentences:
+                words.update(sentence.split())
+        return words
+
+    def people(self, records: Iterable[int]) -> set[str]:
+        """The people that move in some records."""
+        return {self.store.records[record].subject for record in records}
 
     def origin(self, manifest: Manifest) -> Report:
         """How a model was trained, and how many motions and people are in each part of the data."""
-        training, parts = manifest.training, self.parts
-        told = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
-        people = [{self.store.records[i].subject for i in part} for part in (parts.train, parts.test)]
+        training = manifest.training
+        keys = ("seconds", "epochs", "kept_epoch", "loss", "validation", "steps_per_second")
+        parts = self.parts
+        test_people = self.people(parts.test)
         counts = {
             "train": len(parts.train),
             "validation": len(parts.validation),
             "test": len(parts.test),
             "test_unknown_words": len(self.words(parts.test) - self.words(parts.train)),
-            "test_people": len(people[1]),
-            "test_people_unseen": len(people[1] - people[0]),
+            "test_people": len(test_people),
+            "test_people_unseen": len(test_people - self.people(parts.train)),
         }
         return {
-            "train": {key: float(training[key]) for key in told if key in training},
+            "train": {key: float(training[key]) for key in keys if key in training},
             "data": {key: float(count) for key, count in counts.items()},
         }
 
 
 def split_as(manifest: Manifest, store: Store) -> SplitStore:
-    """The store divided as the manifest of a run or bundle says; DataError where it is not what it was trained on."""
+    """The store divided as the manifest of a run or bundle says; DataError if it was not trained on this store."""
     try:
-        told = manifest.training["split"]
-        validation, test, count = set(told["validation"]), set(told["test"]), int(told["train"])
+        split = manifest.training["split"]
+        validation_names = set(split["validation"])
+        test_names = set(split["test"])
+        train_count = int(split["train"])
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
-    names = [entry.name for entry in store.records]
-    train = tuple(i for i, name in enumerate(names) if name not in validation | test)
-    if (validation | test) - set(names) or len(train) != count or len(names) != count + len(validation) + len(test):
+
+    held_out = validation_names | test_names
+    train = []
+    validation = []
+    test = []
+    for record, entry in enumerate(store.records):
+        if entry.name in validation_names:
+            validation.append(record)
+        if entry.name in test_names:
+            test.append(record)
+        if entry.name not in held_out:
+            train.append(record)
+
+    names = {entry.name for entry in store.records}
+    all_present = held_out <= names
+    count = train_count + len(validation_names) + len(test_names)
+    if not all_present or len(train) != train_count or len(store.records) != count:
         raise DataError(
-            f"{manifest.name} was not trained on this data: its {count} training, {len(validation)} validation "
-            f"and {len(test)} test motions are not the {len(names)} that are here"
+            f"{manifest.name} was not trained on this data: its {train_count} training, {len(validation_names)} "
+            f"validation and {len(test_names)} test motions are not the {len(store.records)} that are here"
         )
-    parts = (tuple(i for i, name in enumerate(names) if name in part) for part in (validation, test))
-    return SplitStore(store, Split(train, *parts))
+    return SplitStore(store, Split(tuple(train), tuple(validation), tuple(test)))
 
 
 def plain(sentence: str) -> str:
-    """A sentence as BLEU sees it: normalised, every digit a word."""
+    """A sentence in the form that BLEU compares: normalised, every digit a word."""
     return " ".join(RULES.words(sentence))
 
 
@@ -118,7 +145,7 @@ def _plain(sentences: Iterable[str]) -> tuple[str, ...]:
 
 @contextmanager
 def unknown_words_allowed() -> Iterator[None]:
-    """Without a warning for each sentence of the corpus with unknown words; the report counts them."""
+    """Suppress the warnings about unknown words in sentences of the corpus; the report counts them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TextWarning)
         yield

@@ -14,7 +14,7 @@ from motet.models.generate import GenerateModel
 from motet.representation.root_block import from_root_block
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, panels, strips
-from motet_train.evaluate.language.attributes import ACTIONS, DIRECTIONS, Patterns, common, said
+from motet_train.evaluate.language.attributes import ACTIONS, DIRECTIONS, Patterns, common, mentioned
 from motet_train.evaluate.language.generate import ASKED, known_sentences, knows
 from motet_train.evaluate.language.motions import moves
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
@@ -81,9 +81,12 @@ class Contexts:
         """Each vector in the colour of what half of its sentences say; only: an action that they have to say."""
         kinds: list[str | None] = []
         for row in sentences:
-            actions, found = (common([said(patterns, sentence) for sentence in row]) for patterns in (ACTIONS, colours))
-            shown = only is None or only in actions
-            kinds.append((next(iter(found)) if len(found) == 1 else "other") if shown else None)
+            actions = common([mentioned(ACTIONS, sentence) for sentence in row])
+            attributes = common([mentioned(colours, sentence) for sentence in row])
+            if only is not None and only not in actions:
+                kinds.append(None)
+            else:
+                kinds.append(next(iter(attributes)) if len(attributes) == 1 else "other")
         picture, (axes,) = panels(1, 1, (7, 6), title)
         for number, kind in enumerate([*colours, "other"]):
             chosen = self.places[[found == kind for found in kinds]]
