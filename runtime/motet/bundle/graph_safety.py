@@ -15,8 +15,8 @@ from motet.errors import BundleError
 Value = int | memoryview
 """A number, or the bytes of a string or of a message within the message."""
 
-MAX_FIELDS, MAX_TEXT = 100_000, 1 << 20
-"""Fields of a whole graph, and bytes of a field that is no tensor's data."""
+MAX_FIELDS, MAX_TEXT, MAX_DEPTH = 100_000, 1 << 20, 64
+"""Fields of a whole graph, bytes of a field that is no tensor's data, and messages within each other."""
 
 
 class Message(NamedTuple):
@@ -49,11 +49,11 @@ def check_graph(model: bytes) -> None:
     """BundleError where an ONNX model is damaged or could reach outside its bytes: what was found, and where."""
     if model[4:8] == b"ORTM":
         raise BundleError("the graph is in ONNX Runtime's own format, which cannot be checked")
-    waiting, count, deepest = [("model", memoryview(model), "the graph", 0)], 0, 64
+    waiting, count = [("model", memoryview(model), "the graph", 0)], 0
     while waiting:
         kind, data, outer, depth = waiting.pop()
-        if depth > deepest:
-            raise BundleError(f"the graph is nested more than {deepest} messages deep")
+        if depth > MAX_DEPTH:
+            raise BundleError(f"the graph is nested more than {MAX_DEPTH} messages deep")
         inner = []
         for number, value in fields(data):
             count += 1

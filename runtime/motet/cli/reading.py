@@ -11,12 +11,13 @@ import click
 
 from motet.corpus.sources import Source, sources_of
 from motet.formats import FORMATS
+from motet.formats.text import FRAME_RATES
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
 
 log = logging.getLogger(__name__)
 
-FPS_IN = click.FloatRange(1e-3, 1e5)
+FPS_IN = click.FloatRange(*FRAME_RATES)
 """Frame rates that files may have, as :func:`motet.formats.text.frame_rate` takes them."""
 
 FPS = click.FloatRange(0, 10_000, min_open=True)

@@ -16,6 +16,18 @@ from motet.errors import BundleError
 PAST = (1.0, 0.5, 0.25)
 """Weights of the last step and those before it."""
 
+NEAR = 0.5
+"""Places are drawn by exp(-distance / NEAR)."""
+
+LATER, LATEST = 1 / 64, 2.0
+"""Added to a distance for each squared step of difference in age, and the most that is added."""
+
+EARLY = 0.3
+"""The share of a motion's movement in which an action is taken up that follows another."""
+
+GOOD = 0.95
+"""The share of the most that a number of steps can show from which on a start is as good."""
+
 LEAP = 0.3
 """The share of a motion's movement that may be left out from one step to the next: its act may not."""
 
@@ -123,7 +135,7 @@ class Memory:
             starts = rows[ages == ages.min()]
             return int(starts[int(uniform * len(starts))])
         # after a first step, to begin again would look like going on; and nothing is begun where it is nearly over
-        fitting = ages > 0 if age else over < 0.3
+        fitting = ages > 0 if age else over < EARLY
         return self._near(action, recent, age, ends, uniform, ages, fitting & (over <= done + LEAP))
 
     def over(self, action: int, place: int, whole: bool) -> tuple[bool, float]:
@@ -178,7 +190,7 @@ class Memory:
             motion = rows[self.lasts[rows] == last]
             starts = motion[: max(1, len(motion) - steps)]
             shown = self.acts[np.minimum(starts + steps, last)] - self.acts[starts]
-            good = np.flatnonzero(shown >= 0.95 * shown.max())
+            good = np.flatnonzero(shown >= GOOD * shown.max())
             found.append(starts[good[len(good) // 2]])
         if not recent:
             return int(found[int(uniform * len(found))])
@@ -212,10 +224,10 @@ class Memory:
         rows = self.rows[action]
         seen = np.stack([recent[min(back, len(recent) - 1)] for back in range(len(PAST))])
         off = ((self.keys[action] - (np.sqrt(PAST)[:, None] * seen).ravel()) ** 2).sum(axis=1)
-        later = (ages - age) ** 2 / 64  # earlier or later in its motion
-        off += later if ends else np.minimum(later, 2.0)
+        later = LATER * (ages - age) ** 2
+        off += later if ends else np.minimum(later, LATEST)
         off[~fitting & fitting.any()] = np.inf
-        shares = np.cumsum(np.exp((off.min() - off) / 0.5))
+        shares = np.cumsum(np.exp((off.min() - off) / NEAR))
         return int(rows[np.searchsorted(shares, uniform * shares[-1], side="right")])
 
 

@@ -41,6 +41,10 @@ log = logging.getLogger(__name__)
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
 """The animated properties of a node, and how many numbers each has; mesh weights are left out."""
 
+MAX_SKINS, MAX_JOINTS = 500, 3000
+"""Skins of a file, and joints of its skeleton: a figure has a skin for each of its meshes, and a detailed facial rig
+has a thousand joints."""
+
 LATE_START = 0.5
 """Seconds before the first key from which on a file's start is told; many programs count frames from 1."""
 
@@ -247,8 +251,8 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     moved node. Where the skins' joints are no human's, and are one together with moved nodes, these are joints, too.
     """
     skins, bones = gltf.objects("skins"), set(gltf.humanoid().values())
-    if len(skins) > 500:  # a figure has one for each of its meshes
-        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most 500")
+    if len(skins) > MAX_SKINS:
+        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
     given = [bones, *(set(skin.get("joints", [])) for skin in skins)]
     if strange := set().union(*given) - set(range(len(gltf.parents))):
         raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, strange)))}")
@@ -365,8 +369,8 @@ def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
     ends = {node for node, found in enumerate(nodes) if str(found.get("name", "")).endswith(END_SUFFIX)}
     ends = {node for node in ends if gltf.parents[node] in inside and not nodes[node].get("children")}
     kept = tuple(node for node in gltf.order if node in inside or node in ends)
-    if len(kept) > 3000:  # one with a detailed facial rig has a thousand
-        raise FormatError(gltf.path, f"its skeleton has {len(kept)} joints: expected at most 3000")
+    if len(kept) > MAX_JOINTS:
+        raise FormatError(gltf.path, f"its skeleton has {len(kept)} joints: expected at most {MAX_JOINTS}")
     at, given = {node: i for i, node in enumerate(kept)}, Names()
     names = tuple(given.unique(gltf.name(node)) for node in kept)
     return Figure(kept, tuple(at.get(gltf.parents[node], -1) for node in kept), names)

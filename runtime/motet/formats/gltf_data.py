@@ -29,6 +29,9 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 GLTF_MAX_BYTES, MAX_UNPACKED = 2**29, 2**25
 """Total bytes of a file's buffers, and of parts unpacked: 12 minutes of a figure of 90 joints at 60 keys per second."""
 
+MAX_NODES = 20_000
+"""Nodes of a file: a figure has a few hundred."""
+
 
 @contextmanager
 def broken(path: Path) -> Iterator[None]:
@@ -245,8 +248,8 @@ def parse(file: File) -> Gltf:
         raise FormatError(path, f"not a glTF file: {str(error)[:200]}") from error
     if not str(version).startswith("2."):
         raise FormatError(path, f"glTF version {str(version)[:20]}: expected 2.0")
-    if len(document.get("nodes", [])) > 20_000:  # a figure has a few hundred
-        raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most 20000")
+    if len(document.get("nodes", [])) > MAX_NODES:
+        raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
     buffers = document.get("buffers", [])
     sizes = [buffer["byteLength"] for buffer in buffers]
     if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:

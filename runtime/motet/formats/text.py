@@ -46,6 +46,9 @@ class Contents(NamedTuple):
 
 MARK = "#"
 
+FRAME_RATES = (1e-3, 1e5)
+"""The lowest and the highest frame rate of a file: the highest is ten times what cameras take."""
+
 MAX_POSES, FREE_POSES = 10**7, 10**6
 """Poses of a file, frames times joints: an hour of 90 joints at 30 fps; and what a small file may have, and one more
 for each of its bytes."""
@@ -129,9 +132,10 @@ def spaced(values: Iterable[float]) -> str:
 
 
 def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
-    """A file's frame rate; FormatError if a motion cannot have it: at most 100,000, ten times what cameras take."""
-    if not 1e-3 <= fps <= 1e5:
-        raise FormatError(path, f"frame rate {fps:g} is out of range: expected 0.001 to 100000", line)
+    """A file's frame rate; FormatError if it is none of :data:`FRAME_RATES`."""
+    low, high = FRAME_RATES
+    if not low <= fps <= high:
+        raise FormatError(path, f"frame rate {fps:g} is out of range: expected {low:g} to {high:g}", line)
     return fps
 
 

@@ -56,6 +56,9 @@ from motet.settings import Range, Seed, Settings
 DONE = re.compile(r"(?:ing|ed|[^s]s)$")
 """The ending of a word for what is done."""
 
+STANDING, STANDING_SECONDS = "a person stands still", 0.8
+"""The sentence of a figure that is to stand at the start or end of a story, and for how long it stands."""
+
 NEVER = -1e9
 """Log-probability of an action that is not drawn."""
 
@@ -429,8 +432,8 @@ class CodesModel(GenerateModel):
         texts = [part for own in parts for part in own]
         for end, place in (("start", 0), ("end", len(texts) + 1)):
             if stand in (end, "both"):
-                texts.insert(place, "a person stands still")
-                each.insert(place, 0.8)
+                texts.insert(place, STANDING)
+                each.insert(place, STANDING_SECONDS)
         asked = [self.quantities(text) if numbers else Quantities(text) for text in texts]
         contexts, noise, chosen = self.asked([one.text for one in asked], 1, seed, strict, drawn)
         figure = None if after is None else self.contract.on_figure(self.at_own_rate(after))

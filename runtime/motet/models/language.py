@@ -31,7 +31,7 @@ from motet.motion.rotations import Array
 PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
 """Padding, start and end of a sentence, unknown word: ids 0 to 3. Upper case, so that no normal word is one."""
 
-MAX_WORDS = 40  # of a sentence
+MAX_WORDS, MAX_LETTERS = 40, 2000  # of a sentence
 MAX_SECONDS = 30.0  # of a motion that a model takes, as in the paper's training data
 
 # fmt: off
@@ -198,10 +198,10 @@ class Vocabulary:
         """Ids (words,) int64 of a sentence, without SOS and EOS, and its unknown words, whose id is UNK's.
 
         TextError for a sentence without words, one without a known word, and one of more than :data:`MAX_WORDS` words
-        or 2000 letters.
+        or :data:`MAX_LETTERS` letters.
         """
-        if len(sentence) > 2000:
-            raise TextError(f"the sentence has {len(sentence)} letters, but at most 2000 are allowed")
+        if len(sentence) > MAX_LETTERS:
+            raise TextError(f"the sentence has {len(sentence)} letters, but at most {MAX_LETTERS} are allowed")
         found = self.rules.words(sentence)
         meant = list(map(self.meant, found))
         unknown = [word for word, known in zip(found, meant, strict=True) if not known]

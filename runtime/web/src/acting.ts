@@ -1,26 +1,21 @@
 /* What a steered figure is told to do, laid over its steps: docs/bundle.md, "Acts". */
+import { ACTING, MATCHING, actSettings } from "./generated.js";
 import { type Act, stepOf } from "./acts.js";
 import type { ControlModel } from "./control.js";
 import { BONES, LEG, SIDES } from "./humanoid.js";
-import { FEATURES, TRAJECTORY, type Playback, type Target } from "./matching.js";
+import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
 import { inverse, nearestTurn, ofVector, product, type Quaternion, size, type Vector, vectorOf } from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
 import type { Played } from "./steering.js";
-import type { ActSettings } from "./steeringSettings.js";
+import type { Settings } from "./settings.js";
 
 const LOWER = ["hips", ...SIDES.flatMap((side) => LEG.map((part) => side + part))];
 /** Whether a bone is of the upper body. */
 const UPPER = BONES.map((bone) => !LOWER.includes(bone));
 const SPINE = BONES.indexOf("spine");
 /** From this feature after the trajectory's on they tell of the hands: how the upper body is. */
-const HANDS = FEATURES - TRAJECTORY - 6;
-/** Radians that a metre of the hips' height counts as. */
-const METRE = 10;
-/** Times as long that what is lost fades at most: who is to kneel at once is down in half a second. */
-const LONGER = 1.75;
-/** Radians, metres and metres a second of which nothing is seen. */
-const FADED = 1e-4;
+const HANDS = MATCHING.FEATURES - MATCHING.TRAJECTORY - 6;
 
 /** A pose in its frame of the facing. */
 type Body = Pick<Played, "rotations" | "height">;
@@ -147,7 +142,7 @@ function each(value: (i: number) => number): Ground {
  * What is lost from the last tick to this one is added: of the upper body, and where an act leads the whole body, or led it, of
  * all of it and of the velocity. base: of the last tick without acts.
  */
-function lose(acting: Acting, { blend, far }: ActSettings, base: Body, step: Ground, dt: number): void {
+function lose(acting: Acting, { blend, far }: Settings<typeof actSettings>, base: Body, step: Ground, dt: number): void {
   const { shown, before } = acting;
   const ahead = since(plus(shown, since(shown, before)), source(acting, acting.base, 0));
   const off = since(shown, source(acting, base, 1));
@@ -156,15 +151,15 @@ function lose(acting: Acting, { blend, far }: ActSettings, base: Body, step: Gro
   const isNew = (i: number) => leads || UPPER[Math.floor(i / 3)];
   acting.offsetRate = ahead.map((value, i) => (isNew(i) ? (value - off[i]!) / dt : acting.offsetRate[i]!));
   acting.offset = off.map((value, i) => (isNew(i) ? value : acting.offset[i]!));
-  const farthest = Math.max(...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))), METRE * Math.abs(acting.offset.at(-1)!));
-  acting.damping = dampingOf(blend) / clamp(farthest / far, 1, LONGER);
+  const farthest = Math.max(...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))), ACTING.METRE * Math.abs(acting.offset.at(-1)!));
+  acting.damping = dampingOf(blend) / clamp(farthest / far, 1, ACTING.LONGER);
   if (leads) acting.drift = each((i) => acting.going[i]! - step[i]! / dt);
 }
 
 /** What is added, a tick later; nothing once nothing is seen of it. */
-function fade(acting: Acting, { blend }: ActSettings, dt: number): void {
+function fade(acting: Acting, { blend }: Settings<typeof actSettings>, dt: number): void {
   const later = acting.offset.map((off, i) => damped(off, acting.offsetRate[i]!, acting.damping, dt));
-  const left = later.some(([off]) => Math.abs(off) > FADED) ? 1 : 0;
+  const left = later.some(([off]) => Math.abs(off) > ACTING.FADED) ? 1 : 0;
   acting.offset = later.map(([off]) => left * off);
   acting.offsetRate = later.map(([, rate]) => left * rate);
   acting.drift = each((i) => acting.drift[i]! * left * 0.5 ** (dt / blend));

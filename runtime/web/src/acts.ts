@@ -1,4 +1,5 @@
 /* Acts, short motions of the humanoid that a steered figure can be told to do: docs/bundle.md, "Acts". */
+import { ACTS } from "./generated.js";
 import type { ControlModel } from "./control.js";
 import { ControlError } from "./errors.js";
 import { framesFor } from "./frames.js";
@@ -9,20 +10,6 @@ import { moved, type Pose as Ground } from "./planar.js";
 import { about, minus, normalised, product, type Quaternion, quaternionOf, rotated, rotationOf, size, STILL, type Vector, Y } from "./rotations.js";
 import { wrapped } from "./springs.js";
 import type { Played } from "./steering.js";
-
-/** Frames of an act at least. */
-const SHORTEST = 3;
-/** Seconds of an act of which the rest at both ends is left out: less is a pose that is held. */
-const MOVES = 1;
-/** Numbers of a frame: a quaternion of each bone; x, z and facing of the root; the hips' height. */
-const WIDTH = 4 * BONES.length + 4;
-/** Of these numbers. */
-const LARGEST = 1e4;
-/** Metres between the highest and the lowest that hips are, or would be standing, metres above the ground of a ball of a foot, and
- *  radians of a turn, beyond which an act is one of the legs. */
-const [BENT, RAISED, TURNED] = [0.25, 0.3, (150 * Math.PI) / 180];
-/** The height of the hips of a figure that stands straight. */
-const STANDS = HUMANOID.joints[0]!.offset[1];
 
 /** A motion that a steered figure can play, a frame in each tick; `actOf` makes it. */
 export interface Act {
@@ -45,21 +32,21 @@ export interface Act {
  */
 export function actOf({ fps, acts: { rest } }: ControlModel, name: string, numbers: ArrayLike<number>): Act {
   const values = Array.from(numbers);
-  const frames = values.length / WIDTH;
-  if (!Number.isInteger(frames) || frames < SHORTEST) throw new ControlError(`an act needs ${SHORTEST} or more frames of ${WIDTH} numbers, not ${values.length} numbers`);
-  if (!values.every((value) => Math.abs(value) <= LARGEST)) throw new ControlError(`an act must be finite numbers, no larger than ${LARGEST}`);
-  const rows = Array.from({ length: frames }, (_, at) => values.slice(at * WIDTH, (at + 1) * WIDTH));
+  const frames = values.length / ACTS.WIDTH;
+  if (!Number.isInteger(frames) || frames < ACTS.SHORTEST) throw new ControlError(`an act needs ${ACTS.SHORTEST} or more frames of ${ACTS.WIDTH} numbers, not ${values.length} numbers`);
+  if (!values.every((value) => Math.abs(value) <= ACTS.LARGEST)) throw new ControlError(`an act must be finite numbers, no larger than ${ACTS.LARGEST}`);
+  const rows = Array.from({ length: frames }, (_, at) => values.slice(at * ACTS.WIDTH, (at + 1) * ACTS.WIDTH));
   const poses = rows.map((row): Played => ({
-    ground: [row[WIDTH - 4]!, row[WIDTH - 3]!, row[WIDTH - 2]!],
+    ground: [row[ACTS.WIDTH - 4]!, row[ACTS.WIDTH - 3]!, row[ACTS.WIDTH - 2]!],
     rotations: BONES.map((_, bone) => unitOf(row.slice(4 * bone, 4 * bone + 4) as Quaternion)),
-    height: row[WIDTH - 1]!,
+    height: row[ACTS.WIDTH - 1]!,
     contacts: [1, 1],
   }));
   const world = worldOf(motionOf(poses, fps));
   const places = (at: number) => world.places[at]!.flat();
   const fast = rows.map((_, at) => Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) > rest);
   const [first, last] = [fast.indexOf(true), fast.lastIndexOf(true)];
-  const within = <T>(all: T[]): T[] => (first >= 0 && last - first >= Math.round(MOVES * fps) ? all.slice(first, last + 1) : all);
+  const within = <T>(all: T[]): T[] => (first >= 0 && last - first >= Math.round(ACTS.MOVES * fps) ? all.slice(first, last + 1) : all);
   const [height, ground] = [within(poses.map(({ height }) => height)), within(poses.map(({ ground }) => ground))];
   const features = within(poseFeatures(world, poses.map(({ ground }) => ground), fps));
   const contacts = within(footContacts(world, fps));
@@ -71,7 +58,7 @@ function byLegs(height: number[], ground: Ground[], features: number[][]): boole
   const range = (values: number[]) => Math.max(...values) - Math.min(...values);
   let facing = 0;
   const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
-  return range([STANDS, ...height]) > BENT || Math.max(...features.map((one) => Math.max(one[1]!, one[4]!))) > RAISED || range(turned) > TURNED;
+  return range([ACTS.STANDS, ...height]) > ACTS.BENT || Math.max(...features.map((one) => Math.max(one[1]!, one[4]!))) > ACTS.RAISED || range(turned) > ACTS.TURNED;
 }
 
 /** Metres from where an act begins to where it ends. */

@@ -1,10 +1,6 @@
 /* Figures that keep apart: each turns aside from those that it would come too near to, as motet/decode/apart.py says. */
+import { APART, LEADING } from "./generated.js";
 import type { Pose as Ground } from "./planar.js";
-
-/** Seconds within which figures look ahead, metres beyond which they see nobody, and m/s of the change for figures in one place. */
-const [SOON, SIGHT, STRENGTH] = [2, 5, 6];
-/** m/s: who would go around others more slowly than this stands and lets them pass. */
-const WAITS = 0.2;
 
 /** Where a figure is, and its velocity in m/s; x and z first. */
 export interface Walker {
@@ -17,12 +13,12 @@ export function keptApart(figure: Walker, others: readonly Walker[], room: numbe
   let [changeX, changeZ] = [0, 0];
   for (const other of others) {
     const [x, z] = [figure.root[0] - other.root[0], figure.root[1] - other.root[1]];
-    if (other === figure || Math.abs(x) >= SIGHT || Math.abs(z) >= SIGHT) continue;
+    if (other === figure || Math.abs(x) >= APART.SIGHT || Math.abs(z) >= APART.SIGHT) continue;
     const [u, v] = [figure.velocity[0]! - other.velocity[0]!, figure.velocity[1]! - other.velocity[1]!];
-    const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), SOON);
+    const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), APART.SOON);
     const [nearX, nearZ] = [x + soon * u, z + soon * v];
     if (nearX * nearX + nearZ * nearZ >= room * room) continue;
-    const by = STRENGTH * Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) * (1 - soon / SOON);
+    const by = APART.STRENGTH * Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) * (1 - soon / APART.SOON);
     // head on there is no way away from the other: to the right of the way there
     const [rightX, rightZ] = unit(z, -x);
     const [awayX, awayZ] = unit(nearX + 0.1 * room * rightX, nearZ + 0.1 * room * rightZ);
@@ -36,7 +32,7 @@ export function keptApart(figure: Walker, others: readonly Walker[], room: numbe
 export function aside([x, z]: readonly number[], change: readonly number[]): [x: number, z: number] {
   const [u, v] = [x! + change[0]!, z! + change[1]!];
   const speed = Math.hypot(u, v);
-  const share = speed > WAITS ? Math.min(1, Math.hypot(x!, z!) / speed) : 0;
+  const share = speed > LEADING.WAITS ? Math.min(1, Math.hypot(x!, z!) / speed) : 0;
   return [u * share, v * share];
 }
 

@@ -1,20 +1,9 @@
 /* Figures that go along paths and arrive at their ends, as motet/decode/arriving.py says. Metres, seconds, radians; x and z. */
+import { ARRIVING } from "./generated.js";
 import type { Playback } from "./matching.js";
 import { clamp, dampingOf, wrapped } from "./springs.js";
 
 export type Point = readonly [x: number, z: number];
-
-/** How far ahead on its path a figure aims: metres, and more for each m/s. */
-const [AHEAD, SOONER] = [0.3, 0.25];
-/** m/s^2 at which a figure slows down to the end, and m/s below which it stands. */
-const [BRAKES, STANDS] = [1.5, 0.1];
-/** Metres within which a figure has arrived, and within which it steps to the end without turning there first. */
-const [NEAR, SIDESTEP] = [0.08, 0.7];
-/** Metres from the end within which a figure that stands stays there; m/s at which what is left is made up for, standing and for
- *  each m/s of walking; and in how many seconds. */
-const [GLIDES_FROM, STANDING, WALKING, SETTLES] = [0.16, 0.05, 0.15, 0.25];
-/** How far off a figure faces that has arrived, at most. */
-const FACES = (8 * Math.PI) / 180;
 
 /** A figure on its path. */
 export interface Going {
@@ -46,16 +35,16 @@ export function onward(going: Going, playback: Playback, halfLife: number): [x: 
   const way = unit(minus(at(going, going.gone + 0.05), here));
   const gone = going.gone + clamp(dot(minus(root, here), way), 0, 0.5);
   const [pace, whole] = [Math.hypot(...velocity), along.at(-1)!];
-  const ahead = gone + AHEAD + SOONER * pace;
+  const ahead = gone + ARRIVING.AHEAD + ARRIVING.SOONER * pace;
   const off = minus(points.at(-1)!, root);
   const [last, far] = [ahead >= whole, Math.hypot(...off)];
   const left = last ? far : Math.max(whole - gone, far);
-  const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < NEAR);
-  const stands = pace < STANDS;
-  going.stops = (going.stops && !(stands && far > GLIDES_FROM)) || arrives;
-  const turned = going.facing === null || Math.abs(wrapped(playback.root[2] - going.facing)) < FACES;
-  going.arrived = going.stops && (going.arrived || (stands && far < NEAR && turned));
-  const speed = going.stops ? 0 : Math.min(going.speed, Math.sqrt(2 * BRAKES * left));
+  const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < ARRIVING.NEAR);
+  const stands = pace < ARRIVING.STANDS;
+  going.stops = (going.stops && !(stands && far > ARRIVING.GLIDES_FROM)) || arrives;
+  const turned = going.facing === null || Math.abs(wrapped(playback.root[2] - going.facing)) < ARRIVING.FACES;
+  going.arrived = going.stops && (going.arrived || (stands && far < ARRIVING.NEAR && turned));
+  const speed = going.stops ? 0 : Math.min(going.speed, Math.sqrt(2 * ARRIVING.BRAKES * left));
   going.gone = Math.min(gone, whole);
   const [x, z] = unit(minus(at(going, ahead), root));
   return [x * speed, z * speed];
@@ -63,7 +52,7 @@ export function onward(going: Going, playback: Playback, halfLife: number): [x: 
 
 /** Where a figure faces that goes at a velocity: where it goes; near the end as it does, and at the end as it is to. */
 export function faces({ points, facing }: Going, { root, spring }: Playback, [x, z]: Point): number {
-  if (distance(points.at(-1)!, at2(root)) >= SIDESTEP) return Math.atan2(x, z);
+  if (distance(points.at(-1)!, at2(root)) >= ARRIVING.SIDESTEP) return Math.atan2(x, z);
   return facing ?? spring[2];
 }
 
@@ -72,9 +61,9 @@ export function settle({ points, stops }: Going, playback: Playback, halfLife: n
   const [x, z, facing] = playback.root;
   const off = minus(minus(points.at(-1)!, [x, z]), rolling(playback, halfLife));
   const far = Math.hypot(...off);
-  if (!stops || far >= GLIDES_FROM) return;
-  const most = (STANDING + WALKING * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
-  const share = Math.min(seconds / SETTLES, most / Math.max(far, 1e-9));
+  if (!stops || far >= ARRIVING.GLIDES_FROM) return;
+  const most = (ARRIVING.GLIDES[0] + ARRIVING.GLIDES[1] * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
+  const share = Math.min(seconds / ARRIVING.SETTLES, most / Math.max(far, 1e-9));
   playback.root = [x + off[0] * share, z + off[1] * share, facing];
 }
 

@@ -1,9 +1,9 @@
 /* Filling gaps of placed frames: docs/bundle.md, the loop `between`. Three numbers of place, then two axes a bone. */
+import { PLACED } from "./generated.js";
 import { stacked } from "./arrays.js";
 import type { Graph } from "./graph.js";
 import { cross, dot, type Rotation, rotationOf, unit, type Vector } from "./rotations.js";
 
-const PLACE = 3;
 /** Steps over which the velocities next to a gap are taken. */
 const STEPS = 3;
 
@@ -20,7 +20,7 @@ export async function between(filler: Graph, past: ArrayLike<number>[], after: A
 
 /** Where a figure is and how it faces: x, z, radians. */
 function poseOf(frame: ArrayLike<number>): Vector {
-  const [x, , z] = rotationOf(frame, PLACE);
+  const [x, , z] = rotationOf(frame, PLACED.ROOT_PLACE);
   return [frame[0]!, frame[2]!, Math.atan2(z[0] - x[2], x[0] + z[2])];
 }
 
@@ -41,7 +41,7 @@ function putAt(frame: ArrayLike<number>, [x, z, facing]: Vector): Float64Array {
 /** Place and axes of the hips turned about the vertical axis. */
 function turned(frame: Float64Array, angle: number): Float64Array {
   const [sin, cos] = [Math.sin(angle), Math.cos(angle)];
-  for (const at of [0, PLACE, PLACE + 3]) {
+  for (const at of [0, PLACED.ROOT_PLACE, PLACED.ROOT_PLACE + 3]) {
     const [x, z] = [frame[at]!, frame[at + 2]!];
     frame[at] = x * cos + z * sin;
     frame[at + 2] = z * cos - x * sin;
@@ -57,12 +57,12 @@ function bridge(past: Float64Array[], after: Float64Array[], frames: number): Fl
   return Array.from({ length: frames }, (_, at) => {
     const s = (at + 1) / (frames + 1);
     const found = new Float64Array(start.length);
-    for (let i = 0; i < PLACE; i++) {
+    for (let i = 0; i < PLACED.ROOT_PLACE; i++) {
       found[i] =
         (1 + 2 * s) * (1 - s) ** 2 * start[i]! + s * (1 - s) ** 2 * (frames + 1) * leaves[i]! +
         s ** 2 * (3 - 2 * s) * end[i]! - s ** 2 * (1 - s) * (frames + 1) * arrives[i]!;
     }
-    for (let bone = PLACE; bone < start.length; bone += 6) {
+    for (let bone = PLACED.ROOT_PLACE; bone < start.length; bone += 6) {
       const [x, y] = partOfTheWay(rotationOf(start, bone), rotationOf(end, bone), s);
       found.set(x, bone);
       found.set(y, bone + 3);

@@ -1,13 +1,9 @@
+import { BUNDLE, MANIFEST, MEMBERS } from "./generated.js";
 import { type NumberArray, DTYPES, readNpy, readNpz } from "./arrays.js";
 import { BundleError } from "./errors.js";
 import { type GraphSpec, Graph, type SessionSettings } from "./graph.js";
 import { checkManifest, isObject } from "./manifestChecks.js";
 import { openZip, type Archive } from "./zip.js";
-
-const FORMAT = 3;
-const MAX_MANIFEST = 4 << 20;
-const MAX_FILE = 256 << 20;
-const MAX_FILES = 64;
 
 /** manifest.json, as docs/bundle.md describes it. */
 export interface Manifest {
@@ -62,11 +58,11 @@ export class Bundle {
   /** Open the bytes of a bundle's zip; BundleError says what is wrong with it. */
   static async open(bytes: Uint8Array): Promise<Bundle> {
     const zip = openZip(bytes);
-    const manifest = parse(await zip.read("manifest.json", MAX_MANIFEST));
+    const manifest = parse(await zip.read("manifest.json", BUNDLE.MAX_MANIFEST));
     const listed = Object.keys(manifest.files);
     const extra = zip.names.filter((name) => name !== "manifest.json" && !listed.includes(name));
     if (extra.length) throw new BundleError(`not in its manifest: ${extra.join(", ")}`);
-    if (listed.length > MAX_FILES) throw new BundleError(`the bundle has more than ${MAX_FILES} files`);
+    if (listed.length > MEMBERS.MAX_FILES) throw new BundleError(`the bundle has more than ${MEMBERS.MAX_FILES} files`);
     return new Bundle(manifest, zip);
   }
 
@@ -74,7 +70,7 @@ export class Bundle {
   async read(name: string): Promise<Uint8Array> {
     const entry = this.manifest.files[name];
     if (!entry) throw new BundleError(`the file ${JSON.stringify(name)} is not in the manifest`);
-    if (!(entry.size <= MAX_FILE)) throw new BundleError(`${name} has ${entry.size} bytes; at most ${MAX_FILE} are read`);
+    if (!(entry.size <= MEMBERS.MAX_SIZE)) throw new BundleError(`${name} has ${entry.size} bytes; at most ${MEMBERS.MAX_SIZE} are read`);
     const bytes = await this.zip.read(name, entry.size);
     const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes as BufferSource));
     const hex = Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("");
@@ -105,7 +101,7 @@ export class Bundle {
 
   /** The golden vectors by name. */
   async golden(): Promise<Map<string, NumberArray>> {
-    return readNpz(await this.read(this.manifest.golden.file), MAX_FILE);
+    return readNpz(await this.read(this.manifest.golden.file), MEMBERS.MAX_SIZE);
   }
 }
 
@@ -117,7 +113,7 @@ function parse(bytes: Uint8Array): Manifest {
     throw new BundleError("manifest.json is not JSON");
   }
   if (!isObject(manifest) || !("format" in manifest)) throw new BundleError("manifest.json is not a bundle's manifest");
-  if (manifest.format !== FORMAT) throw new BundleError(`this is a bundle of format ${manifest.format}; format ${FORMAT} is read`);
+  if (manifest.format !== MANIFEST.FORMAT) throw new BundleError(`this is a bundle of format ${manifest.format}; format ${MANIFEST.FORMAT} is read`);
   checkManifest(manifest);
   return manifest as unknown as Manifest;
 }

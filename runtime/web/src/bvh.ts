@@ -1,9 +1,10 @@
 /* BVH: a skeleton and a motion in a text; angles are degrees, and nothing says the unit of lengths. */
+import { SKELETON, TEXT } from "./generated.js";
 import { FormatError, MotionError } from "./errors.js";
 import { eulersOf, fromEuler } from "./euler.js";
 import { checked, type Motion } from "./motion.js";
 import type { Quaternion, Vector } from "./rotations.js";
-import { END, type Joint, Skeleton, unique } from "./skeleton.js";
+import { type Joint, Skeleton, unique } from "./skeleton.js";
 
 const RADIANS = Math.PI / 180;
 const LONGEST = 2 ** 28;
@@ -80,7 +81,7 @@ function hierarchy(lines: string[]): { nodes: Node[]; end: number } {
 }
 
 function nodeOf(keyword: string, name: string, parent: number, nodes: Node[], taken: Set<string>, line: number): Node {
-  const wanted = keyword === "end" ? nodes[parent]!.joint.name + END : name || "joint";
+  const wanted = keyword === "end" ? nodes[parent]!.joint.name + SKELETON.END_SUFFIX : name || "joint";
   return { joint: { name: unique(wanted, taken), parent, offset: [0, 0, 0], order: "zyx" }, line, placed: false, channels: [] };
 }
 
@@ -131,7 +132,8 @@ function header(lines: string[], end: number): { start: number; frames: number; 
 function rate(word: string, line: number): number {
   const seconds = numbers(word, line)[0]!;
   const fps = 1 / seconds;
-  if (!(fps >= 1e-3 && fps <= 1e5)) throw new FormatError(`line ${line}: frame time ${word} s is out of range`);
+  const [low, high] = TEXT.FRAME_RATES;
+  if (!(fps >= low && fps <= high)) throw new FormatError(`line ${line}: frame time ${word} s is out of range`);
   const [, digits = "", power = "0"] = /^[^.e]*(?:\.([0-9]*))?(?:e(.*))?$/i.exec(word) ?? [];
   const precision = 0.51 * 10 ** (Number(power) - digits.length);
   const near = [-1, 0, 1].map((step) => Math.round(fps) + step).filter((one) => one > 0 && Math.abs(1 / one - seconds) <= precision);
@@ -190,7 +192,7 @@ function tree(skeleton: Skeleton, moving: (joint: number) => boolean, offset: (j
   const write = (at: number, depth: number): void => {
     const indent = "\t".repeat(Math.min(depth, 40));
     const children = skeleton.children[at]!;
-    const lone = children.length === 1 && skeleton.names[children[0]!]!.endsWith(END) && !skeleton.children[children[0]!]!.length;
+    const lone = children.length === 1 && skeleton.names[children[0]!]!.endsWith(SKELETON.END_SUFFIX) && !skeleton.children[children[0]!]!.length;
     const spaced = (vector: Vector) => vector.map(number).join(" ");
     order.push(at);
     lines.push(`${indent}${at ? "JOINT" : "ROOT"} ${names[at]}`, `${indent}{`, `${indent}\tOFFSET ${at ? spaced(offset(at)) : "0 0 0"}`);

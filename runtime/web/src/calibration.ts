@@ -1,4 +1,5 @@
 /* A of joints from frames, where the rest pose is no body's: docs/retargeting.md, "Rest poses that do not stand". */
+import { ALIGNMENT } from "./generated.js";
 import { frame, knownAxes, meanDirection, nearAxes } from "./alignment.js";
 import type { Body } from "./body.js";
 import { ARM, directionOf, LEG, SIDES } from "./humanoid.js";
@@ -6,9 +7,6 @@ import type { World } from "./motion.js";
 import {
   cross, inverse, minus, normalised, plus, product, type Quaternion, rotated, STILL, swing, times, unit, type Vector, X, Y, Z,
 } from "./rotations.js";
-
-/** The weight of a limb's shortest turn beside its hinge, which counts by the sine of its bend. */
-const HINGE = 0.05;
 
 /** A of all joints that are bones; alongAxes: whether joints have axes along bones and hinges. */
 export function calibrated(body: Body, world: World, alongAxes: boolean): Quaternion[] {
@@ -87,7 +85,7 @@ class Calibration {
     const { joints } = this.body.map;
     const [thigh, shin] = [this.directions(bones[0]!), this.directions(bones[1]!)];
     const hips = this.turned(joints.hips!);
-    const hinge = thigh.map((along, at) => plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), HINGE)));
+    const hinge = thigh.map((along, at) => plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), ALIGNMENT.HINGE)));
     this.settleLimb(bones[0]!, thigh, hinge.map((axis, at) => frame(axis, times(thigh[at]!, -1))));
     this.settleLimb(bones[1]!, shin, hinge.map((axis, at) => frame(axis, times(shin[at]!, -1))));
     const shins = this.turned(joints[bones[1]!]!);
@@ -115,7 +113,7 @@ class Calibration {
     const lower = body.aimed(lowerArm!) ? this.directions(lowerArm!) : upper;
     const up = upper.map((along, at) => {
       const plain = product(swing(rotated(chest[at]!, directionOf(upperArm!)), along), chest[at]!);
-      return plus(times(cross(along, lower[at]!), -sign), times(rotated(plain, Y), HINGE));
+      return plus(times(cross(along, lower[at]!), -sign), times(rotated(plain, Y), ALIGNMENT.HINGE));
     });
     const level = (along: Vector[], ups: Vector[]) => along.map((one, at) => frame(times(one, sign), ups[at]!, false));
     this.settleLimb(upperArm!, upper, level(upper, up));

@@ -1,13 +1,9 @@
 /* Frames of steps of codes, and steps of codes of frames: docs/bundle.md, the loop `codes`. */
+import { CODEC } from "./generated.js";
 import { integers, stacked } from "./arrays.js";
 import type { Graph } from "./graph.js";
 import type { Frames } from "./model.js";
 import { moved, type Pose, seenFrom } from "./planar.js";
-
-/** Of the decoder's channels the first: the root's forward, left and turn, seen from where the moves have led. */
-const PATH = 3;
-/** Metres that count as much as a radian where moves are compared. */
-const REACH = 0.5;
 
 /** The graphs `decoder` and `tokens`, how many steps they look back and ahead, and the spring that joins motions. */
 export interface Codec {
@@ -52,12 +48,12 @@ export async function codesOf(codec: Codec, frames: Frames): Promise<number[][]>
 async function bookOf({ decoder, moves }: Codec, parts: number): Promise<Pose[]> {
   const codes = Array.from({ length: moves }, (_, move) => [move, ...Array<number>(parts - 1).fill(0)]);
   const { data } = (await decoder.run({ codes: integers(codes.flat(), 1, moves, parts) })).moves!;
-  return codes.map((_, at) => pose(data, PATH * at));
+  return codes.map((_, at) => pose(data, CODEC.PATH * at));
 }
 
 /** The move that leads nearest to another. */
 function nearest([forward, left, turn]: Pose, book: Pose[]): number {
-  const off = book.map(([x, z, angle]) => (forward - x) ** 2 + (left - z) ** 2 + (REACH * (turn - angle)) ** 2);
+  const off = book.map(([x, z, angle]) => (forward - x) ** 2 + (left - z) ** 2 + (CODEC.REACH * (turn - angle)) ** 2);
   return off.indexOf(Math.min(...off));
 }
 
@@ -99,9 +95,9 @@ export class StreamingDecoder {
     const first = !this.pose;
     for (let step = this.count - start; step < until - start; step++) {
       for (let at = step * hop; at < (step + 1) * hop; at++) found.push(this.led(frames!.data.slice(at * width, (at + 1) * width)));
-      this.way = moved(this.way, pose(moves!.data, PATH * step));
+      this.way = moved(this.way, pose(moves!.data, CODEC.PATH * step));
     }
-    if (first) found[0]!.set(found[1]!.subarray(0, PATH)); // the first frame has the second one's rates
+    if (first) found[0]!.set(found[1]!.subarray(0, CODEC.PATH)); // the first frame has the second one's rates
     this.count = until;
     return this.joined(found);
   }
@@ -133,7 +129,7 @@ export class StreamingDecoder {
  */
 function inertialized(given: Frames, found: Frames, fps: number, halfLife: number): (frame: Float32Array) => void {
   const [before, off] = [0, 1].map((row) => Float64Array.from(given[row]!, (value, at) => value - found[row]![at]!)) as [Float64Array, Float64Array];
-  const speed = off.map((value, at) => (at < PATH ? 0 : (value - before[at]!) * fps));
+  const speed = off.map((value, at) => (at < CODEC.PATH ? 0 : (value - before[at]!) * fps));
   const y = (2 * Math.LN2) / halfLife;
   const fading = Math.exp(-y / fps);
   return (frame) => {

@@ -1,13 +1,9 @@
 /* Motions drawn code by code: docs/bundle.md, the loop `codes`. */
+import { CODES, MEMORY } from "./generated.js";
 import { integers, type NumberArray } from "./arrays.js";
 import { type Graph, taken } from "./graph.js";
-import { LEAP, type Memory } from "./memory.js";
+import { type Memory } from "./memory.js";
 import type { Noise } from "./random.js";
-
-/** Steps that the writer looks back at most. */
-const WINDOW = 64;
-/** Steps that a draw from memory compares. */
-const RECENT = 3;
 
 /** How codes are drawn. */
 export interface Drawing {
@@ -89,7 +85,7 @@ export class Writer {
     this.now = { ...this.now, age: from };
     const after = places.map((place, row) => (place === undefined ? undefined : memory.after(actions[row]!, place, whole)));
     const given = places.map((place, row) => (place === undefined ? undefined : this.step(place, ends && after[row]!.end)));
-    const begun = actions.map((action, row) => from[row]! < (1 - LEAP) * (memory.shortest.get(action) ?? 0));
+    const begun = actions.map((action, row) => from[row]! < (1 - MEMORY.LEAP) * (memory.shortest.get(action) ?? 0));
     const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends, begun);
     const age = from.map((one, row) => (again[row] ? 0 : one + 1));
     const done = after.map((one, row) => (again[row] ? 0 : (one?.done ?? this.now.done[row]!)));
@@ -134,7 +130,7 @@ export class Writer {
     const { data, shape } = outputs.numbers!;
     const row = (at: number) => data.slice(at * shape[1]!, (at + 1) * shape[1]!);
     const started = last[0]![0] !== this.source.end + 1;
-    const latest = started ? recent.map((before, at) => [row(at), ...before].slice(0, RECENT)) : recent;
+    const latest = started ? recent.map((before, at) => [row(at), ...before].slice(0, MEMORY.PAST.length)) : recent;
     this.now = { age, done, last, states: lately(next), recent: latest };
     return outputs.known!;
   }
@@ -244,17 +240,17 @@ function lately(states: Record<string, NumberArray<Float32Array>>): Record<strin
   for (const [name, array] of Object.entries(states)) {
     const axis = array.shape.length - 2;
     const [steps, width] = [array.shape[axis]!, array.shape[axis + 1]!];
-    if (steps <= WINDOW) {
+    if (steps <= CODES.WINDOW) {
       found[name] = array;
       continue;
     }
     const blocks = array.data.length / (steps * width);
-    const data = new Float32Array(blocks * WINDOW * width);
+    const data = new Float32Array(blocks * CODES.WINDOW * width);
     for (let block = 0; block < blocks; block++) {
       const stop = (block + 1) * steps * width;
-      data.set(array.data.subarray(stop - WINDOW * width, stop), block * WINDOW * width);
+      data.set(array.data.subarray(stop - CODES.WINDOW * width, stop), block * CODES.WINDOW * width);
     }
-    found[name] = { data, shape: array.shape.with(axis, WINDOW) };
+    found[name] = { data, shape: array.shape.with(axis, CODES.WINDOW) };
   }
   return found;
 }

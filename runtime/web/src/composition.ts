@@ -1,16 +1,12 @@
 /* Sentences that ask for several things in a row, as parts: docs/bundle.md, "Several things in one text". */
+import { COMPOSITION } from "./generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
 const THEN = /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
 const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
 const OPENING = /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the)\s+\w+|\w+ly)(?:\s+(?:is|are))?\s+)+/iu;
 
 /** Words that say little about what is done. */
-export const FUNCTION_WORDS = new Set(
-  (
-    "a after afterwards along am an and are as at be before by finally first for from he her him his i in into is it its man my next of " +
-    "on or person she someone somebody that the their them then they this to up while who with woman you your"
-  ).split(" "),
-);
+export const FUNCTION_WORDS: ReadonlySet<string> = new Set(COMPOSITION.FUNCTION_WORDS);
 
 /** What the forms of a lower-case word share: "danc" of dance, dances and dancing. */
 export function stem(word: string): string {

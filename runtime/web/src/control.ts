@@ -1,19 +1,15 @@
 /* Figures that are steered by motion matching; no ONNX Runtime is needed. */
+import { BASE, FIELDS, MATCHING, STEER, actSettings, footLockSettings, steeringSettings } from "./generated.js";
 import { type Act, actOf, reachOf } from "./acts.js";
 import type { Bundle, Manifest } from "./bundle.js";
-import { ControlSession, LARGEST_CROWD } from "./controlSession.js";
+import { ControlSession } from "./controlSession.js";
 import { BundleError, ControlError } from "./errors.js";
 import { Gaits, type Speeds } from "./gaits.js";
 import { BONES } from "./humanoid.js";
-import { FEATURES, Matcher, type Tables } from "./matching.js";
+import { Matcher, type Tables } from "./matching.js";
 import { Model } from "./model.js";
 import { Steerer } from "./steering.js";
-import { type ActSettings, actsOf, lockOf, steeringOf, type LockSettings } from "./steeringSettings.js";
-
-/** From so many figures on the searches of a session are spread over the ticks. */
-const SPREAD_FROM = 32;
-/** A number of a table at most. */
-const LARGEST = 1e9;
+import { type Settings, settingsOf } from "./settings.js";
 
 export interface StartSettings {
   /** By default the first. */
@@ -35,18 +31,18 @@ export class ControlModel extends Model {
   readonly gaits: readonly string[];
   readonly abilities: Gaits;
   readonly steerer: Steerer;
-  readonly lock: LockSettings;
-  readonly acts: ActSettings;
+  readonly lock: Settings<typeof footLockSettings>;
+  readonly acts: Settings<typeof actSettings>;
   private taken?: ReadonlyMap<string, readonly Act[]>;
 
   constructor(manifest: Manifest, tables: Tables) {
     super(manifest);
-    const steering = steeringOf(manifest.settings);
+    const steering = settingsOf("steering", steeringSettings, manifest.settings.steering);
     const { names, speeds, odd } = configOf(manifest, tables.codes.length / tables.left.length);
     this.abilities = new Gaits(names, speeds, steering);
     this.gaits = names;
-    this.lock = lockOf(manifest.settings);
-    this.acts = actsOf(manifest.settings);
+    this.lock = settingsOf("foot_lock", footLockSettings, manifest.settings.foot_lock);
+    this.acts = settingsOf("acting", actSettings, manifest.settings.acting);
     const matcher = new Matcher(tables, odd, names.length, steering, this.fps);
     matcher.goals.forEach((goals, gait) => {
       if (!goals.rows.length) throw new BundleError(`table left: no row of ${JSON.stringify(names[gait])} can be jumped to`);
@@ -77,8 +73,8 @@ export class ControlModel extends Model {
 
   /** A session of figures that stand still. ControlError for what is out of range. */
   start({ gait = this.gaits[0]!, characters = 1, places, holdFeet = true, strict = false, phases }: StartSettings = {}): ControlSession {
-    if (!Number.isInteger(characters) || characters < 1 || characters > LARGEST_CROWD) {
-      throw new ControlError(`characters must be a whole number from 1 to ${LARGEST_CROWD}, not ${characters}`);
+    if (!Number.isInteger(characters) || characters < 1 || characters > BASE.LARGEST_CROWD) {
+      throw new ControlError(`characters must be a whole number from 1 to ${BASE.LARGEST_CROWD}, not ${characters}`);
     }
     const session = new ControlSession(this, this.abilities.number(gait), characters, holdFeet, strict, this.phases(characters, phases));
     if (places !== undefined) session.put(places);
@@ -88,7 +84,7 @@ export class ControlModel extends Model {
   /** The phase of each figure; null for those that search after every command. */
   phases(characters: number, given?: number | readonly number[]): number[] | null {
     const every = this.steerer.matcher.how.search_every;
-    if (given === undefined && characters < SPREAD_FROM) return null;
+    if (given === undefined && characters < STEER.SPREAD_FROM) return null;
     const found = Array.from({ length: characters }, (_, at) => (given === undefined ? at % every : Array.isArray(given) ? (given[at] as number) : (given as number)));
     const fits = (!Array.isArray(given) || given.length === characters) && found.every((phase) => Number.isInteger(phase) && phase >= 0 && phase < every);
     if (!fits) throw new ControlError(`phases must be whole numbers from 0 to ${every - 1}, for all or for each of ${characters}`);
@@ -133,7 +129,7 @@ async function tablesOf(bundle: Bundle): Promise<Tables> {
   const [rows, codes] = bundle.manifest.tables?.codes?.shape ?? [];
   const gaits = (bundle.manifest.config?.gaits as string[] | undefined)?.length;
   const values = 4 * BONES.length + 1;
-  const table = async (name: string, dtype: string, shape: (number | undefined)[], least = -LARGEST, most = (_: number) => LARGEST) => {
+  const table = async (name: string, dtype: string, shape: (number | undefined)[], least = -FIELDS.LARGEST, most: (at: number) => number = () => FIELDS.LARGEST) => {
     const own = bundle.manifest.tables?.[name];
     if (own && (own.dtype !== dtype || `${own.shape}` !== `${shape}`)) {
       throw new BundleError(`table ${name} is ${own.dtype} (${own.shape}), not ${dtype} (${shape})`);
@@ -147,11 +143,11 @@ async function tablesOf(bundle: Bundle): Promise<Tables> {
   return {
     codes: (await table("codes", "float16", [rows, codes])) as Float32Array,
     moves: (await table("moves", "float32", [rows, 6])) as Float32Array,
-    features: (await table("features", "int8", [rows, FEATURES])) as Int8Array,
+    features: (await table("features", "int8", [rows, MATCHING.FEATURES])) as Int8Array,
     shows: (await table("shows", "uint8", [rows, gaits], 0, () => 1)) as Uint8Array,
     left: (await table("left", "int32", [rows], 0, (at) => rows! - 1 - at)) as Int32Array,
-    feature_mean: (await table("feature_mean", "float32", [FEATURES])) as Float32Array,
-    feature_scale: (await table("feature_scale", "float32", [FEATURES], 1e-6)) as Float32Array,
+    feature_mean: (await table("feature_mean", "float32", [MATCHING.FEATURES])) as Float32Array,
+    feature_scale: (await table("feature_scale", "float32", [MATCHING.FEATURES], 1e-6)) as Float32Array,
     pose_mean: (await table("pose_mean", "float32", [values])) as Float32Array,
     pose_basis: (await table("pose_basis", "float16", [codes, values])) as Float32Array,
   };

@@ -1,4 +1,5 @@
 /* A session of steered figures: commands in, within what gaits allow, and a pose a tick out. */
+import { BASE, GUIDED } from "./generated.js";
 import { doing, type Doing, noAct } from "./acting.js";
 import { type Act, actOf, numbersOf } from "./acts.js";
 import { type Point, sent } from "./arriving.js";
@@ -17,11 +18,7 @@ import { wrapped } from "./springs.js";
 import { hasten, standing, type Steered, tell, tick } from "./steered.js";
 import { between, type Played } from "./steering.js";
 
-/** A number of a command at most: metres, m/s, degrees. */
-const LARGEST = 1e6;
 const RADIANS = Math.PI / 180;
-/** Points of a path. */
-const LONGEST_PATH = 10_000;
 
 /** A pose as `posesOf` gives it, and where its figure is. */
 export interface SteeredPose extends Pose {
@@ -86,9 +83,6 @@ export interface ControlSnapshot {
   readonly holdFeet: boolean;
   readonly state: unknown;
 }
-
-/** Figures of a session. */
-export const LARGEST_CROWD = 100_000;
 
 /** Figures that move together, each steered separately. Angles are degrees about the vertical: 0 along z, positive to the left. */
 export class ControlSession {
@@ -183,7 +177,7 @@ export class ControlSession {
 
   /** The same along a path, from where they are to its first point, and so on to its last: of 1 to 10,000 points, for all. */
   goAlong(path: readonly (readonly number[])[], how: Way = {}): void {
-    if (!Array.isArray(path) || path.length < 1 || path.length > LONGEST_PATH) throw new ControlError(`a path needs 1 to ${LONGEST_PATH} points of x and z`);
+    if (!Array.isArray(path) || path.length < 1 || path.length > GUIDED.LONGEST_PATH) throw new ControlError(`a path needs 1 to ${GUIDED.LONGEST_PATH} points of x and z`);
     const points = path.map((point) => this.rows("points", point, ["x", "z"], 1)[0]!);
     const figures = this.who(how.who);
     this.send(figures, figures.map(() => points), how);
@@ -336,7 +330,7 @@ export class ControlSession {
     if (!Array.isArray(places) || !places.length) throw new ControlError("places needs x, z, facing, for each of the characters that are added");
     const { state, characters, model, holdFeet } = this;
     const count = Array.isArray(places[0]) ? places.length : 1;
-    if (characters + count > LARGEST_CROWD) throw new ControlError(`a session has up to ${LARGEST_CROWD} characters, not ${characters + count}`);
+    if (characters + count > BASE.LARGEST_CROWD) throw new ControlError(`a session has up to ${BASE.LARGEST_CROWD} characters, not ${characters + count}`);
     const turns = phases ?? model.phases(characters + count)?.slice(characters);
     const more = model.start({ characters: count, places, holdFeet, ...(gait !== undefined && { gait }), ...(turns !== undefined && { phases: turns }) });
     if (state.shown) more.advance(0);
@@ -394,8 +388,8 @@ export class ControlSession {
     const rows = (Array.isArray(given?.[0]) ? given : [given]) as readonly (readonly number[])[];
     const fits = rows.every((row) => row?.length === columns.length) && (rows.length === 1 || rows.length === count);
     if (!fits) throw new ControlError(`${what} needs ${columns.join(", ")}, for all or for each of ${count} characters`);
-    if (!rows.every((row) => Array.from(row).every((value) => typeof value === "number" && Math.abs(value) <= LARGEST))) {
-      throw new ControlError(`${what} must be finite numbers, no larger than ${LARGEST}`);
+    if (!rows.every((row) => Array.from(row).every((value) => typeof value === "number" && Math.abs(value) <= GUIDED.LARGEST_COMMAND))) {
+      throw new ControlError(`${what} must be finite numbers, no larger than ${GUIDED.LARGEST_COMMAND}`);
     }
     return rows.length === count ? rows : Array<readonly number[]>(count).fill(rows[0]!);
   }

@@ -1,3 +1,4 @@
+import { DESCRIBE, confidenceSettings } from "./generated.js";
 import type { NumberArray } from "./arrays.js";
 import { beamSearch, type Hypothesis, type Limits, scoreWords } from "./beam.js";
 import type { Manifest } from "./bundle.js";
@@ -7,10 +8,8 @@ import type { Graph } from "./graph.js";
 import { type Known, pathOf } from "./known.js";
 import { type Frames, LanguageModel } from "./model.js";
 import { type Noise, Pcg64 } from "./random.js";
+import { settingsOf } from "./settings.js";
 import { Vocabulary } from "./text.js";
-
-/** The probability below which none is told. */
-const LEAST = 1e-6;
 
 /** How descriptions are found: by default as the bundle says. */
 export interface DescribeSettings {
@@ -40,6 +39,8 @@ export interface Description {
 
 /** Sentences for a motion. */
 export class DescribeModel extends LanguageModel {
+  private readonly confidence = settingsOf("confidence", confidenceSettings, this.manifest.settings.confidence);
+
   constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>, private readonly known?: Known) {
     super(manifest);
   }
@@ -48,10 +49,9 @@ export class DescribeModel extends LanguageModel {
   async describe(frames: Frames, settings: DescribeSettings = {}): Promise<Description[]> {
     const decoding = settings.decoding ?? (this.known && settings.draws === undefined ? "known" : undefined);
     if (decoding === "known") return this.answers(frames, settings);
-    const least = this.manifest.settings.confidence?.log_probability ?? -5.5;
     const found = await this.hypotheses(frames, settings);
     return found.map(({ ids, logProbability, score }) => {
-      return { text: this.vocabulary.decode(ids), logProbability, score, confident: logProbability >= least };
+      return { text: this.vocabulary.decode(ids), logProbability, score, confident: logProbability >= this.confidence.log_probability };
     });
   }
 
@@ -59,12 +59,12 @@ export class DescribeModel extends LanguageModel {
   private async answers(frames: Frames, settings: DescribeSettings): Promise<Description[]> {
     if (!this.known) throw new DecodingError("no motion is known: choose beam or consensus");
     if (settings.draws !== undefined) throw new DecodingError("known motions answer without draws: leave them out, or choose consensus");
-    const beams = this.setting("beams", settings.beams ?? this.manifest.defaults.beams ?? 5);
+    const beams = this.setting("beams", settings.beams);
     const { vector } = await this.graphs.space!.run(this.motion(frames));
     const { known, manifest } = this;
     const found = known.answers(vector!.data as Float32Array, frames.length / this.fps, pathOf(frames, manifest.motion), beams);
     return found.map(({ text, probability }) => {
-      const logProbability = Math.log(Math.max(probability, LEAST));
+      const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST));
       return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
     });
   }
@@ -72,12 +72,12 @@ export class DescribeModel extends LanguageModel {
   /** Sentences that are written, as ids of words; noise: what draws are made by, instead of a seed. */
   async hypotheses(frames: Frames, settings: DescribeSettings = {}, noise?: Noise): Promise<Hypothesis[]> {
     const limits = this.limits(settings.maxWords);
-    const beams = this.setting("beams", settings.beams ?? this.manifest.defaults.beams ?? 5);
+    const beams = this.setting("beams", settings.beams);
     const drawing = settings.decoding ? settings.decoding === "consensus" : this.manifest.loop === "consensus";
-    const draws = settings.draws ?? (drawing ? (this.manifest.defaults.draws ?? 100) : undefined);
+    const draws = settings.draws ?? (drawing ? this.setting("draws") : undefined);
     if (draws === undefined) return beamSearch(this.graphs.step!, await this.context(frames), limits, beams);
     const given = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
-    const temperature = this.setting("temperature", settings.temperature ?? this.manifest.defaults.temperature ?? 1);
+    const temperature = this.setting("temperature", settings.temperature);
     const context = await this.context(frames);
     const found = await consensus(this.graphs.step!, context, limits, this.setting("draws", draws), temperature, given);
     return found.slice(0, beams);

@@ -1,8 +1,6 @@
 /* Euler angles in radians: an order such as "zyx" is the product Rz Ry Rx, and angles are listed as the order is. */
+import { ROTATIONS } from "./generated.js";
 import { about, product, type Quaternion, rotated, type Vector, X, Y, Z } from "./rotations.js";
-
-/** Gimbal lock: below this cosine of the middle angle the other two turn about the same axis. */
-const LOCKED = 1e-9;
 
 export function fromEuler(angles: Vector, order: string): Quaternion {
   const [a, b, c] = angles.map((angle, at) => about([X, Y, Z]["xyz".indexOf(order[at]!)]!, angle)) as [Quaternion, Quaternion, Quaternion];
@@ -14,7 +12,7 @@ export function eulersOf(turns: Quaternion[], order: string): Vector[] {
   let free = 0;
   const found = turns.map((turn): Vector => {
     const [first, middle, last] = toEuler(turn, order);
-    if (Math.abs(middle) <= Math.PI / 2 - LOCKED) {
+    if (Math.abs(middle) <= Math.PI / 2 - ROTATIONS.LOCKED) {
       free = last;
       return [first, middle, last];
     }
@@ -57,7 +55,7 @@ export function toEuler(turn: Quaternion, order: string): Vector {
   const sign = handedness(order);
   const cosine = Math.hypot(entry(i, i), entry(i, j));
   const middle = Math.atan2(sign * entry(i, k), cosine);
-  if (cosine < LOCKED) return [Math.atan2(sign * entry(k, j), entry(j, j)), middle, 0];
+  if (cosine < ROTATIONS.LOCKED) return [Math.atan2(sign * entry(k, j), entry(j, j)), middle, 0];
   return [Math.atan2(-sign * entry(j, k), entry(k, k)), middle, Math.atan2(-sign * entry(i, j), entry(i, i))];
 }
 

@@ -1,4 +1,5 @@
 /* What happens to a live figure from one tick to the next: feet come down, it leaves the ground and lands; as motet/motion/events.py says. */
+import { EVENTS } from "./generated.js";
 
 /** A foot came down, both feet left the ground ("take-off", also between the steps of a run), one came down again, the figure
  *  now moves in another gait, whose name is told, it has arrived where it was to go, or an act, whose name is told, was begun or is
@@ -7,11 +8,6 @@ export interface FigureEvent {
   kind: "left foot" | "right foot" | "take-off" | "landing" | "gait" | "arrived" | "act ended" | "act begun";
   name?: string;
 }
-
-/** A foot comes down where its contact rises above the first, once it has been below the second. */
-const [DOWN, UP] = [0.5, 0.2];
-/** Ticks without a foot on the ground after which a figure has taken off. */
-const FLIES = 2;
 
 /** What a figure does, and for how many ticks it has. */
 export interface Act {
@@ -30,10 +26,10 @@ export interface Happenings {
 
 /** Those of the next tick; shows: whether the gait that is asked for is played, where it begins. before: null in the first tick. */
 export function after(before: Happenings | null, contacts: readonly [number, number], gait: number, shows: boolean, arrived: boolean, act: Act | null): Happenings {
-  const foot = (side: 0 | 1) => (before?.down[side] ? contacts[side] >= UP : contacts[side] > DOWN);
+  const foot = (side: 0 | 1) => (before?.down[side] ? contacts[side] >= EVENTS.UP : contacts[side] > EVENTS.DOWN);
   const down: [boolean, boolean] = [foot(0), foot(1)];
   const flies = !down[0] && !down[1];
-  if (!before) return { down, air: flies ? FLIES : 0, gait, arrived, act };
+  if (!before) return { down, air: flies ? EVENTS.FLIES : 0, gait, arrived, act };
   return { down, air: flies ? before.air + 1 : 0, gait: shows ? gait : before.gait, arrived, act };
 }
 
@@ -43,8 +39,8 @@ export function eventsOf(now: Happenings, earlier: Happenings | null, gaits: rea
   const found: FigureEvent[] = [];
   if (now.down[0] && !before.down[0]) found.push({ kind: "left foot" });
   if (now.down[1] && !before.down[1]) found.push({ kind: "right foot" });
-  if (now.air >= FLIES && before.air < FLIES) found.push({ kind: "take-off" });
-  if (now.air === 0 && before.air >= FLIES) found.push({ kind: "landing" });
+  if (now.air >= EVENTS.FLIES && before.air < EVENTS.FLIES) found.push({ kind: "take-off" });
+  if (now.air === 0 && before.air >= EVENTS.FLIES) found.push({ kind: "landing" });
   if (now.gait !== before.gait) found.push({ kind: "gait", name: gaits[now.gait]! });
   if (now.arrived && !before.arrived) found.push({ kind: "arrived" });
   const begun = now.act?.age === 0 ? now.act : null;

@@ -1,15 +1,15 @@
+import { RETARGET } from "./generated.js";
 import { SIDES } from "./humanoid.js";
 import {
+
   cross, dot, inverse, mean, minus, ofVector, plus, product, type Quaternion, rotated, times, unit, type Vector,
 } from "./rotations.js";
 import type { Skeleton } from "./skeleton.js";
 
 /** What the names of a finger's joints hold, and how far it is bent in a relaxed hand, times a finger's bend. */
-const SHARES: [RegExp, number][] = [[/thumb/, 0.5], [/index/, 0.8], [/mid/, 1], [/ring/, 1.15], [/pinky|little/, 1.3]];
+const SHARES = Object.entries(RETARGET.FINGER_SHARES).map(([words, share]): [RegExp, number] => [new RegExp(words), share]);
 const THUMB = 0;
 const INDEX = 1;
-/** Degrees by which the bones of a finger at rest bend, each against the one before. */
-const BENDS = [15, 25, 15];
 
 /** Local rotations of a pose with its hands relaxed (docs/retargeting.md, "Fingers"); joints: of "leftHand", "rightHand". */
 export function relaxed(skeleton: Skeleton, still: Quaternion[], joints: Record<string, number>): Quaternion[] {
@@ -39,11 +39,11 @@ function bendFingers(fingers: Map<number, number[]>, hand: number, sign: number,
     const pointing: Vector[] = bones.length ? [...bones, bones.at(-1)!] : [[0, 0, 0]];
     const start = finger === THUMB ? pointing[0]! : along;
     const axis = cross(start, finger === THUMB ? plus(palm, across) : palm);
-    chain.slice(0, Math.min(pointing.length, BENDS.length)).forEach((joint, at) => {
+    chain.slice(0, Math.min(pointing.length, RETARGET.FINGER_BENDS.length)).forEach((joint, at) => {
       const [before, bone] = [at ? pointing[at - 1]! : start, pointing[at]!];
       const aside = unit(minus(axis, times(bone, dot(axis, bone))));
       const now = Math.atan2(dot(cross(before, bone), aside), dot(before, bone) - dot(before, aside) * dot(bone, aside));
-      const turn = times(aside, Math.max(0, ((BENDS[at]! * Math.PI) / 180) * SHARES[finger]![1] - now));
+      const turn = times(aside, Math.max(0, ((RETARGET.FINGER_BENDS[at]! * Math.PI) / 180) * SHARES[finger]![1] - now));
       bent[joint] = product(bent[joint]!, ofVector(rotated(inverse(turns[joint]!), turn)));
     });
   }

@@ -1,9 +1,10 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/bundle.md, "The foot lock". */
+import { LOCK, footLockSettings } from "./generated.js";
 import { BONES, HUMANOID, LEG, SIDES, SOLES } from "./humanoid.js";
 import { TwoBones } from "./twoBones.js";
 import { about, inverse, minus, plus, product, type Quaternion, rotated, type Vector, X, Y } from "./rotations.js";
 import { damped, dampingOf } from "./springs.js";
-import type { LockSettings } from "./steeringSettings.js";
+import type { Settings } from "./settings.js";
 import type { Played } from "./steering.js";
 
 export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
@@ -12,8 +13,6 @@ export const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[H
 /** Points of a sole, heel, ball and tip, and which joint of a leg carries each. */
 const POINTS = LEG.flatMap((part, joint) => (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]));
 const BALL = 1;
-/** Half-life in seconds in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward. */
-const LIFTS = 0.035;
 
 /** Of one foot: by how much it is moved along x and z and how high it steps, how fast these change, and where the points of its
  *  sole were. */
@@ -33,7 +32,7 @@ export function newLock(): Lock {
 }
 
 /** The next pose, a tick later, with standing feet held in place and above the ground. */
-export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): Played {
+export function held(lock: Lock, pose: Played, how: Settings<typeof footLockSettings>, dt: number): Played {
   const [x, z, facing] = pose.ground;
   const hips = product(about(Y, facing), pose.rotations[0]!);
   const rotations = [...pose.rotations];
@@ -46,7 +45,7 @@ export function held(lock: Lock, pose: Played, how: LockSettings, dt: number): P
     const moved = shift(foot, minus(soles[bears]!, (foot.soles ?? soles)[bears]!), contact > how.stands, how, dt);
     foot.soles = soles;
     const steps = contact * how.steps * Math.min(1, moved / (how.swings * dt));
-    const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(LIFTS), dt);
+    const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(LOCK.LIFTS), dt);
     foot.height = [steps + off, rise];
     const lift = Math.max(0, steps + off - soles[lowest]![1]);
     if (foot.shift[0] || foot.shift[1] || lift) reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
@@ -73,7 +72,7 @@ export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, r
 }
 
 /** Move a foot whose point that bears it was moved since the last tick; how far that is then shown to move. */
-function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: LockSettings, dt: number): number {
+function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: Settings<typeof footLockSettings>, dt: number): number {
   const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
   if (contact && Math.hypot(x, z) < how.swings * dt && Math.hypot(...stay) < how.farthest) {
     [foot.shift, foot.drift] = [stay, [0, 0]];

@@ -1,8 +1,9 @@
 /* What a figure can be asked: gaits with their speeds, and commands within them. Metres a second and radians. */
+import { steeringSettings } from "./generated.js";
 import { ControlError } from "./errors.js";
 import type { Target } from "./matching.js";
 import { clamp, wrapped } from "./springs.js";
-import type { Steering } from "./steeringSettings.js";
+import type { Settings } from "./settings.js";
 
 /** The slowest, the usual, and the fastest speed forward, sideways and backwards; 0 where a gait cannot go that way. */
 export type Speeds = readonly [slowest: number, usual: number, forward: number, sideways: number, backwards: number];
@@ -22,7 +23,7 @@ export class Gaits {
   constructor(
     readonly names: readonly string[],
     readonly speeds: readonly Speeds[],
-    private readonly how: Steering,
+    private readonly how: Settings<typeof steeringSettings>,
   ) {}
 
   /** The number of a gait; ControlError for an unknown one. */

@@ -1,3 +1,4 @@
+import { GENERATE_CODES, continuationSettings, familiaritySettings } from "./generated.js";
 import type { Bundle, Manifest } from "./bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
 import { FUNCTION_WORDS, partsOf, sentencesOf, stem, verbsOf } from "./composition.js";
@@ -7,6 +8,7 @@ import type { Graph } from "./graph.js";
 import { Memory } from "./memory.js";
 import { type Frames, LanguageModel } from "./model.js";
 import { type Noise, Pcg64, stateOf } from "./random.js";
+import { settingsOf } from "./settings.js";
 
 /** How motions are drawn: by default as the bundle says. */
 export interface GenerateSettings extends Partial<Drawing> {
@@ -94,11 +96,6 @@ interface Piece {
   steps: number;
 }
 
-const STANDING = { text: "a person stands still", seconds: 0.8 };
-
-/** Log-probability of an action that is not drawn. */
-const NEVER = -1e9;
-
 /** What is said of a sentence whose action lacks words of it. */
 function leftOut(sentence: string, { action, lacking }: Shown): string {
   return `'${sentence}' is read as '${action}', which leaves out ${lacking.map((word) => `'${word}'`).join(", ")}`;
@@ -106,6 +103,8 @@ function leftOut(sentence: string, { action, lacking }: Shown): string {
 
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
+  private readonly familiarity = settingsOf("familiarity", familiaritySettings, this.manifest.settings.familiarity);
+  private readonly continuation = settingsOf("continuation", continuationSettings, this.manifest.settings.continuation);
   private readonly verbs: ReturnType<typeof verbsOf>;
 
   constructor(
@@ -179,7 +178,7 @@ export class GenerateModel extends LanguageModel {
     if (!confident) throw new TextError(`'${sentence}' is outside the training data (confidence ${confidence.toFixed(2)}); nearest: ${near}`);
     const shown = this.shownAs(sentence, context.indexOf(Math.max(...context)), context);
     if (shown.lacking.length) throw new TextError(leftOut(sentence, shown));
-    return context.map((value, action) => (this.lacking(sentence, action).length ? NEVER : value));
+    return context.map((value, action) => (this.lacking(sentence, action).length ? GENERATE_CODES.NEVER : value));
   }
 
   /** The same by noise that is given for each motion. */
@@ -247,7 +246,7 @@ export class GenerateModel extends LanguageModel {
     const heard = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : 0), 0);
     const all = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : unheard), 0);
     const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
-    const { confident = 0.4, doubt = 0.25 } = this.manifest.settings.familiarity ?? {};
+    const { confident, doubt } = this.familiarity;
     const confidence = (heard / (all || 1)) * Math.exp(context[order[0]!]!) ** doubt;
     const nearest = [...new Set(order.map((action) => actions[action]!.sentence))].slice(0, 3);
     return { confidence, confident: confidence >= confident, nearest };
@@ -282,8 +281,8 @@ export class GenerateModel extends LanguageModel {
     const seconds = each.map((one) => (one === null ? 0 : this.setting("seconds", one)));
     for (const end of ["start", "end"] as const) {
       if (given.stand !== end && given.stand !== "both") continue;
-      texts[end === "start" ? "unshift" : "push"](STANDING.text);
-      seconds[end === "start" ? "unshift" : "push"](STANDING.seconds);
+      texts[end === "start" ? "unshift" : "push"](GENERATE_CODES.STANDING);
+      seconds[end === "start" ? "unshift" : "push"](GENERATE_CODES.STANDING_SECONDS);
     }
     texts.forEach((text) => this.words(text));
     const longest = this.steps(this.setting("max_seconds", given.max_seconds));
@@ -326,8 +325,7 @@ export class GenerateModel extends LanguageModel {
   /** The last seconds, whole steps of codes, of a motion. */
   private async continued(after: Frames): Promise<Context> {
     const { hop } = this.codec;
-    const seconds = this.manifest.settings.continuation?.context ?? 4;
-    const frames = this.checked(after, this.manifest.motion.channels.length, 2 * hop).slice(-this.steps(seconds) * hop);
+    const frames = this.checked(after, this.manifest.motion.channels.length, 2 * hop).slice(-this.steps(this.continuation.context) * hop);
     const whole = frames.slice(frames.length % hop);
     return { frames: whole, codes: await codesOf(this.codec, whole) };
   }
@@ -353,7 +351,7 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
     ahead: ahead.reduce((sum, one) => sum + one, 0),
     hop,
     fps: manifest.motion.fps,
-    halfLife: manifest.settings.continuation?.half_life ?? 0.1,
+    halfLife: settingsOf("continuation", continuationSettings, manifest.settings.continuation).half_life,
   };
   return new GenerateModel(manifest, encoder!, source, codec);
 }

@@ -1,10 +1,11 @@
 /* Writing GLB files whose nodes are the humanoid in a T-pose: VRM Animation, docs/formats.md, and motions with a body. */
+import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";
 import { BONES, FINGERED, groundUnder, HUMANOID, solePoints } from "./humanoid.js";
 import { checked, type Motion, worldOf } from "./motion.js";
 import { minus, plus, type Quaternion, STILL, type Vector } from "./rotations.js";
-import { END, type Skeleton } from "./skeleton.js";
+import type { Skeleton } from "./skeleton.js";
 import { onHumanoid } from "./retarget.js";
 
 type Numbers = Float32Array | Uint32Array | Uint16Array;
@@ -121,7 +122,7 @@ function animation(buffer: Buffer, { fps, rotations, translations }: Motion): ob
     samplers.push({ input: values.length === rotations.length ? times : start, output: buffer.add(values), interpolation: "LINEAR" });
   };
   HUMANOID.names.forEach((name, at) => {
-    if (!name.endsWith(END)) track(at, "rotation", nearby(rotations.map((turns) => turns[at]!)));
+    if (!name.endsWith(SKELETON.END_SUFFIX)) track(at, "rotation", nearby(rotations.map((turns) => turns[at]!)));
   });
   track(0, "translation", translations.map((moves): Vector => moves[0]!));
   const hands = relaxed(FINGERED, FINGERED.joints.map(() => STILL), Object.fromEntries(FINGERED.names.map((name, at) => [name, at])));

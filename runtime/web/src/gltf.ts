@@ -1,4 +1,5 @@
 /* The parts of a glTF 2.0 file (.glb, .vrm, .vrma, .gltf): its JSON object, its nodes as trees, its arrays of numbers. */
+import { GLTF_DATA } from "./generated.js";
 import { FormatError } from "./errors.js";
 import { normalised, plus, product, type Quaternion, quaternionOf, rotated, times, type Vector } from "./rotations.js";
 
@@ -78,7 +79,6 @@ export interface Local {
   scale?: Vector;
 }
 
-const MOST_NODES = 20_000;
 const WIDTHS: Record<string, number> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 };
 const READERS: Record<number, [size: number, most: number, read: (view: DataView, at: number) => number]> = {
   5120: [1, 127, (view, at) => view.getInt8(at)],
@@ -102,7 +102,7 @@ export class Gltf {
     private readonly buffers: Uint8Array[],
   ) {
     this.nodes = document.nodes ?? [];
-    if (this.nodes.length > MOST_NODES) throw new FormatError(`it has ${this.nodes.length} nodes: expected at most ${MOST_NODES}`);
+    if (this.nodes.length > GLTF_DATA.MAX_NODES) throw new FormatError(`it has ${this.nodes.length} nodes: expected at most ${GLTF_DATA.MAX_NODES}`);
     this.parents = this.nodes.map(() => -1);
     this.nodes.forEach(({ children = [] }, at) => {
       for (const child of children) {

@@ -1,4 +1,5 @@
 /* Reading glTF 2.0 and VRM: a figure's joints, and its animations as clips; every angle is 0 in the rest pose of the nodes. */
+import { GLTF, SKELETON } from "./generated.js";
 import { FormatError, MotionError } from "./errors.js";
 import { type Animation, Gltf, type Local, type Placed } from "./gltf.js";
 import { BONES } from "./humanoid.js";
@@ -6,11 +7,9 @@ import { mapOf } from "./jointMap.js";
 import { checked, type Motion, motionFrom } from "./motion.js";
 import { median, rounded } from "./numbers.js";
 import { cross, dot, inverse, mean, minus, normalised, ofVector, product, type Quaternion, rotated, size, STILL, unit, type Vector } from "./rotations.js";
-import { END, type Joint, type RestNode, Skeleton, unique } from "./skeleton.js";
+import { type Joint, type RestNode, Skeleton, unique } from "./skeleton.js";
 
-const PATHS: Record<string, number> = { rotation: 4, translation: 3, scale: 3 };
-const MOST_JOINTS = 3000;
-const MOST_SKINS = 500;
+const WIDTHS: Record<string, number> = GLTF.PATHS;
 
 /** The names of the animations that move a figure. FormatError as {@link readGLB}. */
 export function clipsOf(content: Uint8Array): string[] {
@@ -48,7 +47,7 @@ function guarded<T>(read: () => T): T {
 }
 
 function moves({ channels = [] }: Partial<Animation>): Set<number> {
-  const targets = channels.map(({ target }) => target).filter(({ node, path }) => PATHS[path] && node !== undefined);
+  const targets = channels.map(({ target }) => target).filter(({ node, path }) => WIDTHS[path] && node !== undefined);
   return new Set(targets.map(({ node }) => node!));
 }
 
@@ -66,7 +65,7 @@ function clips(gltf: Gltf, found: Set<number>[]): Animation[] {
  */
 function figures(gltf: Gltf): Set<number>[] {
   const skins = gltf.document.skins ?? [];
-  if (skins.length > MOST_SKINS) throw new FormatError(`it has ${skins.length} skins: expected at most ${MOST_SKINS}`);
+  if (skins.length > GLTF.MAX_SKINS) throw new FormatError(`it has ${skins.length} skins: expected at most ${GLTF.MAX_SKINS}`);
   const bones = new Set(gltf.humanoid().values());
   const moved = new Set((gltf.document.animations ?? []).flatMap((animation) => [...moves(animation)]));
   const given = [bones, ...skins.map(({ joints }) => new Set(joints))].filter((joints) => joints.size);
@@ -165,7 +164,7 @@ export function restOf(gltf: Gltf): { skeleton: Skeleton; joints: number[]; rest
 /** The figure that an animation moves most, counting its ancestors, else that with the most joints, in the animation's frames. */
 function taken(gltf: Gltf, found: Set<number>[], animation?: Animation): Motion {
   const moved = animation ? moves(animation) : new Set<number>();
-  const weight = (joints: Set<number>) => [...gltf.above(joints)].filter((node) => moved.has(node)).length * MOST_JOINTS + joints.size;
+  const weight = (joints: Set<number>) => [...gltf.above(joints)].filter((node) => moved.has(node)).length * GLTF.MAX_JOINTS + joints.size;
   const joints = jointsOf(gltf, found.reduce((best, one) => (weight(one) > weight(best) ? one : best)));
   const near = gltf.above(joints);
   const rest = gltf.world(near);
@@ -209,9 +208,9 @@ function turnedOnto(turn: Quaternion, bones: [atRest: Vector, bone: Vector][]): 
 function jointsOf(gltf: Gltf, joints: Set<number>): number[] {
   const outside = gltf.above([gltf.parents[top(gltf, joints)]!]);
   const inside = new Set([...gltf.above(joints)].filter((node) => !outside.has(node)));
-  const ends = (node: number) => gltf.name(node).endsWith(END) && inside.has(gltf.parents[node]!) && !gltf.nodes[node]!.children?.length;
+  const ends = (node: number) => gltf.name(node).endsWith(SKELETON.END_SUFFIX) && inside.has(gltf.parents[node]!) && !gltf.nodes[node]!.children?.length;
   const found = gltf.order.filter((node) => inside.has(node) || ends(node));
-  if (found.length > MOST_JOINTS) throw new FormatError(`its skeleton has ${found.length} joints: expected at most ${MOST_JOINTS}`);
+  if (found.length > GLTF.MAX_JOINTS) throw new FormatError(`its skeleton has ${found.length} joints: expected at most ${GLTF.MAX_JOINTS}`);
   return found;
 }
 
@@ -260,11 +259,11 @@ interface Keys {
 function tracks(gltf: Gltf, animation: Animation, nodes: Set<number>): { frames: Map<number, Local>[]; fps: number } {
   const keys: Keys[] = [];
   for (const { sampler, target: { node, path } } of animation.channels) {
-    if (node === undefined || !nodes.has(node) || !PATHS[path]) continue;
+    if (node === undefined || !nodes.has(node) || !WIDTHS[path]) continue;
     const { input, output, interpolation = "LINEAR" } = animation.samplers[sampler]!;
     const times = gltf.array(input).map(([time]) => time!);
     const values = gltf.array(output);
-    if (!times.length || values.length !== times.length * (interpolation === "CUBICSPLINE" ? 3 : 1) || values[0]!.length !== PATHS[path]) {
+    if (!times.length || values.length !== times.length * (interpolation === "CUBICSPLINE" ? 3 : 1) || values[0]!.length !== WIDTHS[path]) {
       throw new FormatError("its animation has tracks without keys, or with others than it says");
     }
     keys.push({ node, path, times, values, kind: interpolation });

@@ -1,9 +1,8 @@
 /* The rows that a gait may jump to, searched for the nearest one: an exact search that passes over boxes of rows. */
+import { MATCHING } from "./generated.js";
 
-/** What is asked, and features of rows, are whole numbers of 1/256 of a scaled unit, so that costs are exact sums. */
-export const STEPS = 256;
 /** A cost of 1: costs are in units of 1 / (2 STEPS^2). */
-export const UNIT = 2 * STEPS ** 2;
+export const UNIT = 2 * MATCHING.STEPS ** 2;
 /** Consecutive goals that share a box, and a larger one: they follow each other in a recording, so they are alike. */
 const SIZES = [8, 32] as const;
 /** The two features of where a row leads at the last of the horizons. */
@@ -65,12 +64,12 @@ export class Goals {
   /** By how much it costs to lead less than half as far: of the steps left and forward, and of being there. */
   private way(asked: Int16Array): [left: number, forward: number, half: number] {
     const { mean, scale, lag } = this;
-    const left = asked[LEFT]! / STEPS / scale[LEFT]! + mean[LEFT]!;
-    const forward = asked[FORWARD]! / STEPS / scale[FORWARD]! + mean[FORWARD]!;
+    const left = asked[LEFT]! / MATCHING.STEPS / scale[LEFT]! + mean[LEFT]!;
+    const forward = asked[FORWARD]! / MATCHING.STEPS / scale[FORWARD]! + mean[FORWARD]!;
     const far = Math.hypot(left, forward);
     const [x, z] = [(lag * left) / Math.max(far, 1e-6), (lag * forward) / Math.max(far, 1e-6)];
     const half = (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!;
-    return [2 * Math.round((STEPS * x) / scale[LEFT]!), 2 * Math.round((STEPS * z) / scale[FORWARD]!), 2 * STEPS * Math.round(STEPS * half)];
+    return [2 * Math.round((MATCHING.STEPS * x) / scale[LEFT]!), 2 * Math.round((MATCHING.STEPS * z) / scale[FORWARD]!), 2 * MATCHING.STEPS * Math.round(MATCHING.STEPS * half)];
   }
 
   private least(asked: Int16Array, bound: number): { at: number; cost: number } {

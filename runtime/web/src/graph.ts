@@ -1,3 +1,4 @@
+import { FIELDS } from "./generated.js";
 import type { InferenceSession, TypedTensor } from "onnxruntime-web";
 import type { NumberArray } from "./arrays.js";
 import { BundleError } from "./errors.js";
@@ -72,7 +73,7 @@ export class Graph {
     for (const [name, tensor] of Object.entries(outputs)) {
       const data = tensor.data as Float32Array | BigInt64Array;
       found[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
-      if (!bounded(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${LARGEST}`);
+      if (!bounded(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${FIELDS.LARGEST}`);
     }
     return found;
   }
@@ -107,12 +108,9 @@ function singles(data: NumberArray["data"]): Float32Array {
   return data instanceof Float32Array ? data : Float32Array.from(data as ArrayLike<unknown>, Number);
 }
 
-/** What no output's number is beyond: squares of larger ones would not be finite. */
-const LARGEST = 1e9;
-
 /** Whether all numbers are finite and within bounds. */
 function bounded(data: Float32Array): boolean {
-  for (let at = 0; at < data.length; at++) if (!(Math.abs(data[at]!) <= LARGEST)) return false;
+  for (let at = 0; at < data.length; at++) if (!(Math.abs(data[at]!) <= FIELDS.LARGEST)) return false;
   return true;
 }
 

@@ -2,31 +2,21 @@
  * Graphs that could reach outside their own bytes, or never end, are refused before ONNX Runtime sees them:
  * docs/bundle.md, "What a reader has to refuse". The whole protocol buffer is walked, with every graph in an attribute.
  */
+import { GRAPH_SAFETY } from "./generated.js";
 import { BundleError } from "./errors.js";
 
 interface Message {
-  plain: number[];
-  nested: Record<number, string>;
-  domain?: number;
+  readonly plain: readonly number[];
+  readonly nested: Readonly<Record<number, string>>;
+  /** The field that names the domain of operators, 0 for none. */
+  readonly domain: number;
 }
 
 /** The fields of onnx.proto by number: plain ones, and messages that are looked into. All others are refused. */
-const MESSAGES: Record<string, Message> = {
-  model: { plain: [1, 2, 3, 4, 5, 6, 14], nested: { 7: "graph", 8: "opset" } },
-  opset: { plain: [1, 2], nested: {}, domain: 1 },
-  graph: { plain: [2, 10, 11, 12, 13, 14, 16], nested: { 1: "node", 5: "tensor", 15: "sparse" } },
-  node: { plain: [1, 2, 3, 4, 6, 7, 8, 9], nested: { 5: "attribute" }, domain: 7 },
-  attribute: {
-    plain: [1, 2, 3, 4, 7, 8, 9, 13, 14, 15, 20],
-    nested: { 5: "tensor", 6: "graph", 10: "tensor", 11: "graph", 22: "sparse", 23: "sparse" },
-  },
-  sparse: { plain: [3], nested: { 1: "tensor", 2: "tensor" } },
-  tensor: { plain: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 16], nested: {} },
-};
+const MESSAGES: Record<string, Message> = GRAPH_SAFETY.MESSAGES;
+
 const OPERATOR = 4; // of a node
 const LOCATION = 14; // of a tensor's data: 0 is in the file
-const MAX_DEPTH = 64;
-const MAX_FIELDS = 100_000;
 
 /** BundleError where an ONNX model is damaged, could read other files, run foreign operators or loop for ever. */
 export function checkGraph(model: Uint8Array): void {
@@ -37,9 +27,9 @@ export function checkGraph(model: Uint8Array): void {
   let count = 0;
   for (let next = waiting.pop(); next; next = waiting.pop()) {
     const [kind, data, depth] = next;
-    if (depth > MAX_DEPTH) throw new BundleError(`the graph is nested more than ${MAX_DEPTH} messages deep`);
+    if (depth > GRAPH_SAFETY.MAX_DEPTH) throw new BundleError(`the graph is nested more than ${GRAPH_SAFETY.MAX_DEPTH} messages deep`);
     for (const [number, value] of fields(data)) {
-      if (++count > MAX_FIELDS) throw new BundleError(`the graph has more than ${MAX_FIELDS} fields`);
+      if (++count > GRAPH_SAFETY.MAX_FIELDS) throw new BundleError(`the graph has more than ${GRAPH_SAFETY.MAX_FIELDS} fields`);
       const inner = MESSAGES[kind]!.nested[number];
       if (inner) waiting.push([inner, message(value), depth + 1]);
       else checkField(kind, number, value);

@@ -1,24 +1,11 @@
 /* Holding the feet of a whole motion: docs/retargeting.md, "Planting of feet". */
+import { CONTACTS, holdSettings } from "./generated.js";
 import { groundUnder, HUMANOID, isHumanoid, LEG, SIDES, solePoints } from "./humanoid.js";
 import { TwoBones } from "./twoBones.js";
 import { type Motion, motionFrom, worldOf } from "./motion.js";
 import { median, rise, rounded, smoothed, windows } from "./numbers.js";
 import { MotionError } from "./errors.js";
 import { product, rotated, type Vector, X } from "./rotations.js";
-
-/** Metres over the ground up to which a point of the sole stands, and from which on it does not; metres a second. */
-const HEIGHTS = [0.02, 0.05] as const;
-const SPEEDS = [0.3, 0.9] as const;
-/** Seconds: a speed is smoothed by a window of this deviation, and a shift, too. */
-const CALM = 0.015;
-/** Seconds: a foot off the ground for less stays where it stands. */
-const LIFTED = 0.1;
-/** Seconds in which a shift comes and goes. */
-const BLEND = 0.2;
-/** Metres by which a foot is shifted at most. */
-const FARTHEST = 0.15;
-/** Seconds in which a foot is lifted out of the ground. */
-const SOFT = 0.05;
 
 /** The motion of the humanoid with standing feet held in place and never below ground, by turning hips, knees and ankles. */
 export function holdFeet(motion: Motion): Motion {
@@ -50,13 +37,13 @@ function targets(legs: TwoBones[], points: Vector[][], fps: number): Vector[] {
   const found = legs.map((leg, at) => leg.eased([leg.ankle[0] + shifts[at]![0], leg.ankle[1], leg.ankle[2] + shifts[at]![1]]));
   const depth = found.map((target, at) => Math.max(0, -(Math.min(...points[at]!.map((point) => point[1])) + target[1] - legs[at]!.ankle[1])));
   // a mean over the window in which each is the deepest is as high as the one in the middle
-  const reach = Math.max(1, rounded(SOFT * fps));
+  const reach = Math.max(1, rounded(holdSettings.soft * fps));
   const deepest = windows(depth, reach).map((window) => Math.max(...window));
   const bell = Array.from({ length: 2 * reach + 1 }, (_, at) => 0.5 - 0.5 * Math.cos((2 * Math.PI * (at + 1)) / (2 * reach + 2)));
   const total = bell.reduce((sum, weight) => sum + weight);
   return windows(deepest, reach).map((window, at) => {
     const lift = window.reduce((sum, value, i) => sum + value * bell[i]!, 0) / total;
-    return [found[at]![0], found[at]![1] + Math.min(lift, FARTHEST), found[at]![2]];
+    return [found[at]![0], found[at]![1] + Math.min(lift, holdSettings.farthest), found[at]![2]];
   });
 }
 
@@ -69,26 +56,26 @@ function shiftsOf(points: Vector[][], fps: number): [number, number][] {
     const step = (axis: 0 | 2) => own.reduce((sum, value, k) => sum + (value / total) * (points[at + 1]![k]![axis] - points[at]![k]![axis]), 0);
     return [-strongest[at]! * step(0), -strongest[at]! * step(2)];
   });
-  const keys = stances(strongest, LIFTED * fps).map(([start, stop]) => {
+  const keys = stances(strongest, holdSettings.lifted * fps).map(([start, stop]) => {
     const path = [[0, 0]];
     for (const [x, z] of undone.slice(start, stop)) path.push([path.at(-1)![0]! + x!, path.at(-1)![1]! + z!]);
     const middle = [0, 1].map((axis) => median(path.map((place) => place[axis]!)));
     return { start, values: path.map((place) => place.map((value, axis) => value - middle[axis]!)) };
   });
-  return smoothed(blended(keys, points.length, BLEND * fps), CALM * fps).map((shift) => {
+  return smoothed(blended(keys, points.length, holdSettings.blend * fps), CONTACTS.SOLES.calm * fps).map((shift) => {
     // no longer than the farthest; short ones are as they are within a few per cent
-    const factor = (1 + (Math.hypot(...shift) / FARTHEST) ** 4) ** -0.25;
+    const factor = (1 + (Math.hypot(...shift) / holdSettings.farthest) ** 4) ** -0.25;
     return [shift[0]! * factor, shift[1]! * factor];
   });
 }
 
 /** Contact of each point from each frame to the next, 0 to 1: low and slow. */
 export function contacts(points: Vector[][], fps: number): number[][] {
-  const calm = smoothed(points.map((frame) => frame.flatMap(([x, , z]) => [x, z])), CALM * fps);
+  const calm = smoothed(points.map((frame) => frame.flatMap(([x, , z]) => [x, z])), CONTACTS.SOLES.calm * fps);
   return points.slice(1).map((frame, at) =>
     frame.map((point, k) => {
       const speed = Math.hypot(calm[at + 1]![2 * k]! - calm[at]![2 * k]!, calm[at + 1]![2 * k + 1]! - calm[at]![2 * k + 1]!) * fps;
-      return (1 - rise((point[1] + points[at]![k]![1]) / 2, ...HEIGHTS)) * (1 - rise(speed, ...SPEEDS));
+      return (1 - rise((point[1] + points[at]![k]![1]) / 2, ...CONTACTS.SOLES.heights)) * (1 - rise(speed, ...CONTACTS.SOLES.speeds));
     }),
   );
 }

@@ -1,9 +1,10 @@
 /* The humanoid: the figure of the bundles, with the bones of VRM 1.0 (docs/humanoid.md). */
+import { SKELETON } from "./generated.js";
 import tables from "../../motet/motion/humanoid/humanoid.json";
 import type { World } from "./motion.js";
 import { quantile } from "./numbers.js";
 import { minus, plus, rotated, size, unit, type Vector } from "./rotations.js";
-import { END, type Joint, Skeleton } from "./skeleton.js";
+import { type Joint, Skeleton } from "./skeleton.js";
 
 type Places = Record<string, [parent: string, offset: Vector, order: string]>;
 
@@ -38,7 +39,7 @@ export const HUMANOID = new Skeleton(added(added([], trunk), left), 1);
 /** The humanoid, and after its joints VRM's fingers. */
 export const FINGERED = new Skeleton(added([...HUMANOID.joints], fingers), 1);
 
-export const BONES = HUMANOID.names.filter((name) => !name.endsWith(END));
+export const BONES = HUMANOID.names.filter((name) => !name.endsWith(SKELETON.END_SUFFIX));
 
 /** Where a bone of the humanoid points at rest. */
 export function directionOf(bone: string): Vector {

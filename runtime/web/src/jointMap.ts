@@ -1,8 +1,9 @@
 /* Which joint of a skeleton is which bone of the humanoid, by the names of joints: docs/retargeting.md, "The tables of names". */
+import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { ARM, LEG, SIDES } from "./humanoid.js";
 import type { Vector } from "./rotations.js";
-import { END, type Skeleton } from "./skeleton.js";
+import type { Skeleton } from "./skeleton.js";
 import { type Table, TABLES } from "./tables.js";
 
 /** The joints of a skeleton that are bones; spine and neck are all joints of a chain, upwards. */
@@ -133,7 +134,7 @@ function match(convention: Convention, skeleton: Skeleton, written: string[]) {
   const lacking = limbs.filter(([bone]) => joints[bone] === undefined && !convention.optional.has(bone)).length;
   const absent = lacking + chains.filter((bone) => !chain(bone).length).length + links;
   // other makers' figures of these names have joints besides, or rest in another pose
-  const whole = known >= skeleton.names.filter((name) => !name.endsWith(END)).length;
+  const whole = known >= skeleton.names.filter((name) => !name.endsWith(SKELETON.END_SUFFIX)).length;
   const axes = Object.fromEntries(names.flatMap((name, at) => (convention.axes[name] ? [[at, convention.axes[name]!]] : [])));
   const confidence = Math.round(100 * (1 - (0.3 * absent) / Math.max(absent + known, 1))) / 100;
   const { title, rest, points } = convention;

@@ -1,13 +1,9 @@
 /* What a motion shows, answered from known motions that are near it: docs/bundle.md, "Describe". */
+import { KNOWN, answerSettings } from "./generated.js";
 import type { Bundle, Manifest } from "./bundle.js";
 import { BundleError } from "./errors.js";
 import type { Frames } from "./model.js";
-
-/** What is said of a motion that is like none of those that are known, or too short to tell. */
-export const NOTHING = "no human motion that it knows";
-
-/** Where a sentence says that somebody goes; 0 if it does not say. */
-const [LEFT, RIGHT, STRAIGHT] = [1, -1, 2];
+import { type Settings, settingsOf } from "./settings.js";
 
 /** What a sentence says that somebody goes backwards by. */
 const BACKWARDS = /backward|in reverse|retreat/;
@@ -17,11 +13,6 @@ export interface Path {
   turn: number | undefined;
   ahead: number;
 }
-
-/** The settings of `answer`, with the values of bundles that do not say them. */
-const SETTINGS = {
-  near: 40, temperature: 0.07, turned: 45, straight: 25, backwards: 0.2, shortest: 0.5, sure: 0.8, outside: 0, bias: 0, share: 1,
-};
 
 /** The tables, row after row. */
 interface Tables {
@@ -36,13 +27,13 @@ interface Tables {
 
 /** Known motions and what is said of them. */
 export class Known {
-  readonly settings: typeof SETTINGS;
+  readonly settings: Settings<typeof answerSettings>;
   /** The different sets of kinds that sentences name, and which of them each sentence names. */
   private readonly sets: number[][];
   private readonly named: number[];
 
   private constructor(private readonly tables: Tables, private readonly shape: number[], private readonly kinds: number, given?: Record<string, number>) {
-    this.settings = { ...SETTINGS, ...given };
+    this.settings = settingsOf("answer", answerSettings, given);
     const rows = tables.sentences.map((_, row) => tables.names.subarray(row * kinds, (row + 1) * kinds).join());
     const order = [...new Set(rows)].sort(); // as zeros and ones they sort like numbers
     this.sets = order.map((one) => one.split(",").flatMap((said, kind) => (said === "1" ? [kind] : [])));
@@ -72,7 +63,7 @@ export class Known {
   /** Up to `count` sentences about a motion at a place of the space, of so many seconds, with such a path. */
   answers(vector: ArrayLike<number>, seconds: number, path: Path, count: number): { text: string; probability: number }[] {
     const { counted, similarity } = this.near(vector);
-    if (seconds < this.settings.shortest || similarity < this.settings.outside) return [{ text: NOTHING, probability: 0 }];
+    if (seconds < this.settings.shortest || similarity < this.settings.outside) return [{ text: KNOWN.NOTHING, probability: 0 }];
     const shares = this.shares(counted).map((share, set) => ({ share, set }));
     const best = shares.filter(({ share }) => share > 0).sort((a, b) => b.share - a.share || a.set - b.set);
     return best.slice(0, count).map(({ share, set }) => {
@@ -124,7 +115,7 @@ export class Known {
   /** The sentence that names a set of kinds: one whose way fits if there is any, and then the one that counts most. If it is about going, what it lacks of the way is added. */
   private sentence(set: number, counted: number[], { turn, ahead }: Path): string {
     const { said, ways, sentences } = this.tables;
-    const side = turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? LEFT! : RIGHT!;
+    const side = turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? KNOWN.LEFT : KNOWN.RIGHT;
     const rows = this.named.flatMap((one, row) => (one === set && counted[said[row]!]! > 0 ? [row] : []));
     const [best] = rows
       .map((row) => ({ row, fit: this.fit(row, turn, side), counts: counted[said[row]!]! }))
@@ -132,7 +123,7 @@ export class Known {
     const text = sentences[best!.row]!;
     if (!ways[3 * best!.row + 2]) return text;
     const back = ahead <= -this.settings.backwards && !BACKWARDS.test(text) ? ", backwards" : "";
-    const turning = side && ways[3 * best!.row] !== side ? `, turning ${side === LEFT ? "left" : "right"}` : "";
+    const turning = side && ways[3 * best!.row] !== side ? `, turning ${side === KNOWN.LEFT ? "left" : "right"}` : "";
     return text + back + turning;
   }
 
@@ -141,10 +132,10 @@ export class Known {
     if (turn === undefined) return 0;
     const [way, degrees] = this.tables.ways.subarray(3 * row, 3 * row + 2);
     if (degrees! > 0 && Math.abs(degrees! - Math.abs(turn)) > 30) return -1;
-    if (side) return way === side ? 1 : way === -side || way === STRAIGHT ? -1 : 0;
+    if (side) return way === side ? 1 : way === -side || way === KNOWN.STRAIGHT ? -1 : 0;
     // neither turned nor straight for certain: the other side alone is wrong
-    if (Math.abs(turn) > this.settings.straight) return way === (turn > 0 ? RIGHT : LEFT) ? -1 : 0;
-    return way === STRAIGHT ? 0.5 : way === LEFT || way === RIGHT ? -1 : 0;
+    if (Math.abs(turn) > this.settings.straight) return way === (turn > 0 ? KNOWN.RIGHT : KNOWN.LEFT) ? -1 : 0;
+    return way === KNOWN.STRAIGHT ? 0.5 : way === KNOWN.LEFT || way === KNOWN.RIGHT ? -1 : 0;
   }
 }
 

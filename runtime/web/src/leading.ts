@@ -1,13 +1,11 @@
 /* Commands of figures that are on their way to a point, and of those that keep apart, tick by tick: motet/models/leading.py. */
+import { LEADING } from "./generated.js";
 import { aside, keptApart } from "./apart.js";
 import { faces, onward, settle } from "./arriving.js";
 import type { ControlModel } from "./control.js";
 import type { Command, Gaits } from "./gaits.js";
 import type { Target } from "./matching.js";
 import { hasten, type Steered } from "./steered.js";
-
-/** m/s or radians by which a target changes in a tick, before rows are searched for it at once. */
-const SUDDEN = 0.2;
 
 /** Let those that are on a way go on, and those that move keep `room` metres apart, if it is not 0. */
 export function lead({ abilities, steerer, fps }: ControlModel, figures: Steered[], room: number): void {
@@ -19,7 +17,7 @@ export function lead({ abilities, steerer, fps }: ControlModel, figures: Steered
   }
   if (room) keepApart(abilities, figures, room);
   figures.forEach(({ playback, target, command }, at) => {
-    const sudden = target.some((value, i) => Math.abs(value - before[at]!.target[i]!) > SUDDEN);
+    const sudden = target.some((value, i) => Math.abs(value - before[at]!.target[i]!) > LEADING.SUDDEN);
     if (sudden || command.gait !== before[at]!.gait) hasten(playback);
   });
 }

@@ -1,4 +1,5 @@
 /* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/motion/looking.py says. */
+import { LOOKING } from "./generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { BONES, HUMANOID } from "./humanoid.js";
 import { about, inverse, minus, plus, product, type Quaternion, rotated, size, STILL, type Vector, Y, Z } from "./rotations.js";
@@ -6,22 +7,9 @@ import { clamp } from "./springs.js";
 import type { Played } from "./steering.js";
 
 /** Bones that turn, and the share of the turn that each and those below it make together. */
-const SHARES: [bone: number, share: number][] = (
-  [["chest", 0.1], ["upperChest", 0.25], ["neck", 0.55], ["head", 1]] as const
-).map(([name, share]) => [BONES.indexOf(name), share]);
+const SHARES = Object.entries(LOOKING.SHARES).map(([name, share]): [bone: number, share: number] => [BONES.indexOf(name), share]);
 const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
 const SPINE = BONES.indexOf("spine");
-/** Between the eyes, from the head's joint. */
-const EYES: Vector = [0, 0.07, 0.08];
-const RADIANS = Math.PI / 180;
-/** The largest angles of the gaze, to a side and up or down; beyond the last a figure goes on looking over the same shoulder. */
-const [ASIDE, UP, BEHIND] = [85 * RADIANS, 50 * RADIANS, 150 * RADIANS];
-/** Metres: nothing nearer to the eyes is looked at, and what is less aside than the second is hardly turned to. */
-const [NEAR, UNDER] = [0.2, 0.3];
-/** Radians below which nothing is turned. */
-const LEAST = 1e-4;
-/** Radians that the gaze follows in a tick at once, and the half-life in seconds in which it catches up with more. */
-const [LEAP, HALF_LIFE] = [10 * RADIANS, 0.18];
 
 /** What a figure looks at, and the angles by which its head is turned to the left and up, more than is played. */
 export interface Look {
@@ -36,10 +24,10 @@ export function ahead(): Look {
 
 /** A pose with the head turned, a tick after the last; the look goes on. */
 export function looked(look: Look, pose: Played, seconds: number): Played {
-  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LEAST)) return pose;
+  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOKING.LEAST)) return pose;
   const seen = bonesOf(pose);
   const now = angles(rotated(seen.at(-1)!, Z));
-  look.turn = followed(look.turn, wanted(look, pose, seen, now), LEAP, HALF_LIFE, seconds);
+  look.turn = followed(look.turn, wanted(look, pose, seen, now), LOOKING.LEAP, LOOKING.HALF_LIFE, seconds);
   const rotations = [...pose.rotations];
   let above: Quaternion = STILL;
   turned(seen, now[0], shownBy(look.turn)).forEach((bone, i) => {
@@ -53,11 +41,11 @@ export function looked(look: Look, pose: Played, seconds: number): Played {
 function wanted({ point, turn }: Look, pose: Played, seen: Quaternion[], now: [left: number, up: number]): number[] {
   if (!point) return [0, 0];
   const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
-  if (!(size(aim) > NEAR)) return [0, 0];
+  if (!(size(aim) > LOOKING.NEAR)) return [0, 0];
   let [left, up] = angles(aim);
-  if (Math.abs(left) > BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
-  left *= Math.min(Math.hypot(aim[0], aim[2]) / UNDER, 1);
-  return [clamp(left, -ASIDE, ASIDE) - now[0], clamp(up, -UP, UP) - now[1]];
+  if (Math.abs(left) > LOOKING.BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
+  left *= Math.min(Math.hypot(aim[0], aim[2]) / LOOKING.UNDER, 1);
+  return [clamp(left, -LOOKING.MOST[0], LOOKING.MOST[0]) - now[0], clamp(up, -LOOKING.MOST[1], LOOKING.MOST[1]) - now[1]];
 }
 
 /** Rotations of the bones that turn in the frame of the lower spine. */
@@ -80,7 +68,7 @@ function eyes(bones: Quaternion[]): Vector {
     place = plus(place, rotated(above, OFFSETS[SHARES[i]![0]]!));
     above = bone;
   });
-  return plus(place, rotated(above, EYES));
+  return plus(place, rotated(above, [...LOOKING.EYES]));
 }
 
 /** Of a direction, to the left and up. */

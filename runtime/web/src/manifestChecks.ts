@@ -1,8 +1,9 @@
 /* What a manifest must be for the rest to rely on it: types, ranges and references, each refused with its place. */
+import { FIELDS } from "./generated.js";
 import { DTYPES } from "./arrays.js";
 import { BundleError } from "./errors.js";
 
-const [MOST_SIZE, MOST_FPS, LARGEST_SETTING] = [2 ** 31, 1000, 1e9];
+const [MOST_SIZE, MOST_FPS] = [2 ** 31, 1000];
 const TENSOR_TYPES = ["float32", "int64", "bool"];
 const TEXTS = ["name", "version", "verb", "model", "loop"];
 const OBJECTS = ["files", "graphs", "tables", "golden", "motion", "defaults", "settings", "config"];
@@ -24,7 +25,7 @@ export function checkManifest(manifest: Fields): void {
   checkMotion(manifest.motion as Fields);
   for (const [feature, values] of entries(manifest.settings)) {
     for (const [key, value] of Object.entries(values)) {
-      const fits = typeof value !== "number" || Math.abs(value) <= LARGEST_SETTING;
+      const fits = typeof value !== "number" || Math.abs(value) <= FIELDS.LARGEST;
       check(fits && value !== null, `settings.${feature}.${key}`, "is no number of a setting");
     }
   }

@@ -1,8 +1,9 @@
 /* Motion matching, which recorded frame a figure plays next: docs/bundle.md, the loop `matching`. Metres, seconds, radians. */
-import { Goals, STEPS, UNIT } from "./goals.js";
+import { MATCHING, STEER, steeringSettings } from "./generated.js";
+import { Goals, UNIT } from "./goals.js";
 import type { Pose as Ground } from "./planar.js";
 import { clamp, damped, dampedPath, dampingOf, wrapped } from "./springs.js";
-import type { Steering } from "./steeringSettings.js";
+import type { Settings } from "./settings.js";
 
 /** The tables of a bundle, row by row: N rows, K codes of a pose, G gaits, P numbers of a pose. */
 export interface Tables {
@@ -46,25 +47,14 @@ export interface Playback {
   strideRate: number;
 }
 
-/** The slowest that a figure goes, m/s. */
-export const LEAST_PACE = 0.1;
-
-/** Features of where a row goes: places and facings in thirds of the horizon, and the speed. Those of how it is now follow. */
-export const TRAJECTORY = 13;
-export const FEATURES = TRAJECTORY + 21;
-/** In which tables hold a scaled unit of a feature. */
-const TABLE_STEPS = 16;
 /** Features that are asked are no larger, on either side of 0. */
 const LARGEST = 16;
 
 /** Triples of a mirror image: of feet, their velocities, hips and hands, in the order of the other side's. */
 const SWAPPED = [1, 0, 3, 2, 4, 6, 5];
-const COLUMNS = [...Array(TRAJECTORY).keys(), ...SWAPPED.flatMap((three) => [0, 1, 2].map((i) => TRAJECTORY + 3 * three + i))];
+const COLUMNS = [...Array(MATCHING.TRAJECTORY).keys(), ...SWAPPED.flatMap((three) => [0, 1, 2].map((i) => MATCHING.TRAJECTORY + 3 * three + i))];
 /** To the left is the first of a pair or a triple. */
-const SIGNS = COLUMNS.map((_, i) => (i < TRAJECTORY ? (i % 2 || i === TRAJECTORY - 1 ? 1 : -1) : (i - TRAJECTORY) % 3 ? 1 : -1));
-
-/** Rows before and after a row that are a stride, over which the hips' sway is none. */
-const STRIDE_ROWS = 15;
+const SIGNS = COLUMNS.map((_, i) => (i < MATCHING.TRAJECTORY ? (i % 2 || i === MATCHING.TRAJECTORY - 1 ? 1 : -1) : (i - MATCHING.TRAJECTORY) % 3 ? 1 : -1));
 
 /** Of each row the angle from the facing to where its recording goes in the stride around it. */
 function waysOf({ moves, left }: Tables): Float64Array {
@@ -77,7 +67,7 @@ function waysOf({ moves, left }: Tables): Float64Array {
   let start = 0; // of the recording
   return Float64Array.from({ length: rows }, (_, row) => {
     if (row && row + left[row]! !== row - 1 + left[row - 1]!) start = row;
-    const [first, stop] = [Math.max(start, row - STRIDE_ROWS), Math.min(row + left[row]!, row + STRIDE_ROWS) + 1];
+    const [first, stop] = [Math.max(start, row - MATCHING.STRIDE_ROWS), Math.min(row + left[row]!, row + MATCHING.STRIDE_ROWS) + 1];
     return Math.atan2(aside[stop]! - aside[first]!, forward[stop]! - forward[first]!);
   });
 }
@@ -96,14 +86,14 @@ export class Matcher {
   readonly goals: Goals[];
   /** Which gaits are faster than a creep. */
   private readonly creeps: boolean[];
-  private readonly asked = new Int16Array(FEATURES);
-  private readonly image = new Int16Array(FEATURES);
+  private readonly asked = new Int16Array(MATCHING.FEATURES);
+  private readonly image = new Int16Array(MATCHING.FEATURES);
 
   constructor(
     readonly tables: Tables,
     odd: number,
     readonly gaits: number,
-    readonly how: Steering,
+    readonly how: Settings<typeof steeringSettings>,
     readonly fps: number,
   ) {
     this.rows = tables.left.length;
@@ -112,7 +102,7 @@ export class Matcher {
     this.ways = waysOf(tables);
     this.reserve = Math.ceil((how.search_every + 1) * how.fastest) + 2;
     this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
-    this.features = Int16Array.from(tables.features, (step) => (step * STEPS) / TABLE_STEPS);
+    this.features = Int16Array.from(tables.features, (step) => (step * MATCHING.STEPS) / STEER.FEATURE_STEPS);
     const lasts = (row: number) => tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
     // what is played at its own rate leads to a leap, with arms that swing: it is entered well before
     const soon = Array.from({ length: how.prepares + 1 }, (_, at) => at);
@@ -120,7 +110,7 @@ export class Matcher {
     const all = [...Array(this.rows).keys()].filter((row) => lasts(row) && !leaps(row));
     this.goals = Array.from({ length: gaits }, (_, gait) => {
       const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % how.row_step === 0);
-      return new Goals(this.features, FEATURES, rows, tables.feature_mean, tables.feature_scale, how.lag);
+      return new Goals(this.features, MATCHING.FEATURES, rows, tables.feature_mean, tables.feature_scale, how.lag);
     });
     this.creeps = Array.from({ length: gaits }, (_, gait) => {
       const speeds = Float32Array.from({ length: this.rows }, (_, row) => (this.shows(row, gait) ? tables.moves[6 * row + 3]! : 0));
@@ -132,14 +122,14 @@ export class Matcher {
   /** Whether a figure is to go slower than recordings do. */
   creeping([x, z]: Target, gait: number): boolean {
     const pace = Math.hypot(x, z);
-    return this.creeps[gait]! && pace >= LEAST_PACE / 2 && pace < this.how.creep;
+    return this.creeps[gait]! && pace >= MATCHING.LEAST_PACE / 2 && pace < this.how.creep;
   }
 
   /** What a velocity over the ground is multiplied by to be as fast as recordings. */
   private hurry(x: number, z: number): number {
     const { creep } = this.how;
     const pace = Math.hypot(x, z);
-    return pace < creep ? creep / Math.max(pace, Math.min(LEAST_PACE, creep)) : 1;
+    return pace < creep ? creep / Math.max(pace, Math.min(MATCHING.LEAST_PACE, creep)) : 1;
   }
 
   /** The row of a gait with the least speed, the first of them; of those that something follows, on the ground. */
@@ -189,7 +179,7 @@ export class Matcher {
     this.ask(figure, row, target, creeps);
     const here = figure.mirror ? this.image : this.asked;
     const bias = creeps ? 0 : how.continuing * UNIT;
-    const bound = stays ? goals.cost(here, this.features, row * FEATURES) - bias : Infinity;
+    const bound = stays ? goals.cost(here, this.features, row * MATCHING.FEATURES) - bias : Infinity;
     const found = goals.nearest(this.asked, this.image, bound);
     if (!found) return;
     const ahead = found.row - row;
@@ -199,8 +189,8 @@ export class Matcher {
   /** What is asked for, as steps of features, and their mirror image: the row's own but for where it goes. */
   private ask(figure: Playback, row: number, target: Target, creeps: boolean): void {
     const { asked } = this;
-    const at = row * FEATURES;
-    for (let i = TRAJECTORY; i < FEATURES; i++) {
+    const at = row * MATCHING.FEATURES;
+    for (let i = MATCHING.TRAJECTORY; i < MATCHING.FEATURES; i++) {
       asked[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
     }
     this.lead(figure, target, creeps);
@@ -211,7 +201,7 @@ export class Matcher {
     const { asked, image } = this;
     const { feature_mean: mean, feature_scale: scale } = this.tables;
     this.trajectory(figure, target, creeps).forEach((value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)));
-    for (let i = 0; i < FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
+    for (let i = 0; i < MATCHING.FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
   }
 
   /** Where the springs lead, as features that are not yet scaled. */
@@ -238,19 +228,19 @@ export class Matcher {
 
   /** How a figure is: the features after those of the trajectory, scaled. */
   now({ row, mirror }: Playback): number[] {
-    const value = (i: number) => this.features[row * FEATURES + (mirror ? COLUMNS[i]! : i)]! * (mirror ? SIGNS[i]! : 1);
-    return Array.from({ length: FEATURES - TRAJECTORY }, (_, i) => value(TRAJECTORY + i) / STEPS);
+    const value = (i: number) => this.features[row * MATCHING.FEATURES + (mirror ? COLUMNS[i]! : i)]! * (mirror ? SIGNS[i]! : 1);
+    return Array.from({ length: MATCHING.FEATURES - MATCHING.TRAJECTORY }, (_, i) => value(MATCHING.TRAJECTORY + i) / MATCHING.STEPS);
   }
 
   /** Features after those of the trajectory, as the table has them. */
   scaled(features: number[]): number[] {
     const { feature_mean: mean, feature_scale: scale } = this.tables;
-    return features.map((value, i) => (value - mean[TRAJECTORY + i]!) * scale[TRAJECTORY + i]!);
+    return features.map((value, i) => (value - mean[MATCHING.TRAJECTORY + i]!) * scale[MATCHING.TRAJECTORY + i]!);
   }
 
   /** Let a figure go on from the row that fits best after being so, features after those of the trajectory, scaled. */
   follow(figure: Playback, target: Target, gait: number, now: number[]): void {
-    now.forEach((value, i) => (this.asked[TRAJECTORY + i] = stepsOf(value)));
+    now.forEach((value, i) => (this.asked[MATCHING.TRAJECTORY + i] = stepsOf(value)));
     this.lead(figure, target, this.creeping(target, gait));
     const { row, mirror } = this.goals[gait]!.nearest(this.asked, this.image, Infinity)!;
     Object.assign(figure, { row, part: 0, mirror, rate: 1, warp: 0, warpRate: 0, stride: 1, strideRate: 0 });
@@ -287,5 +277,5 @@ export class Matcher {
 
 /** A scaled feature in steps. */
 function stepsOf(value: number): number {
-  return Math.round(STEPS * clamp(Math.fround(value), -LARGEST, LARGEST));
+  return Math.round(MATCHING.STEPS * clamp(Math.fround(value), -LARGEST, LARGEST));
 }

@@ -1,4 +1,5 @@
 /* How a figure stands against the humanoid, measured once: docs/retargeting.md. */
+import { MEASURE } from "./generated.js";
 import { alignmentsOfPose, axesAgree, bodyFrame, RADIANS, restsInMotion } from "./alignment.js";
 import { Body } from "./body.js";
 import { calibrated } from "./calibration.js";
@@ -133,8 +134,6 @@ function checkedLeg(body: Body, pose: Vector[]): number {
   return leg;
 }
 
-const UNITS = { metres: 1, decimetres: 0.1, "CMU's unit": 0.0254 / 0.45, inches: 0.0254, centimetres: 0.01, millimetres: 0.001 };
-
 /** Metres of one unit of the skeleton, as it says or as the length of its legs tells; null where neither does. */
 export function unitOf({ metresPerUnit }: Skeleton, leg: number): { metres: number | null; note?: string } {
   if (metresPerUnit !== null) {
@@ -143,7 +142,7 @@ export function unitOf({ metresPerUnit }: Skeleton, leg: number): { metres: numb
   }
   // the unit in which legs are nearest to an adult's 0.82 m
   const off = (metres: number) => Math.abs(Math.log((leg * metres) / 0.82));
-  const likely = Object.entries(UNITS).filter(([, metres]) => leg * metres > 0.55 && leg * metres < 1.1);
+  const likely = Object.entries(MEASURE.LENGTH_UNITS).filter(([, metres]) => leg * metres > 0.55 && leg * metres < 1.1);
   const [name, metres] = likely.sort(([, a], [, b]) => off(a) - off(b))[0] ?? [];
   if (metres === undefined) return { metres: null, note: "unit not known: the figure is taken to be an adult's size" };
   return { metres, note: `unit taken to be ${name} from the length of the legs, ${(leg * metres).toFixed(2)} m` };

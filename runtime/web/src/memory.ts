@@ -1,34 +1,6 @@
+import { MEMORY } from "./generated.js";
 import type { NumberArray } from "./arrays.js";
 import { BundleError } from "./errors.js";
-
-/** Weights of the last step and those before it. */
-const PAST = [1, 0.5, 0.25];
-/** Places are drawn by exp(-distance / NEAR). */
-const NEAR = 0.5;
-/** What is added to a distance for each squared step of difference in age, and the most of it. */
-const LATER = 1 / 64;
-const LATEST = 2;
-/** The share of a motion's movement in which an action is taken up that follows another. */
-const EARLY = 0.3;
-/** The share of a motion's movement that may be left out from one step to the next. */
-export const LEAP = 0.3;
-/** What a step without movement counts beside the squared differences of codes' numbers. */
-const REST = 0.125;
-/** What the codes of a step count beside the squared differences of their numbers, where an act is looked for. */
-const POSE = 1;
-/** The share of the most that a number of steps can show from which on a start is as good. */
-const GOOD = 0.95;
-
-/** Steps of the shortest act: a recording that is not longer counts as one. */
-const WHOLE = 45;
-/** The share of a recording's act that shows it. */
-const ALL = 0.95;
-/** The squared distance of two places up to which the one shows what the other shows. */
-const ALIKE = 8.03;
-/** Steps that an act may be longer to begin, or end, as its recording does. */
-const UNLIKE = 30;
-/** The age of what is not shown. */
-const FAR = 2 ** 20;
 
 /** Of each row of an action its age, and the share of the action that is over before it. */
 interface Course {
@@ -67,9 +39,9 @@ export class Memory {
       this.shortest.set(action, steps.reduce((least, one) => Math.min(least, one)));
     }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
-    this.parts = this.over(changes.map((change) => REST + change));
+    this.parts = this.over(changes.map((change) => MEMORY.REST + change));
     const rare = this.rarity(body.shape[0]!, moves.shape[0]!);
-    this.particular = changes.map((change, row) => (POSE + change) * Math.exp(rare[row]!));
+    this.particular = changes.map((change, row) => (MEMORY.POSE + change) * Math.exp(rare[row]!));
     this.acts = this.over(this.particular);
   }
 
@@ -175,7 +147,7 @@ export class Memory {
       return starts[Math.floor(uniform * starts.length)]!;
     }
     const places = [...all.keys()];
-    const fitting = places.filter((at) => (age ? ages[at]! > 0 : over[at]! < EARLY) && over[at]! <= done + LEAP);
+    const fitting = places.filter((at) => (age ? ages[at]! > 0 : over[at]! < MEMORY.EARLY) && over[at]! <= done + MEMORY.LEAP);
     const used = fitting.length ? fitting : places;
     return this.near(used.map((at) => all[at]!), used.map((at) => ages[at]!), recent, age, ends, uniform);
   }
@@ -194,7 +166,7 @@ export class Memory {
         if (!pieces.has(this.lasts[row]!)) return;
         const age = this.ages[row]! - this.ages[take[first]!]!;
         const inside = age >= 0 && age <= last - first;
-        found.ages[at] = inside ? age : FAR;
+        found.ages[at] = inside ? age : MEMORY.FAR;
         found.over[at] = inside ? age / (last - first) : Infinity;
       });
     }
@@ -209,8 +181,8 @@ export class Memory {
     for (const piece of motions.sort((a, b) => this.ages[a[0]!]! - this.ages[b[0]!]!)) {
       const codes = (some: number[]) => some.map((row) => this.codes(row)).join();
       const place = (take: number[]) => this.ages[piece[0]!]! - this.ages[take[0]!]!;
-      const begin = codes(piece.slice(0, PAST.length));
-      const before = found.find(({ take }) => place(take) > 0 && codes(take.slice(place(take), place(take) + PAST.length)) === begin);
+      const begin = codes(piece.slice(0, MEMORY.PAST.length));
+      const before = found.find(({ take }) => place(take) > 0 && codes(take.slice(place(take), place(take) + MEMORY.PAST.length)) === begin);
       const last = this.lasts[piece[0]!]!;
       if (!before) found.push({ take: piece, pieces: new Set([last]) });
       else {
@@ -225,21 +197,21 @@ export class Memory {
   private act(take: number[]): [number, number] {
     const end = take.length - 1;
     let best: [number, number] = [0, end];
-    if (end <= WHOLE) return best;
-    const past = take.map((row) => PAST.map((_, back) => this.past(row, back)));
+    if (end <= MEMORY.WHOLE) return best;
+    const past = take.map((row) => MEMORY.PAST.map((_, back) => this.past(row, back)));
     const apart = take.map((row) => Float64Array.from(past, (seen) => this.distance(row, seen)));
-    const enough = ALL * take.reduce((sum, row) => sum + this.particular[row]!, 0);
-    const edge = (to: number, at: number) => Math.min(apart[to]![at]! / ALIKE, 1);
+    const enough = MEMORY.ALL * take.reduce((sum, row) => sum + this.particular[row]!, 0);
+    const edge = (to: number, at: number) => Math.min(apart[to]![at]! / MEMORY.ALIKE, 1);
     const shown = take.map(() => end + 1); // where each step is first shown, from a place on
     let least = Infinity;
     const found: [number, number, number][] = [];
     for (let first = end; first >= 0; first--) {
-      take.forEach((_, at) => (shown[at] = apart[first]![at]! <= ALIKE ? first : shown[at]!));
+      take.forEach((_, at) => (shown[at] = apart[first]![at]! <= MEMORY.ALIKE ? first : shown[at]!));
       const order = [...take.keys()].sort((a, b) => shown[a]! - shown[b]! || a - b);
       let [sum, k] = [0, 0];
       while (k < end && (sum += this.particular[take[order[k]!]!]!) < enough) k++;
-      for (let last = Math.max(shown[order[k]!]! + 1, first + WHOLE); last <= end; last++) {
-        found.push([last - first + UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))), first, last]);
+      for (let last = Math.max(shown[order[k]!]! + 1, first + MEMORY.WHOLE); last <= end; last++) {
+        found.push([last - first + MEMORY.UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))), first, last]);
       }
     }
     for (const [cost, first, last] of found.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
@@ -257,7 +229,7 @@ export class Memory {
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
       const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
       const most = shown.reduce((a, b) => Math.max(a, b));
-      const good = starts.filter((_, at) => shown[at]! >= GOOD * most);
+      const good = starts.filter((_, at) => shown[at]! >= MEMORY.GOOD * most);
       found.push(good[Math.floor(good.length / 2)]!);
       while (at < all.length && all[at]! <= last) at++;
     }
@@ -269,12 +241,12 @@ export class Memory {
   private near(rows: number[], ages: number[], recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
     const off = new Float64Array(rows.length);
     for (let at = 0; at < rows.length; at++) {
-      const later = LATER * (ages[at]! - age) ** 2;
-      off[at] = this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, LATEST));
+      const later = MEMORY.LATER * (ages[at]! - age) ** 2;
+      off[at] = this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, MEMORY.LATEST));
     }
     const least = off.reduce((a, b) => Math.min(a, b));
     let sum = 0;
-    const shares = off.map((value) => (sum += Math.exp((least - value) / NEAR)));
+    const shares = off.map((value) => (sum += Math.exp((least - value) / MEMORY.NEAR)));
     return rows[shares.findIndex((share) => share > uniform * sum)] ?? rows.at(-1)!;
   }
 
@@ -286,7 +258,7 @@ export class Memory {
 
   private distance(row: number, recent: Float32Array[]): number {
     let sum = 0;
-    for (let back = 0; back < PAST.length; back++) {
+    for (let back = 0; back < MEMORY.PAST.length; back++) {
       const seen = recent[Math.min(back, recent.length - 1)]!;
       const own = this.past(row, back);
       let apart = 0;
@@ -294,7 +266,7 @@ export class Memory {
         const off = own[at]! - seen[at]!;
         apart += off * off;
       }
-      sum += PAST[back]! * apart;
+      sum += MEMORY.PAST[back]! * apart;
     }
     return sum;
   }

@@ -1,36 +1,24 @@
 /* What the models of all verbs share: their manifest, settings, and checks of what they are given. */
+import { LANGUAGE, PREDICT, betweenSettings, codesSettings, consensusSettings, freeRunSettings, nearestSettings } from "./generated.js";
 import { integers, stacked } from "./arrays.js";
 import type { Manifest } from "./bundle.js";
 import { BundleError, DecodingError } from "./errors.js";
+import { fits, type Range } from "./settings.js";
 import { Vocabulary } from "./text.js";
 
 /** Frames in the channels and units of a model's contract (`manifest.motion`), one row each. */
 export type Frames = ArrayLike<number>[];
 
-/** The longest motion that is described. */
-const MAX_SECONDS = 30;
-
-/** Of each setting the least and the most, and whether it is a whole number. */
-const RANGES: Record<string, [number, number, boolean]> = {
-  max_words: [1, 1000, true],
-  beams: [1, 100, true],
-  draws: [1, 1000, true],
-  seed: [0, Number.MAX_SAFE_INTEGER, true],
-  hypotheses: [1, 100, true],
-  seconds: [1e-3, 600, false],
-  max_seconds: [0, 600, false],
-  temperature: [0.01, 100, false],
-  first_temperature: [0.01, 100, false],
-  top_p: [0.01, 1, false],
-  guidance: [0, 10, false],
-  memory: [0, 1, false],
-  certainty: [0.01, 100, false],
-  frames: [1, 100_000, true],
-  horizon: [1, 1000, true],
-  context: [1, 1000, true],
-  least: [1, 1000, true],
-  longest: [1, 1000, true],
-  count: [1, 1_000_000, true],
+/** Settings by name, with their ranges. */
+const RANGES: Record<string, Range> = {
+  ...consensusSettings,
+  ...codesSettings,
+  ...freeRunSettings,
+  ...betweenSettings,
+  count: { ...nearestSettings.count, high: 1_000_000 },
+  seconds: { ...codesSettings.seconds, low: 1e-3 },
+  seed: { default: null, low: 0, high: Number.MAX_SAFE_INTEGER, whole: true },
+  frames: { default: null, low: 1, high: PREDICT.MAX_FRAMES, whole: true },
 };
 
 export abstract class Model {
@@ -47,12 +35,12 @@ export abstract class Model {
     return frames;
   }
 
-  /** A setting that is given, or else the bundle's default; DecodingError where it is out of range. */
+  /** A setting that is given, or else the bundle's default, or the usual one; DecodingError where it is out of range. */
   protected setting(name: string, given?: number): number {
-    const value = given ?? this.manifest.defaults[name];
-    const [least, most, whole] = RANGES[name]!;
-    if (value === undefined || !(value >= least && value <= most) || (whole && !Number.isInteger(value))) {
-      throw new DecodingError(`${name} must be ${whole ? "a whole number " : ""}from ${least} to ${most}, not ${value}`);
+    const range = RANGES[name]!;
+    const value = given ?? this.manifest.defaults[name] ?? range.default;
+    if (value === null || !fits(value, range)) {
+      throw new DecodingError(`${name} must be ${range.whole ? "a whole number " : ""}from ${range.low} to ${range.high}, not ${value}`);
     }
     return value;
   }
@@ -74,7 +62,7 @@ export abstract class LanguageModel extends Model {
 
   protected motion(frames: Frames) {
     const given = this.checked(frames, this.manifest.motion.channels.length, 2);
-    const most = Math.floor(MAX_SECONDS * this.fps + 1e-9) + 1;
+    const most = Math.floor(LANGUAGE.MAX_SECONDS * this.fps + 1e-9) + 1;
     if (given.length > most) throw new DecodingError(`the motion has ${given.length} frames, but the model takes at most ${most}: cut it`);
     return { frames: stacked(given, 1, given.length, given[0]!.length), lengths: integers([given.length]) };
   }

@@ -1,4 +1,5 @@
 /* Hands that reach for points: two-bone inverse kinematics of an arm, within what a shoulder can do, as motet/motion/reaching.py says. */
+import { REACHING } from "./generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { ARM, BONES, HUMANOID, SIDES, SPINE } from "./humanoid.js";
 import { about, dot, inverse, minus, normalised, plus, product, type Quaternion, rotated, size, times, unit, type Vector, Y } from "./rotations.js";
@@ -10,18 +11,6 @@ const ARMS = SIDES.map((side) => ARM.map((part) => BONES.indexOf(side + part)));
 const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
 const TRUNK = SPINE.map((name) => BONES.indexOf(name));
 const RADIANS = Math.PI / 180;
-/** Metres from the wrist to the middle of the hand, which is what reaches. */
-const PALM = 0.09;
-/** The cosine of how far an arm turns from diagonally forward, to its own side. */
-const WIDEST = Math.cos(105 * RADIANS);
-/** Shares of the arm's length: between the first two away from the shoulder is reached exactly; by how much more an arm stretches. */
-const [NEAREST, STRAIGHT, STRETCHED] = [0.25, 0.95, 0.04];
-/** The weight below which an arm is as it is played. */
-const LEAST = 1e-3;
-/** Metres from a point at which a hand has reached it. */
-const REACHED = 0.02;
-/** Metres that a point may move in a tick and be followed at once, and the half-life in seconds in which a hand gets to a new one, and back. */
-const [LEAP, HALF_LIFE] = [0.1, 0.12];
 
 /** What a hand of a figure reaches for. aim: where it goes for it; weight: [0], the arm as it is played, to [1]; beyond: whether
  *  the point was out of reach in the last tick. */
@@ -39,14 +28,14 @@ export function idle(): Reach {
 
 /** A pose with the hand of a side there, a tick after the last; the reach goes on. */
 export function reached(hand: Reach, side: number, pose: Played, seconds: number): Played {
-  const rests = shownBy(hand.weight)[0]! < LEAST;
+  const rests = shownBy(hand.weight)[0]! < REACHING.LEAST;
   if (!hand.point && rests) return pose;
   const wanted = hand.point ?? hand.aim.wanted;
   // an arm that does not reach yet goes to the point by its weight alone
-  hand.aim = followed(rests ? followerAt([...wanted]) : hand.aim, [...wanted], LEAP, HALF_LIFE, seconds);
-  hand.weight = followed(hand.weight, [hand.point ? 1 : 0], 0.5, HALF_LIFE, seconds);
+  hand.aim = followed(rests ? followerAt([...wanted]) : hand.aim, [...wanted], REACHING.LEAP, REACHING.HALF_LIFE, seconds);
+  hand.weight = followed(hand.weight, [hand.point ? 1 : 0], 0.5, REACHING.HALF_LIFE, seconds);
   const { upper, lower, gap } = arm(pose, side, shownBy(hand.aim) as Vector);
-  hand.beyond = !!hand.point && gap > REACHED;
+  hand.beyond = !!hand.point && gap > REACHING.REACHED;
   const rotations = [...pose.rotations];
   const [share, bones] = [shownBy(hand.weight)[0]!, ARMS[side]!];
   rotations[bones[1]!] = mixed(rotations[bones[1]!]!, upper, share);
@@ -61,7 +50,7 @@ function arm(pose: Played, side: number, point: Vector): { upper: Quaternion; lo
   const offsets = bones.map((bone) => OFFSETS[bone]!);
   const start = plus(offsets[0]!, rotated(shoulder, offsets[1]!));
   const way = minus(inChest(pose, point), start);
-  const ready = readied(side, offsets[2]!, plus(offsets[3]!, rotated(hand, [out(side) * PALM, 0, 0])));
+  const ready = readied(side, offsets[2]!, plus(offsets[3]!, rotated(hand, [out(side) * REACHING.PALM, 0, 0])));
   const near = within(way, side, ready.longest);
   const { thigh, shin } = ready.turns(near);
   const [up, low] = [product(thigh, READY[side]![0]), product(shin, READY[side]![1])];
@@ -101,11 +90,11 @@ function within(way: Vector, side: number, longest: number): Vector {
   const [axis, far] = [unit([out(side), 0, 1]), size(way)];
   const along = dot(way, axis);
   const aside = unit(minus(way, times(axis, along)));
-  const edge = plus(times(axis, WIDEST * far), times(aside, Math.sqrt(1 - WIDEST * WIDEST) * far));
-  const [nearest, straight, more] = [NEAREST * longest, STRAIGHT * longest, STRETCHED * longest];
+  const edge = plus(times(axis, REACHING.WIDEST * far), times(aside, Math.sqrt(1 - REACHING.WIDEST * REACHING.WIDEST) * far));
+  const [nearest, straight, more] = [REACHING.NEAREST * longest, REACHING.STRAIGHT * longest, REACHING.STRETCHED * longest];
   const over = Math.max(far - straight, 0);
   const eased = over > 0 ? straight + more * (1 - Math.exp(-over / more)) : Math.max(far, nearest);
-  return times(along >= WIDEST * far ? way : edge, eased / Math.max(far, 1e-12));
+  return times(along >= REACHING.WIDEST * far ? way : edge, eased / Math.max(far, 1e-12));
 }
 
 /** A rotation between two, by a share of the way. */

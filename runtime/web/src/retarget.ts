@@ -1,4 +1,5 @@
 /* Motions of any human figure to the humanoid and back: docs/retargeting.md. */
+import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";
 import { BONES, groundUnder, HIPS, HUMANOID, isHumanoid, LEG_LENGTH, NECK, SIDES, solePoints, SPINE } from "./humanoid.js";
@@ -8,7 +9,7 @@ import { atRest, checked, cut, type Motion, motionFrom, placesOf, type World, wo
 import {
   about, inverse, mean, minus, plus, product, type Quaternion, rotated, STILL, swing, times, towards, twist, type Vector, X, Y, Z,
 } from "./rotations.js";
-import { END, type Skeleton } from "./skeleton.js";
+import type { Skeleton } from "./skeleton.js";
 
 /** Bones and the names of their joints: a string, or of spine and neck a list, upwards. */
 export type NamedJoints = Record<string, string | string[]>;
@@ -97,7 +98,7 @@ function humanoidTurns(turns: Quaternion[], pose: Vector[], { body, aligned, pel
   for (const bone of BONES.slice(1)) {
     found[bone] ??= found[HUMANOID.names[HUMANOID.joints[HUMANOID.index(bone)]!.parent]!]!;
   }
-  return HUMANOID.names.map((name) => found[name.endsWith(END) ? name.slice(0, -END.length) : name]!);
+  return HUMANOID.names.map((name) => found[name.endsWith(SKELETON.END_SUFFIX) ? name.slice(0, -SKELETON.END_SUFFIX.length) : name]!);
 }
 
 /** Rotations of so many joints of another chain with the same ends, by how far up the chain each is; the first is no part. */

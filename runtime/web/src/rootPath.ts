@@ -1,25 +1,16 @@
 /* The path over the ground that feet imply: docs/retargeting.md, "Clips in place". */
+import { CONTACTS, treadmillSettings } from "./generated.js";
 import { rise, rounded, smoothed } from "./numbers.js";
 
 /** x and z by frame. */
 export type Plane = [x: number, z: number][];
 
-/** Seconds: the deviation of the window that feet and heights are smoothed by. */
-const CALM = 0.015;
-/** Metres over the ground from which on a point has no vote. */
-const NEAR = 0.07;
-/** Seconds over which votes are brought together, and beyond which they do not reach. */
-const TOGETHER = 0.05;
-const REACH = 1;
-/** Metres a second: how far off a slower vote may be, and a faster one. */
-const OFF = [0.2, 0.6] as const;
-
 /** Velocities over the ground, in m/s from each frame to the next, that keep points (T, K) from sliding; heights: of them over the ground. */
 export function velocityByFeet(points: Plane[], heights: number[][], fps: number): Plane {
-  const calm = smoothed(points.map((row) => row.flat()), CALM * fps);
+  const calm = smoothed(points.map((row) => row.flat()), treadmillSettings.calm * fps);
   const steps = calm.slice(1).map((row, at) => row.map((value, i) => (calm[at]![i]! - value) * fps));
   const votes = steps.map((row) => heights[0]!.map((_, k): [number, number] => [row[2 * k]!, row[2 * k + 1]!]));
-  const near = votes.map((row, at) => row.map((_, k) => 1 - rise((heights[at]![k]! + heights[at + 1]![k]!) / 2, 0, NEAR)));
+  const near = votes.map((row, at) => row.map((_, k) => 1 - rise((heights[at]![k]! + heights[at + 1]![k]!) / 2, 0, CONTACTS.VOTING_HEIGHT)));
   let velocity = led(votes, near, fps);
   for (let attempt = 0; attempt < 10; attempt++) {
     const weights = votes.map((row, at) => row.map((vote, k) => near[at]![k]! * agreement(vote, velocity[at]!)));
@@ -31,7 +22,7 @@ export function velocityByFeet(points: Plane[], heights: number[][], fps: number
 /** How far a vote counts beside a velocity. */
 function agreement([x, z]: [number, number], [alongX, alongZ]: [number, number]): number {
   const [offX, offZ] = [x - alongX, z - alongZ];
-  const allowed = OFF[offX * alongX + offZ * alongZ > 0 ? 1 : 0];
+  const allowed = CONTACTS.ALLOWED[offX * alongX + offZ * alongZ > 0 ? 0 : 1];
   return (1 + (offX ** 2 + offZ ** 2) / allowed ** 2) ** -2;
 }
 
@@ -41,8 +32,8 @@ function led(votes: Plane[], weights: number[][], fps: number): Plane {
     const sum = (of: (vote: [number, number]) => number) => row.reduce((all, vote, k) => all + weights[at]![k]! * of(vote), 0);
     return [sum(() => 1), sum(([x]) => x), sum(([, z]) => z)] as const;
   });
-  const reach = rounded(REACH * fps);
-  const nearness = Array.from({ length: reach + 1 }, (_, away) => Math.exp(-away / (TOGETHER * fps)));
+  const reach = rounded(CONTACTS.REACH * fps);
+  const nearness = Array.from({ length: reach + 1 }, (_, away) => Math.exp(-away / (CONTACTS.TOGETHER * fps)));
   return sums.map((_, at) => {
     let [total, x, z] = [1e-12, 0, 0]; // no vote within a second is none
     for (let other = Math.max(0, at - reach); other <= Math.min(sums.length - 1, at + reach); other++) {
@@ -59,7 +50,7 @@ function led(votes: Plane[], weights: number[][], fps: number): Plane {
 export function heightsByFeet(standing: number[], fps: number): number[][] {
   // a jump up forward in time is a fall backward: only frames on which both agree are flight
   const [up, down] = [flown(standing, fps), flown([...standing].reverse(), fps).reverse()];
-  return smoothed(up.map((value, at) => [Math.min(value, down[at]!)]), CALM * fps);
+  return smoothed(up.map((value, at) => [Math.min(value, down[at]!)]), treadmillSettings.calm * fps);
 }
 
 function flown(standing: number[], fps: number): number[] {

@@ -1,6 +1,8 @@
+import { indexSettings } from "./generated.js";
 import type { Manifest } from "./bundle.js";
 import type { Graph } from "./graph.js";
 import { type Frames, LanguageModel } from "./model.js";
+import { settingsOf } from "./settings.js";
 
 /** The index of a vector, how near it is (1 is the same), and whether it is like what was asked for at all, and not only nearer than others. */
 export interface Hit {
@@ -11,13 +13,15 @@ export interface Hit {
 
 /** Motions and sentences as vectors of length 1, near where they mean the same. */
 export class SearchModel extends LanguageModel {
+  private readonly index = settingsOf("index", indexSettings, this.manifest.settings.index);
+
   constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>) {
     super(manifest);
   }
 
   /** The vector (E) of frames (T, D); one of more than ten seconds has the direction of the sum of its windows' vectors. */
   async embedMotion(frames: Frames): Promise<Float32Array> {
-    const most = Math.floor((this.manifest.settings.index?.window ?? 10) * this.fps + 1e-9);
+    const most = Math.floor(this.index.window * this.fps + 1e-9);
     const count = Math.max(1, Math.ceil(frames.length / most));
     const edges = Array.from({ length: count + 1 }, (_, at) => toEven((at * frames.length) / count));
     const vectors: Float32Array[] = [];
@@ -37,8 +41,7 @@ export class SearchModel extends LanguageModel {
 
   /** The vectors of motions that are nearest to a sentence or to frames (T, D), best first; where the first is not `like` it, none is. */
   async search(query: string | Frames, vectors: Float32Array[], count = this.setting("count")): Promise<Hit[]> {
-    const { like_text = 0.45, like_motion = 0.87 } = this.manifest.settings.index ?? {};
-    const least = typeof query === "string" ? like_text : like_motion;
+    const least = typeof query === "string" ? this.index.like_text : this.index.like_motion;
     const vector = await (typeof query === "string" ? this.embedText(query) : this.embedMotion(query));
     return this.nearest(vector, vectors, count).map((hit) => ({ ...hit, like: hit.score >= least }));
   }

@@ -1,9 +1,7 @@
+import {  } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { spread } from "./numbers.js";
 import { plus, type Quaternion, type Vector } from "./rotations.js";
-
-/** What ends the name of the tip of a last bone, which has no rotation of its own. */
-export const END = "_end";
 
 /** A joint and the offset from its parent at rest; the order of Euler angles is that of its file. */
 export interface Joint {

@@ -1,5 +1,6 @@
 /* The step of a steered figure: docs/bundle.md, the loop `matching`. Metres, seconds and radians. */
-import { LEAST_PACE, type Matcher, type Playback, type Target } from "./matching.js";
+import { MATCHING } from "./generated.js";
+import { type Matcher, type Playback, type Target } from "./matching.js";
 import { moved, type Pose as Ground } from "./planar.js";
 import type { Quaternion } from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
@@ -98,7 +99,7 @@ export class Steerer {
     const side = mirror ? -1 : 1;
     const pace = Math.hypot(spring[0], spring[1]);
     const moving = creeps || Math.min(recorded, pace) > how.idle;
-    const ratio = pace / Math.max(recorded, creeps ? LEAST_PACE : how.idle);
+    const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : how.idle);
     const stride = moving ? clamp(ratio / rate, creeps ? 0 : how.shortest, how.longest) : 1;
     const by = rate * dt * stride;
     const [forward, left, turn] = [moves[0]! * by, side * moves[1]! * by, side * moves[2]! * rate * dt];

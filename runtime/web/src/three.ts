@@ -1,11 +1,12 @@
 /* Motions for three.js, which is no dependency: plain objects that THREE.AnimationClip.parse takes. */
+import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { grounded, nearby } from "./glbWrite.js";
 import { BONES, HUMANOID } from "./humanoid.js";
 import type { Motion } from "./motion.js";
 import { onHumanoid } from "./retarget.js";
 import { inverse, minus, product, type Quaternion, rotated, times, type Vector } from "./rotations.js";
-import { END, type Skeleton } from "./skeleton.js";
+import type { Skeleton } from "./skeleton.js";
 
 export interface Track {
   name: string;
@@ -61,7 +62,7 @@ function jointTracks(motion: Motion): Track[] {
     const node = (skeleton.nodes?.[at]?.name ?? name).replace(/\s/g, "_").replace(/[[\].:/]/g, "");
     const moving = at === 0 || translations.some((row) => row[at] !== offset);
     const turns = () => nearby(rotations.map((row) => turned(skeleton, at, row[at]!)));
-    const turn = name.endsWith(END) ? [] : [track(`${node}.quaternion`, "quaternion", fps, turns())];
+    const turn = name.endsWith(SKELETON.END_SUFFIX) ? [] : [track(`${node}.quaternion`, "quaternion", fps, turns())];
     const moves = () => translations.map((row) => placed(skeleton, at, row[at]!));
     return moving ? [...turn, track(`${node}.position`, "vector", fps, moves())] : turn;
   });

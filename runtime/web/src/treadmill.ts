@@ -1,4 +1,5 @@
 /* Clips in place: found by their feet, and given the path that these imply: docs/retargeting.md, "Clips in place". */
+import { CONTACTS, treadmillSettings } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { groundUnder, HUMANOID, isHumanoid, LEG_LENGTH, SIDES, solePoints } from "./humanoid.js";
 import { checked, type Motion, resampled, worldOf } from "./motion.js";
@@ -6,23 +7,6 @@ import { rounded, spread } from "./numbers.js";
 import { toHumanoid } from "./retarget.js";
 import { heightsByFeet, type Plane, velocityByFeet } from "./rootPath.js";
 import { inverse, mean, minus, plus, rotated, times, type Vector } from "./rotations.js";
-
-/** In metres of the humanoid: the root stays within it. */
-const ROOM = 0.5;
-/** Of the way of the feet that the root goes itself, at most. */
-const SHARE = 0.25;
-/** Metres a second that the feet go, at least. */
-const SPEED = 0.3;
-/** The least standard deviation of how far one foot is ahead of the other. */
-const STRIDE = 0.15;
-/** The least mean height of the hips over the feet. */
-const HIPS = 0.3;
-/** Seconds over which velocities are averaged: feet that twist or shuffle go nowhere. */
-const SPAN = 1;
-/** Frames a second in which faster clips are looked at. */
-const FPS = 30;
-/** Metres: the height of a figure whose unit does not count. */
-const ADULT = 1.7;
 
 const FEET = SIDES.flatMap((side) => ["Foot", "Toes", "Toes_end"].map((part) => HUMANOID.index(side + part)));
 
@@ -36,7 +20,7 @@ export function travelling(motion: Motion): Motion {
 /** Whether the feet of a human figure stride while its root stays. */
 export function isInPlace(motion: Motion): boolean {
   if (!motion.travels) return false;
-  const looked = resampled(motion, Math.min(motion.fps, FPS));
+  const looked = resampled(motion, Math.min(motion.fps, treadmillSettings.fps));
   if (looked.rotations.length < 3 || goes(looked)) return false;
   try {
     return strides(seen(looked).motion);
@@ -72,7 +56,7 @@ function seen(motion: Motion): { motion: Motion; toFile: (path: Vector) => Vecto
 function goes({ skeleton, translations }: Motion): boolean {
   for (const joint of skeleton.joints.keys()) {
     const [x, y, z] = [0, 1, 2].map((axis) => spread(translations.map((moves) => moves[joint]![axis]!))) as Vector;
-    if (x || y || z) return Math.hypot(x, z) > 1.5 * ROOM * (skeleton.height / ADULT);
+    if (x || y || z) return Math.hypot(x, z) > 1.5 * treadmillSettings.room * (skeleton.height / CONTACTS.ADULT_HEIGHT);
   }
   return false;
 }
@@ -81,11 +65,11 @@ function goes({ skeleton, translations }: Motion): boolean {
 function strides(motion: Motion): boolean {
   const { fps } = motion;
   const root = motion.translations.map((moves) => moves[0]!);
-  if (Math.hypot(...[0, 2].map((axis) => spread(root.map((place) => place[axis]!)))) > ROOM) return false;
+  if (Math.hypot(...[0, 2].map((axis) => spread(root.map((place) => place[axis]!)))) > treadmillSettings.room) return false;
   const soles = solePoints(worldOf(motion));
   const ground = groundUnder(soles);
-  const slid = averaged(velocityByFeet(soles.map(flat), soles.map((row) => row.map((point) => point[1] - ground)), fps), SPAN * fps);
-  const went = averaged(root.slice(1).map((place, at) => flat([times(minus(place, root[at]!), fps)])[0]!), SPAN * fps);
+  const slid = averaged(velocityByFeet(soles.map(flat), soles.map((row) => row.map((point) => point[1] - ground)), fps), treadmillSettings.span * fps);
+  const went = averaged(root.slice(1).map((place, at) => flat([times(minus(place, root[at]!), fps)])[0]!), treadmillSettings.span * fps);
   const way = (velocity: Plane) => velocity.reduce((sum, one) => sum + Math.hypot(...one), 0);
   const [left, right] = [0, 3].map((first) => slid.map(([x, z], at) => {
     const foot = minus(mean(soles[at + 1]!.slice(first, first + 3)), root[at + 1]!);
@@ -93,8 +77,8 @@ function strides(motion: Motion): boolean {
   })) as [number[], number[]];
   const apart = left.map((one, at) => one - right[at]!);
   const hips = average(root.map((place) => place[1])) - average(soles.flat().map((point) => point[1]));
-  return way(slid) >= SPEED * slid.length && way(went) <= SHARE * way(slid) && Math.sqrt(together(apart, apart)) >= STRIDE
-    && together(left, right) < 0 && hips >= HIPS;
+  return way(slid) >= treadmillSettings.speed * slid.length && way(went) <= treadmillSettings.share * way(slid) && Math.sqrt(together(apart, apart)) >= treadmillSettings.stride
+    && together(left, right) < 0 && hips >= treadmillSettings.hips;
 }
 
 /** The path over the ground of a motion of the humanoid whose feet do not slide, from the origin. */

@@ -1,16 +1,15 @@
 /* Legs go another way, hips turned with them and the spine back, and with other strides: docs/bundle.md, the loop `matching`. */
+import { WARPING } from "./generated.js";
 import { legOf, OFFSETS, reach } from "./footLock.js";
 import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "./humanoid.js";
 import { about, inverse, plus, product, type Quaternion, rotated, Y } from "./rotations.js";
 
 /** Which bones turn back, each by the same share. */
 const BACK = SPINE.map((name) => BONES.indexOf(name));
-/** Radians below which nothing is turned. */
-const LEAST = 1e-4;
 
 /** Local rotations with hips and legs turned to the left by an angle; all that the spine carries stays as it is. */
 export function warped(rotations: Quaternion[], angle: number): Quaternion[] {
-  if (Math.abs(angle) <= LEAST) return rotations;
+  if (Math.abs(angle) <= WARPING.LEAST) return rotations;
   const found = [...rotations];
   let above = rotations[0]!;
   found[0] = product(about(Y, angle), above);
@@ -32,7 +31,7 @@ const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
  * go: one that changed with the row that is played would make feet leap.
  */
 export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
-  if (Math.abs(stride - 1) <= LEAST) return rotations;
+  if (Math.abs(stride - 1) <= WARPING.LEAST) return rotations;
   const found = [...rotations];
   SIDES.forEach((_, side) => {
     const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);

@@ -4,7 +4,8 @@ import { readFile } from "node:fs/promises";
 import test from "node:test";
 import { BundleError, ControlError, ControlModel, load, type Told } from "../src/index.js";
 import { Goals } from "../src/goals.js";
-import { steeringOf } from "../src/steeringSettings.js";
+import { steeringSettings } from "../src/generated.js";
+import { settingsOf } from "../src/settings.js";
 
 const bytes = new Uint8Array(await readFile("../motet/bundles/control.zip"));
 const model = (await load(bytes)) as ControlModel;
@@ -148,9 +149,10 @@ test("the search finds what a search of all rows finds", () => {
 });
 
 test("settings and tables that are out of range are refused", () => {
-  assert.throws(() => steeringOf({ steering: { velocity: 0 } }), /steering.velocity: must be 0.01 to 10/);
-  assert.throws(() => steeringOf({ steering: { search_every: 2.5 } }), BundleError);
-  assert.throws(() => steeringOf({ steering: { wings: 2 } }), /wings is unknown/);
+  const steering = (values: Record<string, number>) => settingsOf("steering", steeringSettings, values);
+  assert.throws(() => steering({ velocity: 0 }), /steering.velocity: must be 0.01 to 10/);
+  assert.throws(() => steering({ search_every: 2.5 }), BundleError);
+  assert.throws(() => steering({ wings: 2 }), /wings is unknown/);
   const { manifest, steerer } = model;
   const made = (config: object) => new ControlModel({ ...manifest, config: { ...manifest.config, ...config } }, steerer.matcher.tables);
   for (const config of [{ gaits: [] }, { speeds: [[1, 2]] }, { odd: 99 }, { gaits: "walk" }]) assert.throws(() => made(config), BundleError);

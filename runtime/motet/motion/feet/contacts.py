@@ -30,6 +30,15 @@ from motet.motion.skeleton import Skeleton, partners_of
 GROUND_PERCENT = 10
 """Percentage of frames whose lowest point of the feet is below ground."""
 
+VOTING_HEIGHT = 0.07
+"""Metres above the ground from which on a point has no vote on where the root goes."""
+
+TOGETHER, REACH = 0.05, 1.0
+"""Seconds over which votes are brought together, and beyond which they do not reach."""
+
+ALLOWED = (3 * 0.2, 0.2)
+"""Metres a second by which a vote may be off, one that is faster and one that is slower."""
+
 ADULT_HEIGHT = 1.7  # m: assumed if the skeleton's length unit is unknown
 
 
@@ -178,16 +187,15 @@ def velocity_by_feet(
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
     """
     # a vote counts less the higher its point is
-    near = contacts((above[1:] + above[:-1]) / 2, None, ContactSettings(heights=(0.0, 0.07)))
-    votes, reach = -np.diff(points, axis=0) * fps, round(1.0 * fps)
-    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (0.05 * fps))  # votes are brought together over .05 s
+    near = contacts((above[1:] + above[:-1]) / 2, None, ContactSettings(heights=(0.0, VOTING_HEIGHT)))
+    votes, reach = -np.diff(points, axis=0) * fps, round(REACH * fps)
+    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (TOGETHER * fps))
     weights, velocity = near, np.zeros(votes[:, 0].shape)
     for attempt in range(11):
         if attempt:
             off = votes - velocity[:, None]
             faster = (off * velocity[:, None]).sum(axis=-1) > 0
-            # m/s: how far off a slower vote may be; a faster one three times as far
-            allowed = np.where(faster, 3 * 0.2, 0.2)
+            allowed = np.where(faster, *ALLOWED)
             weights = near / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2
         columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
         total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)

@@ -337,6 +337,9 @@ def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: 
     return turned
 
 
+FINGER_BENDS = (15.0, 25.0, 15.0)
+"""Degrees by which the bones of a finger of a hand at rest bend, each against the one before."""
+
 FINGER_SHARES = {"thumb": 0.5, "index": 0.8, "mid": 1.0, "ring": 1.15, "pinky|little": 1.3}
 """What the names of a finger's joints hold, and how far it is bent in a relaxed hand, times a finger's bend."""
 
@@ -366,9 +369,8 @@ def relaxed(skeleton: Skeleton, still: Array, joints: Mapping[str, int]) -> Arra
             thumb = finger == "thumb"
             start = pointing[0] if thumb else along
             axis = np.cross(start, palm + across if thumb else palm)
-            # each bone bends against the one before, by degrees of a hand at rest, about what of the axis is across it
-            bends = (15.0, 25.0, 15.0)
-            for joint, before, bone, bend in zip(chain, [start, *pointing], pointing, bends, strict=False):
+            # each bone bends against the one before, about the part of the axis that is across it
+            for joint, before, bone, bend in zip(chain, [start, *pointing], pointing, FINGER_BENDS, strict=False):
                 aside = unit(axis - (axis @ bone) * bone)
                 now = np.arctan2(np.cross(before, bone) @ aside, before @ bone - (before @ aside) * (bone @ aside))
                 turn = max(0.0, np.radians(bend) * FINGER_SHARES[finger] - float(now)) * aside

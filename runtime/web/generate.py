@@ -1,0 +1,159 @@
+"""Writes src/generated.ts: the numbers and lists of words that both languages use, from the modules that hold them.
+
+    python runtime/web/generate.py
+
+A module becomes an object with those of its constants that src uses, such as MEMORY.ALIKE; a class of settings becomes
+an object with the default of each field, and its range where it has one.
+"""
+
+import ast
+import inspect
+import json
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import MISSING, asdict, fields, is_dataclass
+from importlib import import_module
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from motet.settings import Settings
+
+TARGET = Path(__file__).parent / "src/generated.ts"
+
+MODULES = (
+    "motet.bundle.bundle",
+    "motet.bundle.fields",
+    "motet.bundle.graph_safety",
+    "motet.bundle.manifest",
+    "motet.bundle.members",
+    "motet.decode.acting",
+    "motet.decode.acts",
+    "motet.decode.apart",
+    "motet.decode.arriving",
+    "motet.decode.codec",
+    "motet.decode.codes",
+    "motet.decode.continue_codes",
+    "motet.decode.loops",
+    "motet.decode.matching",
+    "motet.decode.memory",
+    "motet.decode.standing",
+    "motet.decode.steering_settings",
+    "motet.decode.warping",
+    "motet.decode.words",
+    "motet.formats.gltf",
+    "motet.formats.gltf_data",
+    "motet.formats.text",
+    "motet.models.base",
+    "motet.models.composition",
+    "motet.models.describe",
+    "motet.models.generate_codes",
+    "motet.models.guided",
+    "motet.models.known",
+    "motet.models.language",
+    "motet.models.leading",
+    "motet.models.predict",
+    "motet.models.search",
+    "motet.models.steer",
+    "motet.motion.events",
+    "motet.motion.looking",
+    "motet.motion.reaching",
+    "motet.motion.rotations",
+    "motet.motion.skeleton",
+    "motet.motion.two_bones",
+    "motet.motion.feet.contacts",
+    "motet.motion.feet.hold",
+    "motet.motion.feet.lock",
+    "motet.motion.feet.treadmill",
+    "motet.motion.humanoid.alignment",
+    "motet.motion.humanoid.measure",
+    "motet.motion.humanoid.retarget",
+    "motet.representation.placed",
+)
+
+
+def typescript() -> str:
+    """The text of src/generated.ts: of each module what the other files of src name."""
+    sources = [path.read_text("utf-8") for path in sorted(TARGET.parent.rglob("*.ts")) if path != TARGET]
+    used = {name for source in sources for name in re.findall(r"\b[A-Z_]+\.[A-Z_]+\b|\b[a-z]\w+Settings\b", source)}
+    parts = ["/* Written by runtime/web/generate.py from the modules of the Python runtime: do not edit. */\n"]
+    for module in map(import_module, MODULES):
+        path, _, name = module.__name__.rpartition(".")
+        constants = list(constants_of(module, {use[1] for use in map(parted, used) if use[0] == name.upper()}))
+        if constants:
+            parts += [f"\n// {path}.{name}\nexport const {name.upper()} = {{\n", *constants, "} as const;\n"]
+        for title, kind in inspect.getmembers(module, inspect.isclass):
+            label = title[0].lower() + title[1:]
+            if label in used and kind.__module__ == module.__name__:
+                parts += [
+                    f"\n// {path}.{name}.{title}\nexport const {label} = {{\n",
+                    *fields_of(kind),
+                    "} as const;\n",
+                ]
+    return "".join(parts)
+
+
+def parted(name: str) -> tuple[str, str]:
+    """The object and the constant of a name such as MEMORY.ALIKE."""
+    first, _, last = name.partition(".")
+    return first, last
+
+
+def constants_of(module: ModuleType, used: Iterable[str]) -> Iterator[str]:
+    """A line for each constant of a module, or of its classes, that is used, and its docstring above it."""
+    left = set(used)
+    body = ast.parse(inspect.getsource(module)).body
+    classes = [(getattr(module, node.name), node.body) for node in body if isinstance(node, ast.ClassDef)]
+    for owner, statements in ((module, body), *classes):
+        for statement, following in pairwise([*statements, ast.Pass()]):
+            targets = ast.walk(statement.targets[0]) if isinstance(statement, ast.Assign) else ()
+            names = [target.id for target in targets if isinstance(target, ast.Name) and target.id in left]
+            match following:
+                case ast.Expr(ast.Constant(str(doc))) if names:
+                    yield f"  // {' '.join(doc.split())}\n"
+            for name in names:
+                yield f"  {name}: {literal(getattr(owner, name))},\n"
+            left -= set(names)
+    if left:
+        raise AttributeError(f"{module.__name__} has no {', '.join(sorted(left))}, which src uses")
+
+
+def fields_of(kind: type[Any]) -> Iterator[str]:
+    """A line for each field of a dataclass: its default; of settings its default, null for none, and its range, too."""
+    defaults = {field.name: None if field.default is MISSING else field.default for field in fields(kind)}
+    for name, value in defaults.items():
+        if issubclass(kind, Settings):
+            whole, (low, high, _) = kind.RANGES[name]
+            yield f"  {name}: {literal({'default': value, 'low': low, 'high': high, 'whole': whole})},\n"
+        else:
+            yield f"  {name}: {literal(value)},\n"
+
+
+def literal(value: Any) -> str:
+    """A value in TypeScript; TypeError for one that is not made of numbers and texts."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    elif hasattr(value, "_asdict"):
+        value = value._asdict()
+    elif isinstance(value, frozenset):
+        value = sorted(value)
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(literal, value))}]"
+    if isinstance(value, dict):
+        items = [f"{keyed(key)}: {literal(item)}" for key, item in value.items()]
+        return f"{{ {', '.join(items)} }}"
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        return str(int(value)) if value == int(value) else repr(float(value))
+    return json.dumps(value, ensure_ascii=False)
+
+
+def keyed(key: str | int) -> str:
+    """A key of an object in TypeScript."""
+    return str(key) if str(key).isalnum() else json.dumps(key)
+
+
+if __name__ == "__main__":
+    TARGET.write_text(typescript(), "utf-8")
