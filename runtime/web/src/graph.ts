@@ -3,6 +3,7 @@ import type { InferenceSession, TypedTensor } from "onnxruntime-web";
 import type { NumberArray } from "./arrays.js";
 import { BundleError } from "./errors.js";
 import { checkGraph } from "./graphSafety.js";
+import { loaded, type Runtime } from "./runtime.js";
 
 /** A tensor of a graph: a word in its shape is an axis of any size. */
 export interface TensorSpec {
@@ -30,13 +31,13 @@ export class Graph {
     readonly role: string,
     readonly spec: GraphSpec,
     private readonly session: InferenceSession,
-    private readonly runtime: typeof import("onnxruntime-web/wasm"),
+    private readonly runtime: Runtime,
   ) {}
 
   /** Load a graph that is safe and keeps the contract of the manifest; BundleError otherwise. */
   static async load(role: string, model: Uint8Array, spec: GraphSpec, settings: SessionSettings = {}): Promise<Graph> {
     checkGraph(model);
-    const runtime = await import("onnxruntime-web/wasm").catch((error: unknown) => {
+    const runtime = await loaded().catch((error: unknown) => {
       throw new BundleError(`ONNX Runtime cannot be loaded (${String(error)}): npm install onnxruntime-web`);
     });
     const session = await runtime.InferenceSession.create(model, settings).catch((error: unknown) => {

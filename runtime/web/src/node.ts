@@ -1,0 +1,6 @@
+/* What Node imports: the same functions, with ONNX Runtime's build for Node. */
+import { loadFrom } from "./runtime.js";
+
+loadFrom(() => import("onnxruntime-web"));
+
+export * from "./index.js";
