@@ -17,9 +17,9 @@ sys.path.insert(0, str(Path(__file__).parent / "runtime"))
 from gltf_player import Array, Played
 
 import motet
+from motet.figures.humanoid.bones import HUMANOID, LEFT_RIGHT, leg_length, sided
+from motet.figures.humanoid.retarget import map_of, on_humanoid
 from motet.formats import read_character
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, leg_length, sided
-from motet.motion.humanoid.retarget import map_of, on_humanoid
 
 BONES = [
     (sided(side, a), sided(side, b))

@@ -18,7 +18,7 @@ from gltf_player import Array, Played
 
 import motet
 from motet.errors import MotetError
-from motet.motion.humanoid.bones import ARM, HUMANOID, LEFT_RIGHT, LEG, leg_length, sided
+from motet.figures.humanoid.bones import ARM, HUMANOID, LEFT_RIGHT, LEG, leg_length, sided
 
 LIMBS = [tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG[:3], ARM[1:])]
 

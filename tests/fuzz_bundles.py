@@ -26,7 +26,7 @@ import motet
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import SessionOptions
 from motet.bundle.graph_safety import Value, fields
-from motet.models.generate_codes import CodesModel
+from motet.generate.model import CodesModel
 from motet.models.load import verify
 from motet.motion.motion import Motion
 

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent / "runtime"))
 from browser import Browser
 
 import motet
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 COUNT = """(() => {
   const frame = motet.frame.bind(motet);

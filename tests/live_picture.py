@@ -8,7 +8,7 @@ sys.path.insert(0, str(Path(__file__).parent / "runtime"))
 from browser import Browser
 
 import motet
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "live.png"
 STEPS = """(() => {

@@ -15,7 +15,7 @@ import motet
 from motet.draw.page import source
 from motet.live.page import net_data
 from motet.live.protocol import ClientSession
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 TICKS = 300
 ORDERS = [("walk", 1.3, 0), ("run", 3.0, 90), ("walk", 0.0, 90)]

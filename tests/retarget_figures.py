@@ -18,11 +18,11 @@ import numpy as np
 
 import motet
 from motet.errors import MotetError
+from motet.figures.humanoid.bones import BONES, HUMANOID, MIXAMO
+from motet.figures.humanoid.retarget import from_humanoid, to_humanoid
 from motet.formats import read_motion
 from motet.models.describe import DescribeModel
 from motet.models.language import MAX_SECONDS
-from motet.motion.humanoid.bones import BONES, HUMANOID, MIXAMO
-from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton

@@ -9,7 +9,7 @@ from typing import Any, get_args, get_type_hints
 import pytest
 
 import motet
-from motet.motion import humanoid
+from motet.figures import humanoid
 
 ROOT = Path(__file__).parents[1]
 INNER = ("motet.bundle.", "motet.decode.")

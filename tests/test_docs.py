@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet.models.load import load_as
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 ROOT = Path(__file__).parents[1]
 PAGES = {path.relative_to(ROOT).as_posix(): path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))}

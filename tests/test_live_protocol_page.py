@@ -14,7 +14,7 @@ import pytest
 
 import motet
 from motet.live.protocol import KEYS, parsed
-from motet.motion.events import Happening
+from motet.steering.events import Happening
 
 pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import connect

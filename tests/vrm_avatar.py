@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.figures.humanoid.bones import PARENTS
 from motet.formats.glb import INDICES, VERTICES, Buffer, container
-from motet.motion.humanoid.bones import PARENTS
 from motet.motion.rotations import rotmat_to_quat, swing
 
 Array = NDArray[np.float64]

@@ -4,9 +4,9 @@ import json
 import sys
 from pathlib import Path
 
+from motet.figures.humanoid.bones import HUMANOID
+from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import glb, read_motion
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions
 
 

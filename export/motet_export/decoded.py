@@ -10,19 +10,20 @@ from numpy.typing import NDArray
 
 from motet.bundle.golden import TOLERANCE, vectors
 from motet.bundle.graph import Arrays
+from motet.decode.beam import noise_of
 from motet.decode.loop import Recording
-from motet.decode.words import noise_of
 from motet.errors import TextWarning
+from motet.generate.base import GenerateModel
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
-from motet.models.fill import FillModel
-from motet.models.generate import GenerateModel
-from motet.models.language import MAX_WORDS, SPECIALS, LanguageModel
-from motet.models.predict import PredictModel
-from motet.models.search import SearchModel
-from motet.models.steer import SteerModel
-from motet.models.tdbn_control import TdbnModel
+from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
+from motet.papers.tdbn_control import TdbnModel
+from motet.predict.fill import FillModel
+from motet.predict.model import PredictModel
+from motet.search.model import SearchModel
+from motet.steering.model import SteerModel
+from motet.text.vocabulary import MAX_WORDS, SPECIALS
 from motet_export.parity import Examples, sides, walks
 
 Decoded = dict[str, NDArray[Any]]

@@ -10,10 +10,9 @@ from importlib.metadata import version
 from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import SessionOptions
-from motet.checked import Checked, check
-from motet.decode.acts import Act
-from motet.decode.matched import Matched
-from motet.demo import write_demo
+from motet.compose.compose import Composition, Met
+from motet.compose.plans import Moment, parse_plan, read_plan
+from motet.corpus.checked import Checked, check
 from motet.errors import (
     ArgumentError,
     BundleError,
@@ -31,30 +30,33 @@ from motet.errors import (
     TravelWarning,
     UnitError,
 )
+from motet.figures.humanoid import Humanoid, from_humanoid, read_map, to_humanoid
 from motet.formats import Character, clips, figures_in
 from motet.formats import read_motion as read
 from motet.formats import write_motion as write
+from motet.generate.base import Generated, GenerateModel, GenerateSettings
+from motet.generate.model import CodesModel, Story, StorySettings, Understood
+from motet.live.demo import write_demo
 from motet.live.page import live_page, write_live_page
-from motet.models.base import BundleModel, ControlModel
-from motet.models.compose import Composition, Met
-from motet.models.composition import Passage, Shown
+from motet.models.base import BundleModel
+from motet.models.control import ControlModel
 from motet.models.describe import DescribeModel, Description, Part
-from motet.models.fill import FillModel
-from motet.models.generate import Generated, GenerateModel, GenerateSettings, MixtureModel
-from motet.models.generate_codes import CodesModel, Story, StorySettings, Understood
 from motet.models.load import load, load_as
-from motet.models.plans import Moment, parse_plan, read_plan
-from motet.models.predict import PredictModel, PredictSession
-from motet.models.quantities import Quantities
-from motet.models.said_acts import SaidActs
-from motet.models.search import Hit, Index, SearchModel
-from motet.models.steer import SteerModel
-from motet.models.steer_session import SteerSession, SteerSnapshot
-from motet.models.tdbn_control import TdbnModel, TdbnSession, TdbnSnapshot
-from motet.motion.events import Event
-from motet.motion.humanoid import Humanoid, from_humanoid, read_map, to_humanoid
 from motet.motion.motion import Motion
-from motet.motion.pose import Pose
+from motet.papers.mixture_model import MixtureModel
+from motet.papers.tdbn_control import TdbnModel, TdbnSession, TdbnSnapshot
+from motet.predict.fill import FillModel
+from motet.predict.model import PredictModel, PredictSession
+from motet.search.model import Hit, Index, SearchModel
+from motet.steering.acts import Act
+from motet.steering.events import Event
+from motet.steering.matched import Matched
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.sentence_acts import SaidActs
+from motet.steering.session import SteerSession, SteerSnapshot
+from motet.text.clauses import Passage, Shown
+from motet.text.numeric_phrases import Quantities
 
 __version__ = version("motet")
 

@@ -24,55 +24,59 @@ from motet.settings import Settings
 
 TARGET = Path(__file__).parent / "src/generated.ts"
 
-MODULES = (
-    "motet.bundle.bundle",
-    "motet.bundle.fields",
-    "motet.bundle.graph_safety",
-    "motet.bundle.manifest",
-    "motet.bundle.members",
-    "motet.decode.acting",
-    "motet.decode.acts",
-    "motet.decode.apart",
-    "motet.decode.arriving",
-    "motet.decode.codec",
-    "motet.decode.codes",
-    "motet.decode.continue_codes",
-    "motet.decode.loops",
-    "motet.decode.matching",
-    "motet.decode.memory",
-    "motet.decode.standing",
-    "motet.decode.steering_settings",
-    "motet.decode.warping",
-    "motet.decode.words",
-    "motet.formats.gltf",
-    "motet.formats.gltf_data",
-    "motet.formats.text",
-    "motet.models.base",
-    "motet.models.composition",
-    "motet.models.describe",
-    "motet.models.generate_codes",
-    "motet.models.guided",
-    "motet.models.known",
-    "motet.models.language",
-    "motet.models.leading",
-    "motet.models.predict",
-    "motet.models.search",
-    "motet.models.steer",
-    "motet.motion.events",
-    "motet.motion.looking",
-    "motet.motion.reaching",
-    "motet.motion.rotations",
-    "motet.motion.skeleton",
-    "motet.motion.two_bones",
-    "motet.motion.feet.contacts",
-    "motet.motion.feet.hold",
-    "motet.motion.feet.lock",
-    "motet.motion.feet.treadmill",
-    "motet.motion.humanoid.alignment",
-    "motet.motion.humanoid.measure",
-    "motet.motion.humanoid.retarget",
-    "motet.representation.placed",
-)
+MODULES = {
+    "BUNDLE": "motet.bundle.bundle",
+    "FIELDS": "motet.bundle.fields",
+    "GRAPH_SAFETY": "motet.bundle.graph_safety",
+    "MANIFEST": "motet.bundle.manifest",
+    "MEMBERS": "motet.bundle.members",
+    "WORDS": "motet.decode.beam",
+    "CONTACTS": "motet.figures.feet.contacts",
+    "HOLD": "motet.figures.feet.hold",
+    "TREADMILL": "motet.figures.feet.treadmill",
+    "ALIGNMENT": "motet.figures.humanoid.alignment",
+    "MEASURE": "motet.figures.humanoid.measure",
+    "RETARGET": "motet.figures.humanoid.retarget",
+    "TWO_BONES": "motet.figures.two_bones",
+    "GLTF": "motet.formats.gltf",
+    "GLTF_DATA": "motet.formats.gltf_data",
+    "TEXT": "motet.formats.text",
+    "CODEC": "motet.generate.codec",
+    "CODES": "motet.generate.codes",
+    "CONTINUE_CODES": "motet.generate.continue_codes",
+    "MEMORY": "motet.generate.memory",
+    "GENERATE_CODES": "motet.generate.model",
+    "BASE": "motet.models.control",
+    "DESCRIBE": "motet.models.describe",
+    "LANGUAGE": "motet.models.language",
+    "KNOWN": "motet.models.nearest_neighbour",
+    "ROTATIONS": "motet.motion.rotations",
+    "SKELETON": "motet.motion.skeleton",
+    "BETWEEN": "motet.predict.between",
+    "FREE_RUN": "motet.predict.free_run",
+    "PREDICT": "motet.predict.model",
+    "PLACED": "motet.representation.placed",
+    "SEARCH": "motet.search.model",
+    "NEAREST": "motet.search.nearest",
+    "ACTING": "motet.steering.action_layer",
+    "ACTS": "motet.steering.acts",
+    "ARRIVING": "motet.steering.arrival",
+    "APART": "motet.steering.avoidance",
+    "EVENTS": "motet.steering.events",
+    "LOCK": "motet.steering.foot_lock",
+    "STANDING": "motet.steering.idle",
+    "LOOKING": "motet.steering.look_layer",
+    "MATCHING": "motet.steering.matching",
+    "STEER": "motet.steering.model",
+    "LEADING": "motet.steering.path_following",
+    "REACHING": "motet.steering.reach_layer",
+    "STEERING_SETTINGS": "motet.steering.settings",
+    "GUIDED": "motet.steering.targets",
+    "WARPING": "motet.steering.warping",
+    "COMPOSITION": "motet.text.clauses",
+    "VOCABULARY": "motet.text.vocabulary",
+}
+"""Name of an object in TypeScript -> the module that has its constants."""
 
 
 def typescript() -> str:
@@ -80,16 +84,16 @@ def typescript() -> str:
     sources = [path.read_text("utf-8") for path in sorted(TARGET.parent.rglob("*.ts")) if path != TARGET]
     used = {name for source in sources for name in re.findall(r"\b[A-Z_]+\.[A-Z_]+\b|\b[a-z]\w+Settings\b", source)}
     parts = ["/* Written by runtime/web/generate.py from the modules of the Python runtime: do not edit. */\n"]
-    for module in map(import_module, MODULES):
-        path, _, name = module.__name__.rpartition(".")
-        constants = list(constants_of(module, {use[1] for use in map(parted, used) if use[0] == name.upper()}))
+    for name, path in MODULES.items():
+        module = import_module(path)
+        constants = list(constants_of(module, {use[1] for use in map(parted, used) if use[0] == name}))
         if constants:
-            parts += [f"\n// {path}.{name}\nexport const {name.upper()} = {{\n", *constants, "} as const;\n"]
+            parts += [f"\n// {path}\nexport const {name} = {{\n", *constants, "} as const;\n"]
         for title, kind in inspect.getmembers(module, inspect.isclass):
             label = title[0].lower() + title[1:]
             if label in used and kind.__module__ == module.__name__:
                 parts += [
-                    f"\n// {path}.{name}.{title}\nexport const {label} = {{\n",
+                    f"\n// {path}.{title}\nexport const {label} = {{\n",
                     *fields_of(kind),
                     "} as const;\n",
                 ]

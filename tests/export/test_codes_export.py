@@ -13,14 +13,14 @@ from torch import nn
 import motet
 from motet.bundle.bundle import Bundle
 from motet.errors import TextWarning
-from motet.models.generate_codes import CodesModel
-from motet.models.language import RULES, SPECIALS
+from motet.figures.humanoid.bones import HUMANOID
+from motet.generate.model import CodesModel
 from motet.models.load import verify
-from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
+from motet.text.vocabulary import RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.parity import example, walks
 from motet_train.models.action_net import ActionsConfig, stems_of

@@ -8,7 +8,7 @@ import torch
 from predict_manifest import predict_manifest
 
 from motet.models.load import load
-from motet.models.predict import PredictModel
+from motet.predict.model import PredictModel
 from motet_export.bundles import export_run
 from motet_train.papers.li2018 import from_config
 from motet_train.papers.li2018.stepwise import Stepwise

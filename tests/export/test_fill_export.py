@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from motet.bundle.bundle import Bundle
-from motet.models.fill import FillModel
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.models.load import load, verify
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.predict.fill import FillModel
 from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS

@@ -9,10 +9,10 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
-from motet.decode.words import Limits, beam_search
+from motet.decode.beam import Limits, beam_search
 from motet.models.describe import DescribeModel
-from motet.models.language import EOS, PAD, RULES, SOS, SPECIALS, UNK
 from motet.models.load import load, verify
+from motet.text.vocabulary import EOS, PAD, RULES, SOS, SPECIALS, UNK
 from motet_export.bundles import export_run
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried

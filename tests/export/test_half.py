@@ -12,7 +12,7 @@ from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet.cli import main
 from motet.models.load import load_as, verify
-from motet.models.tdbn_control import TdbnModel
+from motet.papers.tdbn_control import TdbnModel
 from motet_export.exporter import export_graph, halved, round_weights
 
 SPEC = GraphSpec((TensorSpec("x", ("batch", 64)),), (TensorSpec("y", ("batch", 8)),))

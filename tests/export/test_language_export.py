@@ -10,11 +10,11 @@ import pytest
 import torch
 
 from motet.bundle.bundle import Bundle
+from motet.generate.base import GenerateModel
 from motet.models.describe import DescribeModel
-from motet.models.generate import GenerateModel
-from motet.models.language import RULES, SPECIALS
 from motet.models.load import load, verify
 from motet.representation.contract import Z_LIMIT
+from motet.text.vocabulary import RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_export.parity import example

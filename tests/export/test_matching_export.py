@@ -10,12 +10,12 @@ import pytest
 
 from motet import to_humanoid
 from motet.bundle.bundle import Bundle
-from motet.decode.steering_settings import SteeringSettings
+from motet.figures.humanoid import HUMANOID
 from motet.formats import read_motion
 from motet.models.load import load, load_as, verify
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import HUMANOID
 from motet.representation.contract import MotionContract, named
+from motet.steering.model import SteerModel
+from motet.steering.settings import SteeringSettings
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_train.data.cmu_trials import CMU_FOLDER

@@ -10,7 +10,7 @@ from predict_manifest import predict_manifest
 
 from motet.bundle.manifest import Manifest
 from motet.models.load import load
-from motet.models.predict import PredictModel
+from motet.predict.model import PredictModel
 from motet_export.bundles import export_run
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.runs import Run

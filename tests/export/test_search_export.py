@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from motet.bundle.bundle import Bundle
-from motet.models.language import RULES, SPECIALS
+from motet.figures.humanoid.bones import HUMANOID
 from motet.models.load import load, verify
-from motet.models.search import SearchModel
-from motet.motion.humanoid.bones import HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
+from motet.search.model import SearchModel
+from motet.text.vocabulary import RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.parity import example, walks
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from motet.bundle.graph import OnnxGraph
-from motet.decode.loops import free_run
+from motet.predict.free_run import free_run
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried, check_one_step
 from motet_train.papers.li2018.recurrent import (

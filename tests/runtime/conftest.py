@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 import motet
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 
 @pytest.fixture(scope="session")

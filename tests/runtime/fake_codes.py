@@ -6,8 +6,8 @@ import numpy as np
 from fake_models import FakeGraph, spec
 from numpy.typing import NDArray
 
-from motet.decode.codes import Source
-from motet.decode.memory import Memory
+from motet.generate.codes import Source
+from motet.generate.memory import Memory
 
 Array = NDArray[Any]
 MOVES, BODY, GROUPS, ACTIONS = 5, 4, 2, 3

@@ -3,9 +3,9 @@
 import numpy as np
 from fake_models import FakeGraph, manifest, spec
 
-from motet.models.fill import FillModel
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.motion.motion import Motion
+from motet.predict.fill import FillModel
 from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS

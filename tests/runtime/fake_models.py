@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.models.describe import DescribeModel
-from motet.models.generate import MixtureModel
-from motet.models.language import SPECIALS, Vocabulary
-from motet.models.search import SearchModel
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
+from motet.papers.mixture_model import MixtureModel
 from motet.representation.contract import MotionContract
+from motet.search.model import SearchModel
+from motet.text.vocabulary import SPECIALS, Vocabulary
 
 Array = NDArray[Any]
 FPS = 10.0

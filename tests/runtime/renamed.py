@@ -4,8 +4,8 @@ import json
 from importlib.resources import files
 from typing import Any
 
-from motet.motion.humanoid.bones import LEFT_RIGHT, part_of
-from motet.motion.humanoid.joint_map import map_by_names
+from motet.figures.humanoid.bones import LEFT_RIGHT, part_of
+from motet.figures.humanoid.joint_map import map_by_names
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.skeleton import END_SUFFIX
@@ -14,7 +14,7 @@ from motet.motion.skeleton import END_SUFFIX
 def names_of(motion: Motion, title: str) -> list[str]:
     """For each joint of a figure with known names the first name that a table has for it; others keep theirs."""
     tables: list[Any] = [
-        json.loads(file.read_text("utf-8")) for file in (files("motet.motion.humanoid") / "conventions").iterdir()
+        json.loads(file.read_text("utf-8")) for file in (files("motet.figures.humanoid") / "conventions").iterdir()
     ]
     (table,) = (table for table in tables if table["title"] == title)
     skeleton = skeleton_of(motion)

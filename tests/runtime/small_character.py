@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gltf_player import Array, matrix
 
-from motet.motion.humanoid.bones import MIXAMO, T_POSE
+from motet.figures.humanoid.bones import MIXAMO, T_POSE
 
 QUARTER = 0.5**0.5
 

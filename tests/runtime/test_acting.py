@@ -5,17 +5,17 @@ import pytest
 from numpy.typing import NDArray
 
 import motet
-from motet.decode.acting import UPPER
-from motet.decode.acts import WIDTH, Act, ActSettings
 from motet.errors import ControlError, MotionError, ScriptError, TextError
-from motet.models.said_acts import SaidActs
-from motet.models.scripts import parse_orders
-from motet.models.steer import SteerModel
-from motet.models.steer_session import SteerSession
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.motion import Motion
-from motet.motion.pose import Pose
 from motet.motion.rotations import quat_product
+from motet.steering.action_layer import UPPER
+from motet.steering.acts import WIDTH, Act, ActSettings
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.scripts import parse_orders
+from motet.steering.sentence_acts import SaidActs
+from motet.steering.session import SteerSession
 
 pytestmark = pytest.mark.numeric
 

@@ -9,8 +9,8 @@ import pytest
 from command_line import run
 
 import motet
-from motet import archives
-from motet.archives import ZipFiles
+from motet.corpus import archives
+from motet.corpus.archives import ZipFiles
 from motet.corpus.sources import Source, files_of, opened
 
 BVH = (Path(__file__).parent / "skeletons/mixamo.bvh").read_bytes()

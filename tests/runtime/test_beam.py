@@ -5,7 +5,7 @@ import pytest
 from fake_models import STATE, FakeGraph, word_step
 from numpy.typing import NDArray
 
-from motet.decode.words import Hypothesis, Limits, beam_search
+from motet.decode.beam import Hypothesis, Limits, beam_search
 
 pytestmark = pytest.mark.numeric
 

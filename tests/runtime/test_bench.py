@@ -19,7 +19,7 @@ from motet.bench.machine import Machine, ceilings, fresh, peak_memory
 from motet.bench.measure import Case, Row, Taken, Times, compared
 from motet.bench.profile import operations_of, profiled
 from motet.bundle.graph import SessionOptions
-from motet.models.predict import PredictModel
+from motet.predict.model import PredictModel
 
 HERE = Machine("a processor", 2, {"motet": motet.__version__, "numpy": "2.0"}, 0.0, {"1": 100.0, "2": 180.0}, 9.0)
 

@@ -12,15 +12,15 @@ from command_line import run
 
 import motet
 from motet.bundle.manifest import Manifest
-from motet.decode.codec import Inertialization
-from motet.decode.continue_codes import ContinuationSettings, Pace
 from motet.errors import DecodingError, MotionError
-from motet.models.continuation import Continuation, at_rate, levelled, paced
-from motet.models.generate_codes import CodesModel
-from motet.models.predict import SURE, PredictModel
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.humanoid.bones import HUMANOID
+from motet.generate.codec import Inertialization
+from motet.generate.continuation import Continuation, at_rate, levelled, paced
+from motet.generate.continue_codes import ContinuationSettings, Pace
+from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
+from motet.predict.model import SURE, PredictModel
 from motet.representation.contract import MotionContract
 
 RULES = ContinuationSettings()

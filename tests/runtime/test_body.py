@@ -9,8 +9,8 @@ from motet.draw.body import human_mesh
 from motet.draw.figure import Body, figure_of
 from motet.draw.mesh import loft, normals_of, ring
 from motet.draw.skinned import person, skinned
+from motet.figures.humanoid import HUMANOID, T_POSE, to_humanoid
 from motet.formats import read_motion
-from motet.motion.humanoid import HUMANOID, T_POSE, to_humanoid
 from motet.motion.kinematics import positions
 
 

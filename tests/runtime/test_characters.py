@@ -10,9 +10,9 @@ from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
+from motet.figures.humanoid.bones import BONES
 from motet.formats import Character, read_character
 from motet.motion import HUMANOID, MIXAMO, positions
-from motet.motion.humanoid.bones import BONES
 
 
 def test_a_motion_is_written_onto_a_character_given_in_any_way(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ from figures import walker
 from gltf_files import write_clips
 
 import motet
-from motet import checked
-from motet.checked import Checked
+from motet.corpus import checked
+from motet.corpus.checked import Checked
 from motet.errors import MotionError
 from motet.motion import HUMANOID, Motion
 

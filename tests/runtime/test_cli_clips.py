@@ -11,7 +11,7 @@ from gltf_files import write_clips
 from test_retarget import dancing
 
 import motet
-from motet.models.search import Index
+from motet.search.model import Index
 
 NAMES = ("Walk", "a/b: c?", "歩く", "..", "A|B", "A:B")
 LABELS = ("Walk", "a_b_ c_", "歩く", "__", "A_B", "A_B_2")

@@ -9,8 +9,8 @@ from command_line import check_refused, run
 from fake_models import describe_model, generate_model, moving
 
 from motet.formats import read_motion, write_motion
+from motet.generate.base import GenerateModel
 from motet.models.describe import ConfidenceSettings, DescribeModel
-from motet.models.generate import GenerateModel
 from motet.models.load import load, load_as
 from motet.motion.motion import Motion
 

@@ -13,7 +13,7 @@ from fake_models import moving, search_model
 import motet
 from motet.formats import read_motion, write_motion
 from motet.models.load import load_as
-from motet.models.search import INDEX_FILE, Index, IndexSettings, SearchModel
+from motet.search.model import INDEX_FILE, Index, IndexSettings, SearchModel
 
 
 @pytest.fixture(autouse=True)
@@ -154,9 +154,9 @@ def test_indexes_of_shards_are_merged_into_the_bytes_of_one(folder: Path, tmp_pa
 
 def test_merged_shards_are_not_embedded_again(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run("search", "walks", folder, "--shard", "1/2", "--index", tmp_path / "a.npz")
-    read, asked = motet.models.search.read_motion, list[str]()
+    read, asked = motet.search.model.read_motion, list[str]()
     monkeypatch.setattr(
-        "motet.models.search.read_motion", lambda path, **rest: asked.append(path.name) or read(path, **rest)
+        "motet.search.model.read_motion", lambda path, **rest: asked.append(path.name) or read(path, **rest)
     )
     run("search", "walks", folder, "--merge", tmp_path / "a.npz")
     assert asked == ["1.npz", "3.npz"]  # those of the shard that is missing

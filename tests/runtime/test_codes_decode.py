@@ -11,16 +11,8 @@ import pytest
 from fake_codes import ACTIONS, END, KNOWN, NULL_ACTION, PARTS, memory_tables, numbers_of, remembered, source
 from numpy.typing import NDArray
 
-from motet.decode.codes import (
-    CodesSettings,
-    Source,
-    Writer,
-    draw_codes,
-    drawn_actions,
-    drawn_steps,
-    nucleus,
-)
-from motet.decode.memory import LEAP, PAST, Memory
+from motet.generate.codes import CodesSettings, Source, Writer, draw_codes, drawn_actions, drawn_steps, nucleus
+from motet.generate.memory import LEAP, PAST, Memory
 
 pytestmark = pytest.mark.numeric
 

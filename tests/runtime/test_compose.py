@@ -11,7 +11,7 @@ from command_line import run
 
 import motet
 from motet import Moment
-from motet.models.plans import parse_plan, read_plan
+from motet.compose.plans import parse_plan, read_plan
 from motet.motion import HUMANOID, Motion, positions
 from motet.motion.rotations import Array
 
@@ -63,7 +63,7 @@ def test_what_is_not_met_is_told(model: motet.CodesModel) -> None:
     """What is told of a motion that somebody else made."""
     still = model.story("a person stands still", seconds=3).motion
     root, turned = positions(still)[:, 0], facing(still)
-    place, seen = motet.models.compose.met(still, [Moment(1.0, place=(3.0, 4.0), facing=120.0)])
+    place, seen = motet.compose.compose.met(still, [Moment(1.0, place=(3.0, 4.0), facing=120.0)])
     assert place.off == pytest.approx(100 * math.dist(root[29, [0, 2]], (3, 4)), rel=1e-6)
     assert seen.off == pytest.approx(abs(120 - turned[29]), abs=5)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from motet.errors import TextError, TextWarning
-from motet.models.composition import parts_of, sentences_of, stem, verbs_of
-from motet.models.generate_codes import CodesModel, Story
+from motet.generate.model import CodesModel, Story
 from motet.models.load import load_as
+from motet.text.clauses import parts_of, sentences_of, stem, verbs_of
 
 VERBS = verbs_of(
     ["walking", "turning", "running", "jumping", "sitting", "drinking", "dancing", "bowing", "boxing", "something"]

@@ -6,7 +6,7 @@ import pytest
 from fake_models import STATE, Array, FakeGraph, word_step
 from numpy.typing import NDArray
 
-from motet.decode.words import Drawn, Limits, agreement, by_consensus, draw_sequences
+from motet.decode.beam import Drawn, Limits, agreement, by_consensus, draw_sequences
 
 pytestmark = pytest.mark.numeric
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motet.motion.feet.contacts import SOLES, ContactSettings, contacts, contacts_of, ground_speeds, rise, standing
+from motet.figures.feet.contacts import SOLES, ContactSettings, contacts, contacts_of, ground_speeds, rise, standing
 
 
 def test_contact_fades_from_the_first_bound_to_the_second() -> None:

@@ -13,10 +13,10 @@ from motet.bundle.bundle import list_bundles
 from motet.errors import ControlError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.models.load import load
-from motet.models.scripts import control_track, parse_segments
-from motet.models.tdbn_control import TdbnModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
+from motet.papers.control_script import control_track, parse_segments
+from motet.papers.tdbn_control import TdbnModel
 
 pytestmark = pytest.mark.numeric
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from motet import ControlError, SteerModel, load
-from motet.models.said_acts import SaidActs
-from motet.models.steer_session import SteerSession
-from motet.motion.pose import Pose
+from motet.steering.pose import Pose
+from motet.steering.sentence_acts import SaidActs
+from motet.steering.session import SteerSession
 
 pytestmark = pytest.mark.numeric
 

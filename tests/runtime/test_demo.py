@@ -7,10 +7,10 @@ from browser import CHROMIUM, Browser
 from figures import walker
 
 import motet
-from motet import demo
 from motet.draw.svg import strip
 from motet.errors import OutputError
-from motet.models.steer import SteerModel
+from motet.live import demo
+from motet.steering.model import SteerModel
 
 
 @pytest.fixture(scope="module")

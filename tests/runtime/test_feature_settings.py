@@ -10,7 +10,7 @@ from fake_models import search_model
 
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError, SettingError
-from motet.models.search import SearchModel
+from motet.search.model import SearchModel
 from motet.settings import Range, Settings
 
 

@@ -13,10 +13,10 @@ from test_mmm_figure import mmm
 
 import motet
 from motet.errors import BundleError, MotionError
-from motet.models.fill import FillModel
 from motet.motion import MIXAMO, Motion, from_humanoid, positions, to_humanoid
 from motet.motion.kinematics import local_rotations, local_translations, posed
 from motet.motion.rotations import axis_to_rotmat
+from motet.predict.fill import FillModel
 from motet.representation.placed import placed
 
 pytestmark = pytest.mark.numeric

@@ -9,8 +9,8 @@ from figures import WRITTEN
 
 import motet
 from motet.formats import read_motion
-from motet.models.fill import FillModel
 from motet.motion import Motion, positions
+from motet.predict.fill import FillModel
 
 WALK, RUN = "39_14.amc", "09_07.amc"
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from test_retarget import angles_between, dancing
 
+from motet.figures.humanoid.bones import LEFT_RIGHT
 from motet.motion import HUMANOID, Joint, Motion, Skeleton, from_humanoid, local_rotations, positions
-from motet.motion.humanoid.bones import LEFT_RIGHT
 from motet.motion.kinematics import motion_of
 from motet.motion.rotations import Array, rotvec_to_rotmat
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_odd_figures import ON_THE_FLOOR, posed
 
-from motet.motion.floor import LIMBS, THICKNESS, TOLERATED, above_floor
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.floor import LIMBS, THICKNESS, TOLERATED, above_floor
+from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from motet.errors import MotionError
+from motet.figures.feet.hold import HoldSettings
+from motet.figures.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sole_points
+from motet.figures.two_bones import TwoBones
 from motet.formats import read_motion
 from motet.motion import HUMANOID, global_transforms, hold_feet, positions, to_humanoid
-from motet.motion.feet.hold import HoldSettings
-from motet.motion.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sole_points
 from motet.motion.motion import Motion
-from motet.motion.parts import parts
 from motet.motion.rotations import euler_to_rotmat, quat_to_rotmat
+from motet.motion.scalar_or_batch import parts
 from motet.motion.skeleton import Joint, Skeleton
-from motet.motion.two_bones import TwoBones
 
 BALLS = [HUMANOID.index(side + "Toes") for side in LEFT_RIGHT]
 LEGS = [[HUMANOID.index(side + part) for part in LEG[:3]] for side in LEFT_RIGHT]

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from motet.motion.feet.lock import FootLock
-from motet.motion.humanoid import BONES, sole_points
-from motet.motion.pose import Pose
+from motet.figures.humanoid import BONES, sole_points
 from motet.motion.rotations import Array, quat_to_rotmat
+from motet.steering.foot_lock import FootLock
+from motet.steering.pose import Pose
 
 DT, HEIGHT = 1 / 30, 0.98
 

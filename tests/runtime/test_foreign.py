@@ -16,10 +16,10 @@ import motet
 from motet.errors import MotionError
 from motet.formats.text import with_names
 from motet.models.describe import DescribeModel
-from motet.models.predict import PredictModel
-from motet.models.tdbn_control import TdbnModel
 from motet.motion import MIXAMO, Joint, Motion, Skeleton, global_transforms, positions
 from motet.motion.rotations import euler_to_rotmat, rotmats_to_euler
+from motet.papers.tdbn_control import TdbnModel
+from motet.predict.model import PredictModel
 
 CLIPS = ("39_14", "09_07", "02_06")
 

@@ -16,8 +16,8 @@ from figures import WRITTEN, walker
 from test_mmm import frame, xml
 
 from motet.errors import FormatError, MotetError, MotionError, OutputError
+from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import FORMATS, MOCAP, READABLE, WRITABLE, read_motion, write_motion
-from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
 
 DOCS = Path(__file__).parents[2] / "docs" / "formats.md"

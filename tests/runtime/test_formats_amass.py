@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from motet.errors import FormatError
+from motet.figures.humanoid.bones import HUMANOID
+from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import npz, read_motion
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 

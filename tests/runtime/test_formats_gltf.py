@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from motet.errors import FormatError, MotionError
+from motet.figures.humanoid.bones import BONES, HUMANOID, MIXAMO, T_POSE, ground_under, sole_points
+from motet.figures.humanoid.retarget import from_humanoid, grounded, to_humanoid
 from motet.formats import glb, gltf, gltf_data, read_character, read_motion
-from motet.motion.humanoid.bones import BONES, HUMANOID, MIXAMO, T_POSE, ground_under, sole_points
-from motet.motion.humanoid.retarget import from_humanoid, grounded, to_humanoid
 from motet.motion.kinematics import global_transforms, local_rotations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, rotmat_to_rotvec

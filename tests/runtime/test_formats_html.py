@@ -13,8 +13,8 @@ from motet.draw import page as html
 from motet.draw.figure import Body, figure_of
 from motet.draw.skinned import person
 from motet.errors import MotionError, OutputError
+from motet.figures.humanoid import HUMANOID, to_humanoid
 from motet.formats import read_motion, write_motion
-from motet.motion.humanoid import HUMANOID, to_humanoid
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import product, quat_to_rotmat, rotated

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from motet.bundle.fields import Fields
-from motet.decode.steering_settings import SteeringSettings
 from motet.errors import BundleError
-from motet.models.gaits import Gaits
+from motet.steering.gaits import Gaits
+from motet.steering.settings import SteeringSettings
 
 SPEEDS = [[0.1, 1.3, 1.9, 1.2, 1.6], [1.0, 1.8, 2.5, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0]]
 """m/s: the slowest, the usual, the fastest forward, sideways and backwards of a walk, a sneak and a jump."""

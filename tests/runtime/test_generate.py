@@ -8,12 +8,12 @@ from fake_models import CONTRACT, generate_model, moving
 from figures import walker
 
 from motet.bench.cases import SECONDS, cases
-from motet.decode.mixture import Sample
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.formats import read_motion
-from motet.models.generate import Generated, GenerateModel
+from motet.generate.base import Generated, GenerateModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
+from motet.papers.mixture import Sample
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import from_root_block, plant_feet, to_root_block
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from motet import ControlError, SteerModel, load
-from motet.decode.arriving import Paths
+from motet.steering.arrival import Paths
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from motet.decode.codec import REACH, moved, nearest_moves, seen_from, way_of
+from motet.generate.codec import REACH, moved, nearest_moves, seen_from, way_of
 from motet.motion.rotations import Array
 from motet.representation.root_block import way
 

@@ -9,11 +9,11 @@ from fake_models import CONTRACT, FakeGraph, manifest, spec
 
 from motet.bundle.fields import Fields
 from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.decode.beam import Limits, beam_search, draw_sequences
 from motet.decode.loop import zero_state
-from motet.decode.loops import free_run
-from motet.decode.words import Limits, beam_search, draw_sequences
 from motet.errors import BundleError
-from motet.models.predict import PredictModel
+from motet.predict.free_run import free_run
+from motet.predict.model import PredictModel
 
 pytestmark = pytest.mark.numeric
 

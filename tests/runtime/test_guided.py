@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from motet import ControlError, SteerModel, SteerSession, load
-from motet.models.scripts import parse_orders
-from motet.motion import looking, reaching
-from motet.motion.humanoid import BONES, HUMANOID
-from motet.motion.pose import Pose
+from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array, conjugate, quat_rotated
+from motet.steering import look_layer as looking
+from motet.steering import reach_layer as reaching
+from motet.steering.pose import Pose
+from motet.steering.scripts import parse_orders
 
 AROUND = [(0, 1.6, 3), (2, 1.6, 2), (-2.5, 1.2, 1.2), (1, 0, 3), (-1, 2.5, 2.5)]
 

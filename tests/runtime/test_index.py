@@ -11,8 +11,8 @@ from fake_models import moving, search_model
 
 from motet.errors import DecodingError, FormatError, MotionError, OutputError, TextError
 from motet.formats import read_motion, write_motion
-from motet.models import search as searching
-from motet.models.search import INDEX_FILE, Hit, Index, Member, SearchModel
+from motet.search import model as searching
+from motet.search.model import INDEX_FILE, Hit, Index, Member, SearchModel
 
 FILES = ("a.npz", "b.npz", "inner/c.npz", "d.npz")
 

@@ -7,10 +7,10 @@ import pytest
 from renamed import names_of
 
 from motet.errors import FormatError
+from motet.figures.humanoid.joint_map import JointMap, conventions, map_by_names, read_map
+from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import read_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid.joint_map import JointMap, conventions, map_by_names, read_map
-from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from motet.compose.keys import Key, Moves
 from motet.errors import MotionError
-from motet.motion.keys import Key, Moves
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 
 FRAMES, REACH = 60, 10

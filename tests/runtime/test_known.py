@@ -8,7 +8,7 @@ from fake_models import CONTRACT, FakeGraph, describe_model, moving, spec
 
 from motet.errors import BundleError, DecodingError
 from motet.models.describe import DescribeModel
-from motet.models.known import NOTHING, RIGHT, AnswerSettings, Known, Seen, path_of
+from motet.models.nearest_neighbour import NOTHING, RIGHT, AnswerSettings, Known, Seen, path_of
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 

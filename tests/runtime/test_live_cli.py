@@ -5,7 +5,7 @@ import pytest
 from command_line import check_refused, run
 
 import motet
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 OSC = ("--osc", "127.0.0.1:39539")
 

@@ -13,9 +13,9 @@ from browser import CHROMIUM, Browser
 import motet
 from motet.draw.page import source
 from motet.errors import BundleError, ControlError, OutputError
+from motet.figures.humanoid import T_POSE
 from motet.live.page import live_body, net_data
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import T_POSE
+from motet.steering.model import SteerModel
 
 NODE = shutil.which("node")
 PLAN = [

@@ -9,7 +9,7 @@ from browser import CHROMIUM, Browser
 from figures import walker
 
 import motet
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 PRESSED = "document.querySelector('#{}').ariaPressed"
 GONE = "(() => { for (let n = 0; n < 90; n++) motet.tick(motet.asked()); return motet.figures[0].root; })()"

@@ -14,12 +14,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from motet.decode.acts import Act, ActSettings
 from motet.errors import ControlError, OutputError, TextError
-from motet.models.composition import Shown
-from motet.models.steer import SteerModel
-from motet.motion.humanoid.bones import BONES, HUMANOID
-from motet.motion.pose import Pose
+from motet.figures.humanoid.bones import BONES, HUMANOID
+from motet.steering.acts import Act, ActSettings
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.text.clauses import Shown
 
 pytest.importorskip("websockets", reason="the extra live is not installed")
 from websockets.asyncio.client import ClientConnection, connect

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from motet.errors import OutputError, ScriptError
-from motet.models.steer import SteerModel
-from motet.motion.humanoid.bones import BONES, HUMANOID
-from motet.motion.pose import Pose
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.motion.rotations import quat_to_rotmat
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
 
 pytest.importorskip("pythonosc", reason="the extra live is not installed")
 from pythonosc.osc_packet import OscPacket

@@ -14,9 +14,9 @@ from small_character import character, packed
 
 import motet
 from motet.draw.body import human_mesh
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import HUMANOID, T_POSE
+from motet.figures.humanoid import HUMANOID, T_POSE
 from motet.motion.rotations import Array, quat_to_rotmat
+from motet.steering.model import SteerModel
 
 TICKS = "(() => {{ for (let n = 0; n < {}; n++) motet.tick(motet.asked()); return motet.figures[0].root; }})()"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from motet.bundle.graph import Floats
-from motet.decode.lookahead import Lookahead, LookaheadSettings, Run
+from motet.papers.lookahead import Lookahead, LookaheadSettings, Run
 
 pytestmark = pytest.mark.numeric
 

@@ -6,9 +6,9 @@ from figures import walker
 from test_retarget import SKELETONS
 
 from motet.errors import MotionError
+from motet.figures.humanoid.retarget import on_humanoid
 from motet.formats import read_motion
 from motet.motion import heading, looped, positions
-from motet.motion.humanoid.retarget import on_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton

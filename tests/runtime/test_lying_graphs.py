@@ -12,8 +12,8 @@ from motet.bundle.bundle import Bundle
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError
+from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
-from motet.models.generate_codes import CodesModel
 from motet.models.load import build
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import motet
-from motet.decode.matching import (
+from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT
+from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
+from motet.steering.matching import (
     FEATURES,
     TRAJECTORY,
     Matcher,
@@ -17,12 +19,10 @@ from motet.decode.matching import (
     mirrored_features,
     stride_velocities,
 )
-from motet.decode.steering import PoseCodes
-from motet.decode.steering_settings import SteeringSettings
-from motet.decode.warping import UNDER, strided, warped
-from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT
-from motet.motion.pose import Pose
-from motet.motion.rotations import conjugate, quat_product, quat_rotated, quat_to_rotmat, wrapped
+from motet.steering.pose import Pose
+from motet.steering.settings import SteeringSettings
+from motet.steering.step import PoseCodes
+from motet.steering.warping import UNDER, strided, warped
 
 pytestmark = pytest.mark.numeric
 

@@ -7,8 +7,8 @@ import numpy as np
 from fake_codes import END, PARTS, memory_tables, source
 from numpy.typing import NDArray
 
-from motet.decode.codes import CodesSettings, Writer, draw_codes
-from motet.decode.memory import WHOLE, Memory
+from motet.generate.codes import CodesSettings, Writer, draw_codes
+from motet.generate.memory import WHOLE, Memory
 
 Array = NDArray[Any]
 REMEMBERED = CodesSettings(memory=1.0)

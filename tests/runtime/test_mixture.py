@@ -6,7 +6,7 @@ from fake_models import STATE, FakeGraph, frame_step, log_likelihood
 from numpy.typing import NDArray
 
 from motet.decode.loop import Sample
-from motet.decode.mixture import draw, log_density, mixture_search
+from motet.papers.mixture import draw, log_density, mixture_search
 
 pytestmark = pytest.mark.numeric
 

@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motet.figures.humanoid.bones import HUMANOID, MMM_SKELETON, is_mmm, sole_points, with_figure
+from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import read_motion
-from motet.motion.humanoid.bones import HUMANOID, MMM_SKELETON, is_mmm, sole_points, with_figure
-from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 

@@ -10,8 +10,8 @@ from gltf_files import node_places, read_document, write_clips, write_document
 
 import motet
 from motet.errors import FormatError
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.formats.text import part_names
-from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 

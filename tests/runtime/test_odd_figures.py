@@ -9,10 +9,10 @@ from gltf_files import read_document, write_clips, write_document
 from test_retarget import SKELETONS, angles_between, dancing, limbless, skeleton_file
 
 from motet.errors import FormatError, MotionError
+from motet.figures.humanoid.bones import HUMANOID
+from motet.figures.humanoid.retarget import SURE_OF_JOINTS, from_humanoid, to_humanoid
 from motet.formats import read_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import SURE_OF_JOINTS, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product

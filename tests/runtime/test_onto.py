@@ -16,8 +16,8 @@ from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
+from motet.figures.humanoid.bones import HUMANOID, LEFT_RIGHT, MIXAMO
 from motet.formats import Character, gltf_character, read_character
-from motet.motion.humanoid.bones import HUMANOID, LEFT_RIGHT, MIXAMO
 
 SCALE: Node = {"scale": [0.01] * 3}
 TURN: Node = {"rotation": [QUARTER, 0, 0, QUARTER]}
@@ -39,9 +39,9 @@ LIMBS = [("UpLeg", "Leg"), ("Leg", "Foot"), ("Arm", "ForeArm"), ("ForeArm", "Han
 def walk() -> motet.Motion:
     """The humanoid on its feet while all its joints move, with its soles on the ground."""
     motion = dancing()
-    soles = motet.motion.humanoid.bones.sole_points(*motet.motion.global_transforms(motion))
+    soles = motet.figures.humanoid.bones.sole_points(*motet.motion.global_transforms(motion))
     values = np.array(motion.values)
-    values[:, motion.channels.index("hips.ty")] -= motet.motion.humanoid.bones.ground_under(soles)
+    values[:, motion.channels.index("hips.ty")] -= motet.figures.humanoid.bones.ground_under(soles)
     return motet.Motion(values, motion.channels, motion.units, motion.fps, HUMANOID)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from fake_codes import ACTIONS, END, MOVES, numbers_of, remembered, source
 
-from motet.decode.codes import CodesSettings
-from motet.decode.continue_codes import ContinuationSettings, Continuer, Pace
-from motet.decode.continue_codes import numbers_of as asked_numbers
+from motet.generate.codes import CodesSettings
+from motet.generate.continue_codes import ContinuationSettings, Continuer, Pace
+from motet.generate.continue_codes import numbers_of as asked_numbers
 
 MOTIONS, RULES = remembered(), ContinuationSettings()
 DRAWING = CodesSettings(memory=0.5)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import motet
-from motet.models.predict import PredictModel
 from motet.motion import HUMANOID, Motion, positions
 from motet.motion.rotations import Array
+from motet.predict.model import PredictModel
 
 BUNDLES = ("describe", "predict", "search", "control")
 EXTENSIONS = (".amc", ".bvh", ".glb", ".npz", ".vrma")

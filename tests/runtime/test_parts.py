@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motet.motion import parts as by
+from motet.motion import scalar_or_batch as by
 from motet.motion.rotations import quat_to_rotmat, swing
 
 

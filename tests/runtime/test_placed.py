@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fake_fill import CONTRACT, glider
 
-from motet.motion.humanoid.bones import BONES, HUMANOID
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion

@@ -10,13 +10,13 @@ from fake_models import FakeGraph, manifest, spec
 from figures import walker
 
 import motet
-from motet.decode.loops import free_run
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
-from motet.models.predict import PredictModel
 from motet.motion.kinematics import local_rotations, positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
+from motet.predict.free_run import free_run
+from motet.predict.model import PredictModel
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import RootVectors, joints_of, to_joint_vectors
 

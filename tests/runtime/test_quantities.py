@@ -5,16 +5,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.decode.codes import Writer
 from motet.errors import TextError, TextWarning
-from motet.models.amounts import Seen, played, short, spells, strokes
-from motet.models.composition import at_odds
-from motet.models.generate_codes import CodesModel, Story
+from motet.figures.humanoid import HUMANOID, T_POSE
+from motet.generate.codes import Writer
+from motet.generate.model import CodesModel, Story
+from motet.generate.motion_measures import Seen, played, short, spells, strokes
 from motet.models.load import load_as
-from motet.models.quantities import quantities_of
-from motet.motion.humanoid import HUMANOID, T_POSE
 from motet.motion.kinematics import positions
 from motet.motion.rotations import Array
+from motet.text.clauses import at_odds
+from motet.text.numeric_phrases import quantities_of
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_a_long_turn_is_streamed_stretch_by_stretch(model: CodesModel, monkeypat
 def test_what_is_played_slower_is_the_same_in_stretches(model: CodesModel, monkeypatch: pytest.MonkeyPatch) -> None:
     assert model.quantities("a person bows slowly").amounts == {"pace": 0.75}
     whole = model.story("a person bows slowly", seconds=12).frames
-    monkeypatch.setattr("motet.models.telling.STRETCH", 2.5)
+    monkeypatch.setattr("motet.generate.story_decoder.STRETCH", 2.5)
     frames = model.story("a person bows slowly", seconds=12).frames
     assert len(frames) == 12 * model.fps
     assert np.abs(frames[:, 3:] - whole[:, 3:]).max() < 0.05  # shown within a fraction of a frame of the same time

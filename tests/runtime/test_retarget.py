@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from motet.errors import MotionError
+from motet.figures.humanoid.bones import BONES, HUMANOID, T_POSE, sole_points
+from motet.figures.humanoid.joint_tree import map_by_tree
+from motet.figures.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.formats import read_motion, write_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid.bones import BONES, HUMANOID, T_POSE, sole_points
-from motet.motion.humanoid.joint_tree import map_by_tree
-from motet.motion.humanoid.retarget import Humanoid, from_humanoid, to_humanoid
 from motet.motion.kinematics import global_transforms, motion_of, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from motet.errors import MotionError
+from motet.figures.humanoid.bones import HUMANOID
+from motet.figures.humanoid.joint_map import map_by_names
+from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import clips, read_motion
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.joint_map import map_by_names
-from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.kinematics import global_transforms
 
 sys.path.append(str(Path(__file__).parents[1]))

@@ -11,8 +11,8 @@ from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import MotionError
+from motet.figures.humanoid.bones import LEG, RIGS, sided
 from motet.motion import HUMANOID, Motion, positions, rig
-from motet.motion.humanoid.bones import LEG, RIGS, sided
 
 NAMES = {
     "mixamo": ("mixamorig:Hips", "mixamorig:Spine2", "mixamorig:LeftForeArm", "mixamorig:RightToeBase"),
@@ -29,7 +29,7 @@ def grounded() -> Motion:
 
 
 def test_the_tables_that_have_a_rig_are_those_that_can_be_named() -> None:
-    tables = (files("motet.motion.humanoid") / "conventions").iterdir()
+    tables = (files("motet.figures.humanoid") / "conventions").iterdir()
     found = {table.name: json.loads(table.read_text("utf-8")) for table in tables}
     assert sorted(name for name, table in found.items() if "rig" in table) == [f"{name}.json" for name in RIGS]
     with pytest.raises(MotionError, match="there is no rig 'maya'; expected one of mixamo, rigify, unity, unreal"):
@@ -54,7 +54,7 @@ def test_a_motion_comes_back_from_a_rig(tmp_path: Path, name: str, extension: st
     motion, path = grounded(), tmp_path / f"a{extension}"
     motet.write(path, motion, like=name)
     found = motet.to_humanoid(motet.read(path))
-    title = json.loads((files("motet.motion.humanoid") / "conventions" / f"{name}.json").read_text("utf-8"))["title"]
+    title = json.loads((files("motet.figures.humanoid") / "conventions" / f"{name}.json").read_text("utf-8"))["title"]
     assert (found.convention, found.confidence) == (title, 1.0)
     off = np.abs(positions(found.motion) - positions(motion)).max(axis=(0, 2))
     exact = ["hips", *(sided(side, part) for side in ("left", "right") for part in LEG)]

@@ -5,9 +5,9 @@ import pytest
 from figures import walker
 
 from motet.errors import MotionError
+from motet.figures.feet.contacts import has_feet, lay_root_path
 from motet.formats import read_motion
 from motet.formats.amc import read
-from motet.motion.feet.contacts import has_feet, lay_root_path
 from motet.motion.kinematics import local_translations, positions
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from fake_models import CHANNELS, STATE, FakeGraph, describe_model, generate_model, log_likelihood
 
-from motet.decode.mixture import score_frames
-from motet.decode.words import score_words
+from motet.decode.beam import score_words
 from motet.errors import DecodingError
-from motet.models.generate import GenerateModel
+from motet.generate.base import GenerateModel
+from motet.papers.mixture import score_frames
 
 SAID = np.array([[1, 4, 5, 2, 0], [1, 4, 5, 6, 2], [1, 4, 2, 0, 0], [1, 4, 5, 2, 0], [1, 2, 0, 0, 0]])
 ROWS = np.array([0, 0, 0, 1, 1])

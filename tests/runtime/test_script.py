@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from motet.errors import ControlError, ScriptError
-from motet.models.scripts import Segment, captions, control_track, parse_segments
+from motet.models.control import captions
+from motet.papers.control_script import Segment, control_track, parse_segments
 
 LABELS = ("walk", "run", "bend_over")
 

@@ -7,10 +7,10 @@ import pytest
 from fake_models import CONTRACT, VOCABULARY, FakeGraph, moving, search_model, spec
 
 from motet.bench.cases import cases
-from motet.decode.loops import nearest
 from motet.errors import BundleError, MotionError, TextError, TextWarning
 from motet.models.load import build
-from motet.models.search import SearchModel
+from motet.search.model import SearchModel
+from motet.search.nearest import nearest
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from starlette.testclient import TestClient
 
 from motet.serve.application import app
 from motet.serve.content import MEDIA
-from motet.serve.doors import DOORS
 from motet.serve.limits import Limits
+from motet.serve.routes import DOORS
 
 ORIGIN = "https://pages.example"
 SKELETONS = Path(__file__).parent / "skeletons"

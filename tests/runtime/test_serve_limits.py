@@ -35,10 +35,10 @@ from websockets.sync.client import ClientConnection, connect
 from motet.live.server import LIMITS
 from motet.serve.application import listening
 from motet.serve.batches import Batcher
-from motet.serve.doors import DOORS
 from motet.serve.endpoints import HEADER_BYTES, endpoint, in_a_header, refused
 from motet.serve.limits import Gate, Limits
 from motet.serve.protocol import OPTIONS, BoundedProtocol, most_connections, quieter
+from motet.serve.routes import DOORS
 
 WALK = "/generate.npz?text=a+person+walks&seconds=1&seed="
 

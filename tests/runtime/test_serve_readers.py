@@ -252,13 +252,13 @@ def test_what_a_broken_process_says(
 @posix
 def test_sentences_are_answered_while_files_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     pytest.importorskip("starlette", reason="the extra serve is not installed")
+    from motet.generate.model import CodesModel
     from motet.models.describe import DescribeModel
-    from motet.models.generate_codes import CodesModel
     from motet.models.load import load_as
-    from motet.models.predict import PredictModel
+    from motet.predict.model import PredictModel
     from motet.serve.answers import Answers
-    from motet.serve.asked import Asked
     from motet.serve.limits import Limits
+    from motet.serve.request import Asked
 
     pipe = hanging(monkeypatch, tmp_path)
     writer, describer = load_as(CodesModel, "generate"), load_as(DescribeModel, "describe")

@@ -10,13 +10,13 @@ import pytest
 from command_line import run
 
 import motet
-from motet.decode.codes import WINDOW, CodesSettings, Writer, drawn_steps
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
-from motet.models.generate_codes import CodesModel
-from motet.motion.humanoid import HUMANOID
+from motet.figures.humanoid import HUMANOID
+from motet.generate.codes import WINDOW, CodesSettings, Writer, drawn_steps
+from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
-from motet.motion.looping import looped
 from motet.motion.motion import Motion
+from motet.predict.looping import looped
 
 pytestmark = pytest.mark.numeric
 

@@ -11,8 +11,8 @@ from memory import traced
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.known import NOTHING
 from motet.models.load import load
+from motet.models.nearest_neighbour import NOTHING
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
 

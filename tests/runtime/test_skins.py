@@ -8,9 +8,9 @@ import pytest
 from gltf_files import read_document, write_clips, write_document
 
 from motet.errors import MotionError
+from motet.figures.humanoid import HUMANOID, from_humanoid, rig, to_humanoid
 from motet.formats import read_character, read_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid import HUMANOID, from_humanoid, rig, to_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 

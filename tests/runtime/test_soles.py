@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import motet
-from motet.motion.humanoid import from_humanoid, to_humanoid
-from motet.motion.humanoid.bones import MIXAMO
+from motet.figures.humanoid import from_humanoid, to_humanoid
+from motet.figures.humanoid.bones import MIXAMO
 from motet.motion.kinematics import global_transforms
 from motet.motion.rotations import Array, rotated
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.pose import damped, damped_path, damping_of
+from motet.motion.springs import damped, damped_path, damping_of
 
 
 def test_a_spring_moves_as_its_equation_says() -> None:

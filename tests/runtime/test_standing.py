@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from motet import SteerModel, SteerSession, load
-from motet.decode.standing import DEPTH, PERIOD, SETTLES, TURNS
-from motet.motion.humanoid import HUMANOID
-from motet.motion.pose import Pose, damping_of
+from motet.figures.humanoid import HUMANOID
 from motet.motion.rotations import Array, conjugate, quat_product
+from motet.motion.springs import damping_of
+from motet.steering.idle import DEPTH, PERIOD, SETTLES, TURNS
+from motet.steering.pose import Pose
 
 TURNED = [bone for bone, by in TURNS.items() if by]
 """Bones that a breath turns: spine, upper chest, neck and shoulders."""

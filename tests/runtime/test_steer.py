@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from motet import ControlError, ControlWarning, SteerModel, load
-from motet.decode import steering
-from motet.decode.matching import Playback
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
-from motet.motion.pose import Pose
 from motet.motion.rotations import wrapped
+from motet.steering import step as steering
+from motet.steering.matching import Playback
+from motet.steering.pose import Pose
 
 pytestmark = pytest.mark.numeric
 

@@ -3,7 +3,8 @@
 import pytest
 
 from motet.errors import ScriptError
-from motet.models.scripts import Order, captions, parse_orders
+from motet.models.control import captions
+from motet.steering.scripts import Order, parse_orders
 
 GAITS = ("walk", "run")
 

@@ -11,7 +11,7 @@ from motet.bundle.bundle import Bundle, write_bundle
 from motet.bundle.manifest import TABLE_DTYPES
 from motet.bundle.members import array_bytes
 from motet.errors import BundleError
-from motet.models.search import SearchModel
+from motet.search.model import SearchModel
 
 ROWS = np.arange(12, dtype=np.float16).reshape(4, 3)
 

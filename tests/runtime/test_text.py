@@ -7,19 +7,8 @@ import numpy as np
 import pytest
 
 from motet.errors import BundleError, TextError
-from motet.models.language import (
-    EOS,
-    MAX_WORDS,
-    PAD,
-    RULES,
-    SOS,
-    SPECIALS,
-    SPELLING,
-    UNK,
-    TextRules,
-    Vocabulary,
-)
-from motet.models.spelling import corrected, distance
+from motet.text.spelling import corrected, distance
+from motet.text.vocabulary import EOS, MAX_WORDS, PAD, RULES, SOS, SPECIALS, SPELLING, UNK, TextRules, Vocabulary
 
 LENIENT = replace(RULES, spelling={})
 

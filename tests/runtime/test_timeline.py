@@ -15,9 +15,9 @@ from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.models.describe import DescribeModel, Description, TimelineSettings, best_path, edges, near_scores, windows
-from motet.models.language import EOS, SOS
 from motet.models.load import load_as
 from motet.motion.motion import Motion
+from motet.text.vocabulary import EOS, SOS
 
 ONE, OTHER = (1.0, 4.0, -2.0), (3.0, 2.0, -4.0)
 """Poses, in standard deviations from the mean, of which the small model says different things."""

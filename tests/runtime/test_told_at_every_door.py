@@ -9,7 +9,7 @@ from command_line import run
 import motet
 from motet import CodesModel, Shown, TextError, TextWarning
 from motet.live.protocol import ClientSession
-from motet.models.said_acts import SaidActs
+from motet.steering.sentence_acts import SaidActs
 
 SENTENCES = {
     "a person waves": (),

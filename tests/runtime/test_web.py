@@ -18,23 +18,22 @@ from web_cases import texts
 import motet
 from motet.bundle.bundle import Bundle
 from motet.bundle.golden import read
-from motet.decode.acts import Act, ActSettings
-from motet.decode.codec import Context
-from motet.decode.loops import LOOPS
-from motet.decode.words import noise_of, score_words
+from motet.decode.beam import noise_of, score_words
 from motet.errors import ControlWarning, TextWarning, TravelWarning
+from motet.figures.humanoid import BONES
 from motet.formats import read_motion
+from motet.generate.codec import Context
+from motet.generate.model import CodesModel
 from motet.models.describe import DescribeModel
-from motet.models.generate_codes import CodesModel
-from motet.models.language import EOS, SOS, SPECIALS, Vocabulary
-from motet.models.predict import PredictModel
-from motet.models.search import Index, IndexSettings, Member, SearchModel
-from motet.models.steer import SteerModel
 from motet.motion import in_place, is_in_place, with_travel
-from motet.motion.humanoid import BONES
 from motet.motion.kinematics import local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import quat_product
+from motet.predict.model import PredictModel
+from motet.search.model import Index, IndexSettings, Member, SearchModel
+from motet.steering.acts import Act, ActSettings
+from motet.steering.model import SteerModel
+from motet.text.vocabulary import EOS, SOS, SPECIALS, Vocabulary
 
 pytestmark = pytest.mark.numeric
 
@@ -115,7 +114,7 @@ def known() -> dict[str, Any]:
 
 def described(model: DescribeModel) -> dict[str, Any]:
     """By the agreement of 60 draws."""
-    loop, context = LOOPS["consensus"], model.contexts([golden("describe")])
+    loop, context = model.LOOPS["consensus"], model.contexts([golden("describe")])
     settings = loop.settled(loop.defaults(model.manifest.defaults), {"draws": 60, "beams": 5})
     settings["noise"] = noise_of(model.limits(settings), 60, 4)  # type: ignore[assignment]  # as describe passes it on
     (row,) = model._hypotheses(loop, context, settings)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from web_cases import CASES, WEB, cases
 
+from motet.figures.humanoid import to_humanoid
 from motet.formats import read_motion
-from motet.motion.humanoid import to_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 
 SHIPPED: dict[str, Any] = json.loads(CASES.read_text("utf-8"))

@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from motet.decode import memory
+from motet.generate import memory
 
 WEB = Path(__file__).parents[2] / "runtime/web"
 

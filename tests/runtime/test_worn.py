@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motet.motion.humanoid import HUMANOID, map_of
+from motet.figures.humanoid import HUMANOID, map_of
 from motet.motion.motion import Motion
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 

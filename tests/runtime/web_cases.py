@@ -19,10 +19,10 @@ from renamed import names_of
 from small_character import QUARTER, character, packed
 
 from motet import load
+from motet.figures.humanoid import BONES, HUMANOID, MIXAMO, from_humanoid, rig, to_humanoid
+from motet.figures.humanoid.alignment import AXES_TURNS
 from motet.formats import bvh, read_motion, write_motion
 from motet.formats.text import with_names
-from motet.motion.humanoid import BONES, HUMANOID, MIXAMO, from_humanoid, rig, to_humanoid
-from motet.motion.humanoid.alignment import AXES_TURNS
 from motet.motion.kinematics import global_transforms, motion_of, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotated

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from motet.motion.humanoid.bones import HUMANOID, T_POSE
+from motet.figures.humanoid.bones import HUMANOID, T_POSE
 from motet_train.evaluate.text_adherence.track import RATE
 
 INDEX = HUMANOID.index

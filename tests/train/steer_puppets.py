@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from motet.motion.humanoid.bones import BONES
-from motet.motion.pose import Pose
+from motet.figures.humanoid.bones import BONES
+from motet.steering.pose import Pose
 
 FPS = 30.0
 

@@ -12,7 +12,7 @@ from codes_data import ACTIONS, TEXT, small_store, trained
 from torch import nn
 
 from motet.cli import main
-from motet.models.language import SPECIALS
+from motet.text.vocabulary import SPECIALS
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import actions_of, mirror_text
 from motet_train.data.store import Store

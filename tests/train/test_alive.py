@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
 from motet_train.evaluate.predict.liveliness import SPANS, Trajectory, alive_table, figures, gait, going, measured
 from motet_train.evaluate.tables import json_ready

@@ -5,9 +5,9 @@ import pytest
 import torch
 from language_data import small_store, walker
 
-from motet.models.language import RULES
 from motet.motion.mirroring import mirror
 from motet.representation.root_block import to_root_block
+from motet.text.vocabulary import RULES
 from motet_train.data.batches import Batch, Examples, examples, frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import mirror_text

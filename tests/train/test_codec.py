@@ -14,8 +14,8 @@ from language_data import small_store as angles_store
 from sklearn.cluster import KMeans
 
 from motet.cli import main
-from motet.decode.codec import REACH, moved, seen_from, way_of
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.humanoid.bones import HUMANOID
+from motet.generate.codec import REACH, moved, seen_from, way_of
 from motet.motion.kinematics import positions
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import END_SUFFIX

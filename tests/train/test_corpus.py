@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from kit_zip import JOINTS, mmm_xml, write_kit_zip
 
+from motet.figures.feet.treadmill import with_travel
 from motet.formats import read_motion, write_motion
 from motet.formats.glb import container
 from motet.formats.gltf_data import parse
 from motet.formats.mmm import read
 from motet.motion import in_place
-from motet.motion.feet.treadmill import with_travel
 from motet_train.data import recorded
 from motet_train.data.archive import Archive
 from motet_train.data.cmu_trials import CMU_FOLDER

@@ -25,8 +25,8 @@ from language_models import (
 )
 
 from motet.cli import main
-from motet.models.language import RULES, Vocabulary
 from motet.motion.motion import Motion
+from motet.text.vocabulary import RULES, Vocabulary
 from motet_train.data.store import FRAMES as FRAMES_FILE
 from motet_train.data.store import INDEX, Store
 from motet_train.evaluate.language.describe import bleu, copied_bleu, describe_report, nearest_motions

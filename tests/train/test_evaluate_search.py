@@ -7,9 +7,9 @@ import pytest
 from language_models import KINDS, FakeDescribe, small_store, told
 from numpy.typing import NDArray
 
-from motet.decode.loops import LOOPS
-from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
+from motet.search.model import IndexSettings
+from motet.search.nearest import LOOPS
 from motet_train.data.store import Store
 from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, plain, split_as

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from motet.figures.feet.contacts import smoothed
 from motet.formats import read_motion
-from motet.motion.feet.contacts import smoothed
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_CLIPS, cmu_trial

@@ -15,11 +15,11 @@ from language_data import small_store as angles_store
 
 from motet.bundle.manifest import Manifest
 from motet.cli import main
-from motet.models.fill import FillModel
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.models.load import build
-from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
+from motet.predict.fill import FillModel
 from motet.representation.placed import PLACED_CHANNELS, bridge, mirror, placed, placed_by_way, pose_of, unplaced
 from motet_train.data.batches import frame_mirror
 from motet_train.data.corpus import Record

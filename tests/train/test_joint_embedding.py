@@ -12,7 +12,7 @@ from language_data import records
 from torch import Tensor
 
 from motet.cli import main
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from motet.models.describe import DescribeModel
-from motet.models.known import LEFT, RIGHT, STRAIGHT
 from motet.models.load import load_as
+from motet.models.nearest_neighbour import LEFT, RIGHT, STRAIGHT
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.batches import Views
 from motet_train.data.disguise import Disguise, seen_as

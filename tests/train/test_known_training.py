@@ -10,8 +10,8 @@ from language_data import small_store
 
 from motet.cli import main
 from motet.models.describe import DescribeModel
-from motet.models.known import NOTHING
-from motet.models.language import RULES
+from motet.models.nearest_neighbour import NOTHING
+from motet.text.vocabulary import RULES
 from motet_train.data.store import Store
 from motet_train.evaluate.language.actions import error_by_chance
 from motet_train.runs import Run

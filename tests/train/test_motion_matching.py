@@ -7,19 +7,19 @@ import pytest
 import torch
 
 from motet import to_humanoid
-from motet.decode.matching import TRAJECTORY, Matcher, Playback, Table, mirrored_features
-from motet.decode.steering import PoseCodes, tick
-from motet.decode.steering_settings import SteeringSettings
+from motet.figures.humanoid import sole_points
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.formats import read_motion
-from motet.models.steer import FEATURE_STEPS
-from motet.motion.humanoid import sole_points
-from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import global_transforms, local_rotations, posed, positions
 from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
-from motet.motion.pose import Pose
 from motet.motion.rotations import Array, axis_to_rotmat
 from motet.representation.contract import MotionContract, named
+from motet.steering.matching import TRAJECTORY, Matcher, Playback, Table, mirrored_features
+from motet.steering.model import FEATURE_STEPS
+from motet.steering.pose import Pose
+from motet.steering.settings import SteeringSettings
+from motet.steering.step import PoseCodes, tick
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.matching_rows import MatchingRows, _leaps, mirrored_poses, rows_of
 from motet_train.data.recorded import SLOPE, Recording, _levelled, _with_even_collars

@@ -9,8 +9,8 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from motet.errors import FormatError
+from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import read_motion
-from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from test_predict_data import write_files
 
+from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import read_motion
-from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import chained, local_rotations, local_translations, positions
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record

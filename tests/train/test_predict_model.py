@@ -13,7 +13,7 @@ from test_predict_data import write_files
 from motet.bundle.manifest import Manifest
 from motet.cli import main
 from motet.formats import read_motion, write_motion
-from motet.models.predict import PredictModel
+from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.models.predictor import LEAST, ErrorHead, Predictor, PredictorConfig, error_signs

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from says_figures import led, part, standing, walking
 
-from motet.motion.humanoid import HUMANOID
+from motet.figures.humanoid import HUMANOID
 from motet_train.evaluate.text_adherence import numbers
 from motet_train.evaluate.text_adherence.track import Track
 

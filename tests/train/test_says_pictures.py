@@ -5,8 +5,8 @@ from pathlib import Path
 
 import motet
 from motet.errors import TextWarning
-from motet.models.generate_codes import CodesModel
-from motet.motion.humanoid.retarget import on_humanoid
+from motet.figures.humanoid.retarget import on_humanoid
+from motet.generate.model import CodesModel
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import save

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from says_figures import HIPS, leaping, led, shifted, standing, stepping, times, tipped, walking, whole_tipped
 
+from motet.figures.humanoid.bones import HUMANOID
+from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import read_motion
-from motet.motion.humanoid.bones import HUMANOID
-from motet.motion.humanoid.retarget import to_humanoid
 from motet.motion.mirroring import mirror
 from motet_train.data.errors import DataError
 from motet_train.evaluate.text_adherence.prompts import RULES, actions, holds, prompts

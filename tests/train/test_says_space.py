@@ -11,8 +11,8 @@ from test_says_table import CMU, LEFT, LYING, STILL, ZOMBIE, Half, gliding, only
 import motet
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.search import IndexSettings
 from motet.motion.motion import Motion
+from motet.search.model import IndexSettings
 from motet_train.evaluate.text_adherence import table
 from motet_train.evaluate.text_adherence.prompts import Trial, prompts
 from motet_train.evaluate.text_adherence.table import (

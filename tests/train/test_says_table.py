@@ -11,7 +11,7 @@ from says_figures import HIPS, led, shifted, standing, stepping, times, walking
 
 from motet.cli import main
 from motet.errors import TextError
-from motet.motion.humanoid.bones import HUMANOID
+from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
 from motet_train.data.errors import DataError

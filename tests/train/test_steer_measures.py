@@ -8,13 +8,13 @@ import pytest
 from steer_puppets import FPS, Puppets, resting, turned
 
 from motet import to_humanoid
-from motet.decode.steering_settings import SteeringSettings
+from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.formats import read_motion
-from motet.motion.humanoid.bones import BONES, HUMANOID
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
-from motet.motion.pose import Pose
 from motet.representation.contract import named
+from motet.steering.pose import Pose
+from motet.steering.settings import SteeringSettings
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.matching_rows import rows_of
 from motet_train.data.recorded import Recording

@@ -16,12 +16,12 @@ from motet.bench.cases import cases
 from motet.bench.measure import compared
 from motet.bundle.manifest import Manifest
 from motet.cli import main
+from motet.figures.humanoid.bones import HUMANOID, sole_points
 from motet.formats import read_motion
 from motet.models.load import build
-from motet.models.steer import SteerModel
-from motet.motion.humanoid.bones import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.representation.contract import named
+from motet.steering.model import SteerModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError

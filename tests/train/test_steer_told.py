@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from steer_puppets import FPS, resting
 
-from motet.decode.acts import Act, ActSettings
-from motet.motion.humanoid.bones import BONES
-from motet.motion.pose import Pose
+from motet.figures.humanoid.bones import BONES
+from motet.steering.acts import Act, ActSettings
+from motet.steering.pose import Pose
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.told import act_figures, begins, from_path, going_figures
 

@@ -11,10 +11,10 @@ from language_data import walker
 
 from motet.cli import main
 from motet.errors import OutputError
+from motet.figures.humanoid import on_humanoid
+from motet.figures.humanoid.bones import HUMANOID, MIXAMO
+from motet.figures.humanoid.retarget import from_humanoid, to_humanoid
 from motet.formats import read_motion, write_motion
-from motet.motion.humanoid import on_humanoid
-from motet.motion.humanoid.bones import HUMANOID, MIXAMO
-from motet.motion.humanoid.retarget import from_humanoid, to_humanoid
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 from motet.representation.contract import LIVING_STD, sequences

@@ -13,19 +13,20 @@ import numpy as np
 from motet.bench.measure import Call, Case
 from motet.bundle.graph import Arrays, Graph
 from motet.formats import read_motion, write_motion
+from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
-from motet.models.fill import FillModel
-from motet.models.generate import MixtureModel
-from motet.models.generate_codes import CodesModel
-from motet.models.language import EOS, SPECIALS, LanguageModel
-from motet.models.predict import PredictModel
-from motet.models.search import SearchModel
-from motet.models.steer import SteerModel
-from motet.models.tdbn_control import TdbnModel
+from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
+from motet.papers.mixture_model import MixtureModel
+from motet.papers.tdbn_control import TdbnModel
+from motet.predict.fill import FillModel
+from motet.predict.model import PredictModel
 from motet.representation.contract import MotionContract
 from motet.representation.placed import placed
+from motet.search.model import SearchModel
+from motet.steering.model import SteerModel
+from motet.text.vocabulary import EOS, SPECIALS
 
 BEAMS, WORDS, SECONDS = 5, 10, 7.0
 """Lengths of all descriptions and motions, so that the speed does not depend on what a model produces."""

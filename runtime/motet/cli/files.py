@@ -14,23 +14,23 @@ from typing import Any
 
 import click
 
-from motet.checked import Checked
 from motet.cli.many import Many, many_options, print_list
 from motet.cli.options import Tries
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, places, size, write_options
 from motet.corpus.answers import Answer, Check, Verb, to_json
+from motet.corpus.checked import Checked
 from motet.corpus.sources import Source, files_of
 from motet.draw.page import write_many
+from motet.figures.feet.hold import hold_feet as feet_held
+from motet.figures.feet.treadmill import with_travel
+from motet.figures.humanoid import LENGTH_UNITS, read_map, to_humanoid
 from motet.formats import READS, WRITES, write_motion
-from motet.motion.feet.hold import hold_feet as feet_held
-from motet.motion.feet.treadmill import with_travel
-from motet.motion.humanoid import LENGTH_UNITS, read_map, to_humanoid
 from motet.motion.kinematics import skeleton_of
-from motet.motion.looping import looped
 from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
+from motet.predict.looping import looped
 
 log = logging.getLogger(__name__)
 

@@ -14,15 +14,15 @@ from motet.cli.many import Many, many_options, print_list
 from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
 from motet.cli.reading import read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.compose.plans import parse_plan, read_plan
 from motet.corpus.answers import Answer, Describe, Timeline, to_json
 from motet.formats import READS, read_motion
-from motet.models.composition import Passage
-from motet.models.generate import PLAYED, Generated, GenerateModel
-from motet.models.generate_codes import CodesModel, Story
-from motet.models.known import NOTHING
+from motet.generate.base import PLAYED, Generated, GenerateModel
+from motet.generate.model import CodesModel, Story
 from motet.models.load import load_as
-from motet.models.plans import parse_plan, read_plan
-from motet.motion.looping import looped
+from motet.models.nearest_neighbour import NOTHING
+from motet.predict.looping import looped
+from motet.text.clauses import Passage
 
 
 @click.command(

@@ -8,12 +8,12 @@ import click
 from motet.bundle.graph import SessionOptions
 from motet.cli import missing
 from motet.cli.options import bundle_option, session_options
-from motet.demo import write_demo
 from motet.files import check_place
+from motet.generate.base import GenerateModel
+from motet.live.demo import write_demo
 from motet.live.page import write_live_page
-from motet.models.generate import GenerateModel
 from motet.models.load import load_as
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 
 @click.command()

@@ -15,15 +15,15 @@ from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, spare, write_options
 from motet.errors import ControlError, MotionError, quoted
 from motet.formats import names_motion
-from motet.models.base import ControlModel
-from motet.models.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel, Gap
-from motet.models.generate import GenerateModel
-from motet.models.generate_codes import CodesModel
+from motet.generate.base import GenerateModel
+from motet.generate.model import CodesModel
+from motet.models.control import ControlModel
 from motet.models.load import load_as
-from motet.models.predict import MAX_SAMPLES, PredictModel
-from motet.models.scripts import parse_orders
-from motet.models.steer import SteerModel
 from motet.motion.motion import Motion
+from motet.predict.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel, Gap
+from motet.predict.model import MAX_SAMPLES, PredictModel
+from motet.steering.model import SteerModel
+from motet.steering.scripts import parse_orders
 
 
 @click.command()

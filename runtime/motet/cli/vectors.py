@@ -19,10 +19,10 @@ from motet.corpus.answers import Embed
 from motet.errors import FormatError, TextWarning, collected
 from motet.files import check_place, write_whole
 from motet.formats import names_motion, read_motion
+from motet.generate.base import GenerateModel
 from motet.jobs import Shard
-from motet.models.generate import GenerateModel
 from motet.models.load import load_as
-from motet.models.search import INDEX_FILE, Hit, Index, SearchModel
+from motet.search.model import INDEX_FILE, Hit, Index, SearchModel
 
 
 @click.command()

@@ -13,6 +13,8 @@ from motet.cli.reading import FPS
 from motet.corpus.sources import Source
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
+from motet.figures.humanoid import RIGS
+from motet.figures.root_motion import in_place
 from motet.formats import (
     BODIES,
     ONTO,
@@ -25,9 +27,7 @@ from motet.formats import (
     write_on,
 )
 from motet.formats.text import Names
-from motet.motion.humanoid import RIGS
 from motet.motion.motion import Motion
-from motet.motion.root_motion import in_place
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 
-from motet import checked
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
-from motet.checked import Checked
+from motet.corpus import checked
+from motet.corpus.checked import Checked
 from motet.corpus.sources import Source, opened
 from motet.errors import MotetError, TravelWarning, UnitError, collected, each_once
 from motet.models.describe import DescribeModel

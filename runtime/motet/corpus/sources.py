@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from motet.archives import MAX_FILE, ZipFiles, copy_bounded, is_plain_path
+from motet.corpus.archives import MAX_FILE, ZipFiles, copy_bounded, is_plain_path
 from motet.errors import FormatError, MotetError, MotionError
 from motet.files import files_in, place_of
 from motet.formats import CLIPPED, MOCAP, READABLE, contents_of, read_motion, split_part

@@ -14,7 +14,7 @@ from motet.settings import Settings
 
 @dataclass(frozen=True)
 class Loop:
-    """A decoding loop; :mod:`motet.decode.loops` lists all, by the names that manifests use.
+    """A decoding loop; each class of models has its own, by the names that manifests use.
 
     run: the loop itself. What it takes is the same for all loops of a verb: see
         :class:`motet.models.describe.DescribeModel`, GenerateModel and PredictModel. Settings are given by name.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.draw.mesh import Mesh, eased, loft, ring, shared, together
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
 
 SHIRT, TROUSERS, SKIN, LEFT_PART, RIGHT_PART, DARK, MIDDLE_PART = range(7)

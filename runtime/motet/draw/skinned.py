@@ -14,7 +14,7 @@ from motet.draw.body import LEFT_PART, MIDDLE_PART, RIGHT_PART, human_mesh
 from motet.draw.figure import SAME_SPOT, Body, Bone, below, figure_of, first_of
 from motet.draw.mesh import Mesh, loft, ring, together
 from motet.errors import MotionError
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, SURE_OF_JOINTS, Figure, leg_length, sided, to_humanoid
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, SURE_OF_JOINTS, Figure, leg_length, sided, to_humanoid
 from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, angle_of, product, rotated, unit

@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
+from motet.figures.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
+from motet.figures.root_motion import travel_on_root
 from motet.files import File, check_place, place_of
 from motet.formats.text import Clip, Contents, Figure, split_clip
-from motet.motion.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
 from motet.motion.motion import Motion, motions_of
-from motet.motion.root_motion import travel_on_root
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, metres
 
@@ -240,7 +240,7 @@ def names_motion(text: str) -> bool:
 def read_character(file: File) -> Character:
     """Read a skeleton to put motions onto: from the nodes of glTF, VRM and FBX, otherwise the motion's skeleton.
 
-    The name of a rig in :data:`motet.motion.humanoid.RIGS`, such as "mixamo", gives that rig unless a file of that
+    The name of a rig in :data:`motet.figures.humanoid.RIGS`, such as "mixamo", gives that rig unless a file of that
     name exists. FormatError like :func:`read_motion`.
     """
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():

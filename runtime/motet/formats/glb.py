@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from motet.draw.figure import COLOURS, Body, Bone
 from motet.errors import MotionError
+from motet.figures.humanoid import BONES, FINGERS, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.files import File, write_whole
 from motet.formats.gltf_data import COMPONENTS
-from motet.motion.humanoid import BONES, FINGERS, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat

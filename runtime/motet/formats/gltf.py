@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from motet.errors import FormatError, MotionError, listed, quoted
+from motet.figures.humanoid import BONES, map_of
 from motet.files import File, place_of
 from motet.formats.gltf_data import Gltf, broken, parse
 from motet.formats.text import (
@@ -30,7 +31,6 @@ from motet.formats.text import (
     split_clip,
 )
 from motet.formats.text import Figure as FigureChoice
-from motet.motion.humanoid import BONES, map_of
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotated

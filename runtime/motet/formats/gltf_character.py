@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import FormatError, quoted
+from motet.figures.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.files import File, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
 from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
 from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, broken, parse, read_beside
-from motet.motion.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product, quat_to_rotmat, rotated, rotmat_to_quat

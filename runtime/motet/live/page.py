@@ -7,18 +7,18 @@ bundle's own numbers: its settings, and its tables, gzipped.
 from dataclasses import asdict
 from typing import Any
 
-from motet.decode.steering_settings import SteeringSettings
 from motet.draw.figure import Body
 from motet.draw.page import body_data, filled, source
 from motet.draw.skinned import person
 from motet.errors import BundleError, ControlError
+from motet.figures.humanoid import HUMANOID, T_POSE
 from motet.files import File, place_of, write_whole
 from motet.live.packing import packed
 from motet.live.repertoire import repertoire
-from motet.models.steer import SteerModel
-from motet.motion.feet.lock import FootLockSettings
-from motet.motion.humanoid import HUMANOID, T_POSE
 from motet.settings import checked_int
+from motet.steering.foot_lock import FootLockSettings
+from motet.steering.model import SteerModel
+from motet.steering.settings import SteeringSettings
 
 
 def write_live_page(file: File, model: SteerModel, characters: int = 1, title: str | None = None) -> None:

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import ControlError, ControlWarning, MotetError, TextError, TextWarning, collected, each_once, quoted
-from motet.models.guided import LARGEST_COMMAND
-from motet.models.said_acts import SaidActs
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import BONES, HUMANOID, LEFT_RIGHT
-from motet.motion.pose import Pose
+from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT
 from motet.settings import checked_int
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.sentence_acts import SaidActs
+from motet.steering.targets import LARGEST_COMMAND
 
 LOCAL = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 """Origins of web pages that may connect, next to programs, which have none."""

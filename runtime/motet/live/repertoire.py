@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.generate.model import CodesModel
 from motet.live.packing import packed
-from motet.models.generate_codes import CodesModel
 from motet.models.load import load_as
-from motet.models.steer import SteerModel
 from motet.motion.rotations import Array
+from motet.steering.model import SteerModel
 
 STEPS = 1000
 """In a unit of each number of a frame."""

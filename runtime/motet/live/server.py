@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from motet.errors import MotetError, OutputError, TextError, TextWarning, collected
+from motet.generate.base import GenerateModel
 from motet.live import protocol
 from motet.live.protocol import LOCAL, ClientSession, ProtocolError
-from motet.models.generate import GenerateModel
-from motet.models.said_acts import SaidActs
-from motet.models.steer import SteerModel
-from motet.motion.pose import Pose
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.sentence_acts import SaidActs
 
 try:
     from websockets.asyncio.server import Server, ServerConnection, serve

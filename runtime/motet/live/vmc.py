@@ -13,10 +13,10 @@ import numpy as np
 
 from motet.bundle.graph import Floats
 from motet.errors import OutputError
-from motet.models.scripts import parse_orders
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import BONES, HUMANOID
-from motet.motion.pose import Pose
+from motet.figures.humanoid import BONES, HUMANOID
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.scripts import parse_orders
 
 try:
     from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
@@ -89,7 +89,7 @@ def run_script(
     repeats: int | None = None,
     rate: float | None = None,
 ) -> None:
-    """Let a figure follow a script (:mod:`motet.models.scripts`) again and again, until Ctrl-C; each pose is sent
+    """Let a figure follow a script (:mod:`motet.steering.scripts`) again and again, until Ctrl-C; each pose is sent
     with its time in seconds.
 
     repeats: how often, for ever by default. rate: ticks a second, by default the model's. ScriptError for a script that

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import Arrays, Graph, SessionOptions, Sizes, TensorSpec, bind, bind_tensor
 from motet.bundle.manifest import Manifest
-from motet.decode.loops import LOOPS
+from motet.decode.loop import Loop
 from motet.errors import BundleError
 from motet.motion.motion import Motion, with_frames
 from motet.settings import Settings
@@ -31,8 +31,8 @@ class BundleModel(ABC):
     """
 
     VERB: ClassVar[str]
-    LOOPS: ClassVar[tuple[str, ...]]
-    """The decoding loops of its bundles, by their names in :mod:`motet.decode.loops`."""
+    LOOPS: ClassVar[Mapping[str, Loop]]
+    """The decoding loops of its bundles, by the names that manifests use."""
     ROLES: ClassVar[tuple[str, ...]] = ("encoder", "step")
     SETTINGS: ClassVar[tuple[type[Settings], ...]] = ()
     """Settings classes whose values a bundle may hold."""
@@ -48,7 +48,7 @@ class BundleModel(ABC):
         for role in self.ROLES:
             if role not in graphs:
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
-        self.manifest, self.contract, self.loop = manifest, manifest.motion, LOOPS[manifest.loop]
+        self.manifest, self.contract, self.loop = manifest, manifest.motion, self.LOOPS[manifest.loop]
         self.graphs, self.tables = graphs, tables or {}
         self.defaults = self.loop.defaults(manifest.defaults)
         known = {kind.FEATURE: kind for kind in self.SETTINGS}
@@ -121,22 +121,3 @@ class BundleModel(ABC):
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The complete run of the golden vectors (docs/bundle.md): outputs from its inputs and settings."""
-
-
-LARGEST_CROWD = 100_000  # characters of one session, whose state is in memory
-
-
-class ControlModel(BundleModel):
-    """A model of controllable figures: :class:`motet.models.steer.SteerModel` or
-    :class:`motet.models.tdbn_control.TdbnModel`, depending on the bundle's loop. Each has its own script syntax."""
-
-    VERB = "control"
-
-    @abstractmethod
-    def run(self, script: str, *args: Any, **settings: Any) -> Motion:
-        """The motion of one figure that runs a script, with the settings of the subclass; ScriptError where it does not
-        parse."""
-
-    @abstractmethod
-    def captions(self, script: str) -> list[tuple[float, str]]:
-        """The start of each part of a script, in seconds, and its caption; ScriptError like :meth:`run`."""

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
+from motet.decode.beam import LOOPS, Hypothesis, Limits, noise_of, score_words
 from motet.decode.loop import Loop, Scores
-from motet.decode.loops import LOOPS
-from motet.decode.words import Hypothesis, Limits, noise_of, score_words
 from motet.errors import DecodingError
-from motet.models.known import AnswerSettings, Known, Seen, known_of, path_of
-from motet.models.language import EOS, MAX_SECONDS, PAD, SOS, UNK, LanguageModel, padded
+from motet.models.language import MAX_SECONDS, LanguageModel, padded
+from motet.models.nearest_neighbour import AnswerSettings, Known, Seen, known_of, path_of
 from motet.motion.motion import Motion, motions_of
 from motet.motion.rotations import Array
 from motet.settings import Progress, Range, Settings, seeds_of, silent
+from motet.text.vocabulary import EOS, PAD, SOS, UNK
 
 Decoding = Literal["known", "beam", "consensus"]
 """How descriptions are found."""
@@ -101,12 +101,12 @@ class _Options(TypedDict, total=False):
 
 
 class DescribeModel(LanguageModel):
-    """A motion captioning model. Its loops (:mod:`motet.decode.loops`) take the step, contexts (B, C), limits and their
+    """A motion captioning model. Its loops (:mod:`motet.decode.beam`) take the step, contexts (B, C), limits and their
     settings by name, and return up to ``beams`` hypotheses for each row, best first."""
 
     VERB = "describe"
     SETTINGS = (ConfidenceSettings, TimelineSettings, AnswerSettings)
-    LOOPS = ("beam", "consensus")
+    LOOPS = LOOPS
     known: Known | None = None
     """The motions that it knows, whose sentences answer; None for a model that only writes sentences."""
 
@@ -138,11 +138,12 @@ class DescribeModel(LanguageModel):
     ) -> list[Description] | list[list[Description]]:
         """Up to ``beams`` descriptions of a motion, the best first; for several motions, a list for each.
 
-        decoding: "known" for sentences about known motions that are near (:mod:`motet.models.known`), of different
-            kinds of action, or one, :data:`motet.models.known.NOTHING`; "beam" for beam search, whose best is the most
-            probable sentence; "consensus" for sampling ``draws`` sentences, the best being the one that agrees most
-            with all (:mod:`motet.decode.words`), not necessarily a probable one. By default consensus where ``draws``
-            is given, otherwise known where the bundle has known motions, or else the bundle's loop.
+        decoding: "known" for sentences about known motions that are near (:mod:`motet.models.nearest_neighbour`), of
+            different kinds of action, or one, :data:`motet.models.nearest_neighbour.NOTHING`; "beam" for beam search,
+            whose best is the most probable sentence; "consensus" for sampling ``draws`` sentences, the best being the
+            one that agrees most with all (:mod:`motet.decode.beam`), not necessarily a probable one. By default
+            consensus where ``draws`` is given, otherwise known where the bundle has known motions, or else the
+            bundle's loop.
         seed: of sampling; each motion gets the same samples as alone.
         progress: called with the number of motions done and in total.
 
@@ -154,7 +155,7 @@ class DescribeModel(LanguageModel):
         if name == "known":
             found = self._answers(motions_of(motions), beams, progress)
             return found[0] if isinstance(motions, Motion) else found
-        loop, (first,) = LOOPS[name] if name else self.loop, seeds_of(seed, 1, DecodingError)
+        loop, (first,) = self.LOOPS[name] if name else self.loop, seeds_of(seed, 1, DecodingError)
         given = {"beams": beams, "draws": draws}
         settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), given)}
         if "draws" in settings:
@@ -169,7 +170,7 @@ class DescribeModel(LanguageModel):
 
     def _decoding(self, decoding: str | None, draws: int | None) -> str | None:
         """How to decode, None for the bundle's loop; DecodingError where that is not possible."""
-        choices = ("known",) * (self.known is not None) + self.LOOPS
+        choices = ("known",) * (self.known is not None) + tuple(self.LOOPS)
         if decoding not in (None, *choices):
             raise DecodingError(f"decoding must be one of {', '.join(choices)}, not {decoding!r}")
         if decoding == "known" and draws is not None:
@@ -179,7 +180,7 @@ class DescribeModel(LanguageModel):
     def _answers(self, motions: Sequence[Motion], beams: int | None, progress: Progress) -> list[list[Description]]:
         """What known motions answer."""
         assert self.known is not None
-        beam = LOOPS["beam"]
+        beam = self.LOOPS["beam"]
         count = int(beam.settled(beam.defaults(self.manifest.defaults), {"beams": beams})["beams"])
         least, found = self.known.settings.sure, list[list[Description]]()
         for start in range(0, len(motions), AT_ONCE):
@@ -205,7 +206,7 @@ class DescribeModel(LanguageModel):
         MotionError like :meth:`frames`, except for long motions.
         """
         motion = self.on_figure(motion).resample(self.fps)
-        settings, beam = self.settings(TimelineSettings), LOOPS["beam"]
+        settings, beam = self.settings(TimelineSettings), self.LOOPS["beam"]
         if self.known is not None:
             how = self.known.settings
             spans = windows(len(motion), motion.fps, TimelineSettings(how.window, how.hop))

@@ -10,15 +10,15 @@ from motet.bundle.golden import replay
 from motet.bundle.graph import Arrays, Graph, SessionOptions
 from motet.bundle.manifest import Manifest
 from motet.errors import ArgumentError, BundleError, quoted
+from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
-from motet.models.fill import FillModel
-from motet.models.generate import MixtureModel
-from motet.models.generate_codes import CodesModel
-from motet.models.predict import PredictModel
-from motet.models.search import SearchModel
-from motet.models.steer import SteerModel
-from motet.models.tdbn_control import TdbnModel
+from motet.papers.mixture_model import MixtureModel
+from motet.papers.tdbn_control import TdbnModel
+from motet.predict.fill import FillModel
+from motet.predict.model import PredictModel
+from motet.search.model import SearchModel
+from motet.steering.model import SteerModel
 
 # fmt: off
 KINDS: tuple[type[BundleModel], ...] = (

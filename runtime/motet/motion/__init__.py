@@ -1,9 +1,10 @@
 """Geometry: motions, skeletons, rotations, and operations on them that need no model."""
 
-from motet.motion.feet.contacts import feet_of, ground_of, has_feet, lay_root_path
-from motet.motion.feet.hold import hold_feet
-from motet.motion.feet.treadmill import is_in_place, with_travel
-from motet.motion.humanoid import HUMANOID, MIXAMO, Humanoid, JointMap, from_humanoid, read_map, rig, to_humanoid
+from motet.figures.feet.contacts import feet_of, ground_of, has_feet, lay_root_path
+from motet.figures.feet.hold import hold_feet
+from motet.figures.feet.treadmill import is_in_place, with_travel
+from motet.figures.humanoid import HUMANOID, MIXAMO, Humanoid, JointMap, from_humanoid, read_map, rig, to_humanoid
+from motet.figures.root_motion import in_place
 from motet.motion.kinematics import (
     global_transforms,
     heading,
@@ -12,11 +13,10 @@ from motet.motion.kinematics import (
     positions,
     without_heading,
 )
-from motet.motion.looping import looped
 from motet.motion.mirroring import lateral_axis, mirror
 from motet.motion.motion import UNITS, Motion
-from motet.motion.root_motion import in_place
 from motet.motion.skeleton import Joint, Skeleton, partners_of, sides_of
+from motet.predict.looping import looped
 
 __all__ = [
     "HUMANOID",

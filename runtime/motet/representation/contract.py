@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import BundleError, MotionError
-from motet.motion.humanoid import Figure, to_humanoid
+from motet.figures.humanoid import Figure, to_humanoid
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton

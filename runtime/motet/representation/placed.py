@@ -9,7 +9,7 @@ x and its y axis point in its parent's frame (:mod:`motet.representation.root_si
 
 import numpy as np
 
-from motet.motion.humanoid import BONES
+from motet.figures.humanoid import BONES
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat

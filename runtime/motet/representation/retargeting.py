@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from motet.errors import MotionError, UnitError, listed
-from motet.motion.humanoid import HUMANOID, Figure, from_humanoid, is_mmm, map_of, on_humanoid, unit_by_legs
+from motet.figures.humanoid import HUMANOID, Figure, from_humanoid, is_mmm, map_of, on_humanoid, unit_by_legs
 from motet.motion.kinematics import (
     AXES,
     continued,

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError, listed
-from motet.motion.feet.contacts import feet_of, ground_of, has_feet, lay_root_path, led_along, velocity_by_feet
-from motet.motion.feet.hold import hold_feet
+from motet.figures.feet.contacts import feet_of, ground_of, has_feet, lay_root_path, led_along, velocity_by_feet
+from motet.figures.feet.hold import hold_feet
 from motet.motion.kinematics import (
     AXES,
     continued,

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from motet.motion.feet.hold import hold_feet
-from motet.motion.humanoid import HUMANOID
+from motet.figures.feet.hold import hold_feet
+from motet.figures.humanoid import HUMANOID
 from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, axis_to_rotmat, product, rotmat_to_quat
@@ -54,7 +54,7 @@ class RootSixd(Representation):
         return motion if like is None else motion.select(like.channels, like.units)
 
     def planted(self, features: Motion) -> Motion:
-        """The features with feet that stay where they stand (:func:`motet.motion.feet.hold.hold_feet`)."""
+        """The features with feet that stay where they stand (:func:`motet.figures.feet.hold.hold_feet`)."""
         if features.skeleton != HUMANOID or len(features) < 2:
             return features
         return self.features(hold_feet(self.motion(features)), features)

@@ -12,23 +12,23 @@ import numpy as np
 
 from motet.draw.page import Captions
 from motet.errors import TextWarning, TravelWarning, collected
+from motet.figures.feet.treadmill import is_in_place
+from motet.figures.humanoid import rig
 from motet.formats import ONTO, Character
-from motet.models.composition import Passage, Shown
+from motet.generate.base import PLAYED, Generated
+from motet.generate.model import CodesModel, Story
 from motet.models.describe import DescribeModel, Description
-from motet.models.generate import PLAYED, Generated
-from motet.models.generate_codes import CodesModel, Story
-from motet.models.predict import PredictModel
-from motet.motion.feet.treadmill import is_in_place
-from motet.motion.humanoid import rig
-from motet.motion.looping import looped
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
-from motet.serve.asked import Asked
+from motet.predict.looping import looped
+from motet.predict.model import PredictModel
 from motet.serve.batches import Batcher
 from motet.serve.content import MEDIA, Order, as_json, content_of, figure_of, frames_of
 from motet.serve.limits import Limits
 from motet.serve.readers import Readers
+from motet.serve.request import Asked
 from motet.serve.uploads import Bounds, RequestError
+from motet.text.clauses import Passage, Shown
 
 T = TypeVar("T")
 P = ParamSpec("P")

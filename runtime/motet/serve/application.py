@@ -11,13 +11,13 @@ from typing import Any
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
 from motet.errors import BundleError, MotetError, OutputError
+from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
-from motet.models.fill import FillModel
-from motet.models.generate_codes import CodesModel
 from motet.models.load import load_as
-from motet.models.predict import PredictModel
-from motet.models.steer import SteerModel
+from motet.predict.fill import FillModel
+from motet.predict.model import PredictModel
+from motet.steering.model import SteerModel
 
 try:
     import python_multipart  # noqa: F401  which Starlette needs for forms

@@ -8,10 +8,10 @@ import numpy as np
 
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
+from motet.figures.root_motion import in_place
 from motet.formats import Character, put_onto, write_all_on, write_on
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.root_motion import in_place
 from motet.motion.rotations import Array, rotmat_to_quat
 from motet.serve.uploads import Upload
 

@@ -14,11 +14,11 @@ from starlette.routing import Route
 from motet.draw.page import source
 from motet.errors import BundleError, MotetError, OutputError
 from motet.serve.answers import Answer, Answers
-from motet.serve.asked import Asked, asked
 from motet.serve.content import MEDIA
-from motet.serve.doors import DOORS, Door
 from motet.serve.limits import Limits, refusal
 from motet.serve.openapi import described, manual
+from motet.serve.request import Asked, asked
+from motet.serve.routes import DOORS, Door
 from motet.serve.uploads import TAKES
 
 T = TypeVar("T")

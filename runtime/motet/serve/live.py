@@ -13,7 +13,7 @@ from websockets.typing import Origin
 
 from motet.live.protocol import LOCAL
 from motet.live.server import Connection, LiveClients, connection_options, log
-from motet.models.steer import SteerModel
+from motet.steering.model import SteerModel
 
 OPENING = 10.0
 """Seconds in which a connection is opened."""

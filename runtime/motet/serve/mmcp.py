@@ -15,20 +15,20 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from motet.compose.keys import Key, Moves
+from motet.compose.plans import APART, Moment
 from motet.errors import DecodingError, MotetError, MotionError
-from motet.models.fill import LOOP_SECONDS, FillModel
-from motet.models.generate_codes import CodesModel
-from motet.models.plans import APART, Moment
-from motet.models.steer import SteerModel
+from motet.figures.humanoid import HUMANOID, Figure, from_humanoid, leg_length
+from motet.generate.model import CodesModel
 from motet.motion import heading
-from motet.motion.humanoid import HUMANOID, Figure, from_humanoid, leg_length
-from motet.motion.keys import Key, Moves
 from motet.motion.kinematics import chained, local_rotations, local_translations, motion_of
 from motet.motion.motion import Motion, spline
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
 from motet.motion.skeleton import Joint, Skeleton
+from motet.predict.fill import LOOP_SECONDS, FillModel
 from motet.representation.placed import placed, unplaced
 from motet.serve.answers import unwarned
+from motet.steering.model import SteerModel
 
 try:
     from fastapi import FastAPI

@@ -4,9 +4,9 @@ from html import escape
 from typing import Any
 
 from motet.draw.page import source
-from motet.serve.asked import MOST_TEXTS, Parameter
 from motet.serve.content import MEDIA
-from motet.serve.doors import DOORS, FILES, Door
+from motet.serve.request import MOST_TEXTS, Parameter
+from motet.serve.routes import DOORS, FILES, Door
 
 TYPES: dict[str, dict[str, Any]] = {
     "text": {"type": "string"},

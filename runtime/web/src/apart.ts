@@ -1,4 +1,4 @@
-/* Figures that keep apart: each turns aside from those that it would come too near to, as motet/decode/apart.py says. */
+/* Figures that keep apart: each turns aside from those that it would come too near to, as motet/steering/avoidance.py says. */
 import { APART, LEADING } from "./generated.js";
 import type { Pose as Ground } from "./planar.js";
 

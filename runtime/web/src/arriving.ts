@@ -1,4 +1,4 @@
-/* Figures that go along paths and arrive at their ends, as motet/decode/arriving.py says. Metres, seconds, radians; x and z. */
+/* Figures that go along paths and arrive at their ends, as motet/steering/arrival.py says. Metres, seconds, radians; x and z. */
 import { ARRIVING } from "./generated.js";
 import type { Playback } from "./matching.js";
 import { clamp, dampingOf, wrapped } from "./springs.js";

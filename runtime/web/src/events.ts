@@ -1,4 +1,4 @@
-/* What happens to a live figure from one tick to the next: feet come down, it leaves the ground and lands; as motet/motion/events.py says. */
+/* What happens to a live figure from one tick to the next: feet come down, it leaves the ground and lands; as motet/steering/events.py says. */
 import { EVENTS } from "./generated.js";
 
 /** A foot came down, both feet left the ground ("take-off", also between the steps of a run), one came down again, the figure

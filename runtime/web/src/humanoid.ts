@@ -1,6 +1,6 @@
 /* The humanoid: the figure of the bundles, with the bones of VRM 1.0 (docs/humanoid.md). */
 import { SKELETON } from "./generated.js";
-import tables from "../../motet/motion/humanoid/humanoid.json";
+import tables from "../../motet/figures/humanoid/humanoid.json";
 import type { World } from "./motion.js";
 import { quantile } from "./numbers.js";
 import { minus, plus, rotated, size, unit, type Vector } from "./rotations.js";

@@ -1,4 +1,4 @@
-/* Commands of figures that are on their way to a point, and of those that keep apart, tick by tick: motet/models/leading.py. */
+/* Commands of figures that are on their way to a point, and of those that keep apart, tick by tick: motet/steering/path_following.py. */
 import { LEADING } from "./generated.js";
 import { aside, keptApart } from "./apart.js";
 import { faces, onward, settle } from "./arriving.js";

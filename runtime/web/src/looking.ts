@@ -1,4 +1,4 @@
-/* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/motion/looking.py says. */
+/* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/steering/look_layer.py says. */
 import { LOOKING } from "./generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { BONES, HUMANOID } from "./humanoid.js";

@@ -1,4 +1,4 @@
-/* Hands that reach for points: two-bone inverse kinematics of an arm, within what a shoulder can do, as motet/motion/reaching.py says. */
+/* Hands that reach for points: two-bone inverse kinematics of an arm, within what a shoulder can do, as motet/steering/reach_layer.py says. */
 import { REACHING } from "./generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { ARM, BONES, HUMANOID, SIDES, SPINE } from "./humanoid.js";

@@ -1,4 +1,4 @@
-import { LANGUAGE } from "./generated.js";
+import { VOCABULARY } from "./generated.js";
 import type { TextTables } from "./bundle.js";
 import { stem } from "./composition.js";
 import { BundleError, TextError } from "./errors.js";
@@ -32,13 +32,13 @@ export class Vocabulary {
 
   /** The ids of a sentence's words, and the words that are unknown; TextError where there is none that is known. */
   encode(sentence: string): { ids: number[]; unknown: string[] } {
-    if (sentence.length > LANGUAGE.MAX_LETTERS) {
-      throw new TextError(`the sentence has ${sentence.length} letters, but at most ${LANGUAGE.MAX_LETTERS} are allowed`);
+    if (sentence.length > VOCABULARY.MAX_LETTERS) {
+      throw new TextError(`the sentence has ${sentence.length} letters, but at most ${VOCABULARY.MAX_LETTERS} are allowed`);
     }
     const words = this.split(sentence);
     if (!words.length) throw new TextError(`the sentence ${JSON.stringify(sentence)} has no words`);
-    if (words.length > LANGUAGE.MAX_WORDS) {
-      throw new TextError(`the sentence has ${words.length} words, but at most ${LANGUAGE.MAX_WORDS} are allowed`);
+    if (words.length > VOCABULARY.MAX_WORDS) {
+      throw new TextError(`the sentence has ${words.length} words, but at most ${VOCABULARY.MAX_WORDS} are allowed`);
     }
     const unknown = words.filter((word) => !this.meant(word));
     if (unknown.length === words.length) throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);

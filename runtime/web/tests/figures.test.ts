@@ -53,8 +53,8 @@ for (const [name, { base64, joints, fps, own, places }] of Object.entries(cases.
 }
 
 test("all tables of names are there, in the order of their files", () => {
-  const files = readdirSync("../motet/motion/humanoid/conventions").sort();
-  const titles = files.map((file) => JSON.parse(readFileSync(`../motet/motion/humanoid/conventions/${file}`, "utf8")).title);
+  const files = readdirSync("../motet/figures/humanoid/conventions").sort();
+  const titles = files.map((file) => JSON.parse(readFileSync(`../motet/figures/humanoid/conventions/${file}`, "utf8")).title);
   assert.deepEqual(TABLES.map((table) => table.title), titles);
 });
 

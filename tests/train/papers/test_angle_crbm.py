@@ -10,7 +10,7 @@ import torch
 from control_runs import control_run
 
 from motet.bundle.manifest import Manifest
-from motet.models.tdbn_control import TdbnModel
+from motet.papers.tdbn_control import TdbnModel
 from motet_export.bundles import export_run
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import read_clips

@@ -16,7 +16,7 @@ from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
 from motet.bundle.manifest import Manifest
 from motet.errors import OutputError
 from motet.models.load import load
-from motet.models.tdbn_control import TdbnModel
+from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract
 from motet_train.cli.evaluate import data_of
 from motet_train.cli.suites import SUITES, Suite

@@ -16,9 +16,9 @@ from test_predict_data import write_files
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.predict import PredictModel
 from motet.motion.kinematics import heading, local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.predict.model import PredictModel
 from motet_train.cli.suites import Given, suite_of
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import looks_of, save

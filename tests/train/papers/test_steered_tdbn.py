@@ -12,11 +12,11 @@ from codes_data import PREPARATION, trained
 from motet import to_humanoid
 from motet.bundle.manifest import Manifest
 from motet.cli import main
+from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import read_motion
 from motet.models.load import build
-from motet.models.tdbn_control import TdbnModel
-from motet.motion.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
+from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import named
 from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD

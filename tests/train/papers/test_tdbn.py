@@ -7,7 +7,7 @@ import torch
 from control_runs import control_run
 
 from motet.bundle.manifest import Manifest
-from motet.models.tdbn_control import TdbnModel
+from motet.papers.tdbn_control import TdbnModel
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import body_parts, read_clips
 from motet_train.papers.tdbn.rbm import Learning

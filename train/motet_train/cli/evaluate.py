@@ -13,7 +13,7 @@ from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.models.base import BundleModel
 from motet.models.load import load, load_as
-from motet.models.search import SearchModel
+from motet.search.model import SearchModel
 from motet_train.cli.prepare import store_beside
 from motet_train.cli.suites import Given, Results, Suite, suite_of
 from motet_train.cli.train_options import unit_in

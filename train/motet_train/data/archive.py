@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path, PurePosixPath
 
-from motet.archives import ZipFiles
+from motet.corpus.archives import ZipFiles
 from motet.errors import FormatError, MotionError
 from motet_train.data.errors import DataError
 

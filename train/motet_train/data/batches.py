@@ -12,9 +12,10 @@ from torch import Tensor
 
 from motet.bundle.graph import Floats
 from motet.errors import MotionError
-from motet.models.language import MAX_WORDS, RULES, Vocabulary, padded
+from motet.models.language import padded
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
+from motet.text.vocabulary import MAX_WORDS, RULES, Vocabulary
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import alike, mirror_text, usable
 from motet_train.data.store import Store

@@ -6,10 +6,10 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from motet.figures.feet.treadmill import with_travel
 from motet.formats import CLIPPED, MOCAP, clips, mmm, read_motion
 from motet.formats.text import MARK
 from motet.jobs import Shard
-from motet.motion.feet.treadmill import with_travel
 from motet.motion.motion import Motion
 from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from motet.models.language import RULES
+from motet.text.vocabulary import RULES
 
 KINDS = tomllib.loads((files("motet_train.data") / "kinds.toml").read_text(encoding="utf-8"))
 """Name of a kind -> the regular expression of the words that name it."""

@@ -1,4 +1,4 @@
-"""The rows of motion matching: what its loop needs to know of each recorded frame (:mod:`motet.decode.matching`).
+"""The rows of motion matching: what its loop needs to know of each recorded frame (:mod:`motet.steering.matching`).
 
 Letters in shapes: T frames, N rows, J bones, F features, G gaits.
 """
@@ -8,17 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.decode.acts import foot_contacts, pose_features, seen
-from motet.decode.matching import HORIZONS, horizons, mirrored_features, speed_feature
-from motet.decode.steering_settings import SteeringSettings
-from motet.motion.feet.contacts import ContactSettings
-from motet.motion.humanoid import BONES
+from motet.figures.feet.contacts import ContactSettings
+from motet.figures.humanoid import BONES
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
+from motet.steering.acts import foot_contacts, pose_features, seen
+from motet.steering.matching import HORIZONS, horizons, mirrored_features, speed_feature
+from motet.steering.settings import SteeringSettings
 from motet_train.data.recorded import Recording
 from motet_train.data.sixd_windows import poses_of
 

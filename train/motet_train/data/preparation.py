@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.feet.contacts import ADULT_HEIGHT
-from motet.motion.floor import above_floor
-from motet.motion.humanoid import on_humanoid
+from motet.figures.feet.contacts import ADULT_HEIGHT
+from motet.figures.floor import above_floor
+from motet.figures.humanoid import on_humanoid
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -24,7 +24,7 @@ class Preparation:
     """representation: its name. humanoid: retarget every figure to the humanoid, instead of keeping one figure.
 
     trim: cut off idle frames and T-poses at both ends (:func:`trim`). floor: nothing is under the floor
-    (:func:`motet.motion.floor.above_floor`). fps: of the frames.
+    (:func:`motet.figures.floor.above_floor`). fps: of the frames.
     longest: seconds from which on a motion is cut into pieces where ``cut`` is set, and else refused
     (Plappert et al. 2017, section 5.1).
     """

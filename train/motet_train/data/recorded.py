@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from motet.motion.feet.contacts import GROUND_PERCENT, ContactSettings, contacts, ground_speeds
-from motet.motion.humanoid import HUMANOID, sole_points
+from motet.figures.feet.contacts import GROUND_PERCENT, ContactSettings, contacts, ground_speeds
+from motet.figures.humanoid import HUMANOID, sole_points
 from motet.motion.kinematics import global_transforms
 from motet.motion.motion import Motion
 from motet.motion.rotations import inverse, product, rotated, rotmat_to_rotvec, swing

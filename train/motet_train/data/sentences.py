@@ -4,7 +4,7 @@ import re
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from motet.models.language import MAX_WORDS, RULES
+from motet.text.vocabulary import MAX_WORDS, RULES
 from motet_train.data.store import Store
 
 OTHER = {

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.decode.codec import nearest_moves, seen_from
+from motet.generate.codec import nearest_moves, seen_from
 from motet.motion.rotations import Array
 from motet.representation import placed
 from motet.representation.base import FrameMirror

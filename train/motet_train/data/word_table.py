@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.models.language import RULES, SPECIALS
+from motet.text.vocabulary import RULES, SPECIALS
 from motet_train.data.errors import DataError
 
 FIRST = 50_000

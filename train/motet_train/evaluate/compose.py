@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from motet.compose.compose import Met, met, moved
+from motet.compose.plans import Moment, parse_plan
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.compose import Met, met, moved
-from motet.models.generate_codes import CodesModel
-from motet.models.plans import Moment, parse_plan
+from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet_train.evaluate.positions import BALLS, acceleration, leap, speed

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
-from motet.models.fill import FillModel
-from motet.motion.feet.contacts import ContactSettings, ground_speeds, standing
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.figures.feet.contacts import ContactSettings, ground_speeds, standing
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.rotations import Array
+from motet.predict.fill import FillModel
 from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, straight
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store, split

@@ -14,8 +14,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.feet.contacts import ContactSettings, ground_of, ground_speeds, smoothed, standing
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.figures.feet.contacts import ContactSettings, ground_of, ground_speeds, smoothed, standing
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.kinematics import local_rotations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

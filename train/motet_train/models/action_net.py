@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet.models.language import SPECIALS, UNK
+from motet.text.vocabulary import SPECIALS, UNK
 from motet_train.models.net import Net, before, gelu
 
 UNKNOWN = SPECIALS.index(UNK)

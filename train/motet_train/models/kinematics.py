@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.motion.humanoid import LEFT_RIGHT, sided
+from motet.figures.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from motet.bundle.graph import GraphSpec
-from motet.models.known import Known
+from motet.models.nearest_neighbour import Known
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.models.net import Net
@@ -32,7 +32,7 @@ class KnownMotionsConfig:
 
 
 class KnownMotions(Net):
-    """Both nets, and tables as :class:`motet.models.known.Known` has them."""
+    """Both nets, and tables as :class:`motet.models.nearest_neighbour.Known` has them."""
 
     CONFIG = KnownMotionsConfig
 

@@ -1,6 +1,6 @@
 """What a figure that is steered by motion matching is made of: recorded poses in few codes, and the table of rows.
 
-See :mod:`motet.decode.matching`, whose letters are used here; P = 4 J + 1 are the numbers of a pose.
+See :mod:`motet.steering.matching`, whose letters are used here; P = 4 J + 1 are the numbers of a pose.
 """
 
 from dataclasses import dataclass, field
@@ -31,7 +31,7 @@ DTYPES = {
     "pose_mean": np.float32,
     "pose_basis": np.float16,
 }
-"""Of the tables of a bundle, by name: :class:`motet.models.steer.SteerModel`."""
+"""Of the tables of a bundle, by name: :class:`motet.steering.model.SteerModel`."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.models.language import RULES, Vocabulary, padded
+from motet.models.language import padded
+from motet.text.vocabulary import RULES, Vocabulary
 from motet_train.data.batches import Rows
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions, actions_of

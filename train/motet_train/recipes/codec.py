@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.decode.codec import REACH, seen_from
+from motet.generate.codec import REACH, seen_from
 from motet.motion.rotations import Array
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.motion.humanoid import HUMANOID
+from motet.figures.humanoid import HUMANOID
 from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
 from motet_train.data.batches import frame_mirror

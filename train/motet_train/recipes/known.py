@@ -15,8 +15,8 @@ import torch
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.models.known import LEFT, RIGHT, STRAIGHT, AnswerSettings, Known, log_odds
-from motet.models.language import RULES
+from motet.models.nearest_neighbour import LEFT, RIGHT, STRAIGHT, AnswerSettings, Known, log_odds
+from motet.text.vocabulary import RULES
 from motet_train.data.batches import Examples, Views
 from motet_train.data.errors import DataError
 from motet_train.data.kinds import KINDS, Shown, careful, named, shown_by

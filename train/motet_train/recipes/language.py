@@ -11,9 +11,10 @@ import torch
 
 from motet.bundle.manifest import Manifest
 from motet.models.describe import ConfidenceSettings, DescribeModel
-from motet.models.language import MAX_SECONDS, RULES, Vocabulary
+from motet.models.language import MAX_SECONDS
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract, named
+from motet.text.vocabulary import RULES, Vocabulary
 from motet_train.data.batches import Batch, Examples, examples, frame_mirror
 from motet_train.data.sentences import mirror_text, usable
 from motet_train.data.store import Split, Store, split

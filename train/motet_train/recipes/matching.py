@@ -8,11 +8,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.decode.matching import LEAST_PACE, is_faster, stride_velocities
-from motet.decode.steering_settings import SteeringSettings
-from motet.models.steer import FEATURE_STEPS
-from motet.motion.feet.lock import FootLockSettings
 from motet.motion.rotations import Array
+from motet.steering.foot_lock import FootLockSettings
+from motet.steering.matching import LEAST_PACE, is_faster, stride_velocities
+from motet.steering.model import FEATURE_STEPS
+from motet.steering.settings import SteeringSettings
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
 from motet_train.data.recorded import gaits_of, recordings

@@ -7,8 +7,9 @@ from functools import partial
 import torch
 from torch.nn import functional
 
-from motet.models.language import RULES, padded
+from motet.models.language import padded
 from motet.representation.contract import named
+from motet.text.vocabulary import RULES
 from motet_train.data.batches import Examples, Views, views
 from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.sentences import alike, usable

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.models.describe import DescribeModel, Description
-from motet.models.known import NOTHING
+from motet.models.nearest_neighbour import NOTHING
 from motet_train.data.kinds import Shown, named, shown_by
 from motet_train.data.store import Split, Store, matches
 from motet_train.evaluate.language.attributes import common_side, side, turning

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.models.describe import ConfidenceSettings, DescribeModel, Description, Part
-from motet.models.language import RULES
 from motet.motion.motion import Motion
+from motet.text.vocabulary import RULES
 from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, mentioned
 from motet_train.evaluate.language.split_store import SplitStore
 

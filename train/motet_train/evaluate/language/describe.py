@@ -14,8 +14,8 @@ from sklearn.metrics import pairwise_distances_argmin
 
 from motet.errors import TextError
 from motet.models.describe import DescribeModel
-from motet.models.language import EOS, RULES, SOS
 from motet.motion.motion import Motion
+from motet.text.vocabulary import EOS, RULES, SOS
 from motet_train.evaluate.language.attributes import words_right
 from motet_train.evaluate.language.confidence import confidence, timeline_figures
 from motet_train.evaluate.language.motions import Looks

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.errors import TextError
+from motet.generate.base import Generated, GenerateModel
 from motet.models.describe import DescribeModel
-from motet.models.generate import Generated, GenerateModel
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.evaluate.language.attributes import common_side, common_turning, common_verbs

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from motet.motion.feet.contacts import feet_of, ground_of
+from motet.figures.feet.contacts import feet_of, ground_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

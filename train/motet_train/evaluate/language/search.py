@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from motet.models.describe import DescribeModel
-from motet.models.language import RULES
-from motet.models.search import Hit, Index, IndexSettings, Member, SearchModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.search.model import Hit, Index, IndexSettings, Member, SearchModel
+from motet.text.vocabulary import RULES
 from motet_train.data.sentences import alike
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks

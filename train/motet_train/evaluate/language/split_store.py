@@ -10,9 +10,9 @@ import numpy as np
 
 from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
-from motet.models.language import RULES
 from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
+from motet.text.vocabulary import RULES
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import usable
 from motet_train.data.store import Split, Store

@@ -18,12 +18,12 @@ import numpy as np
 from tqdm import tqdm
 
 from motet.errors import MotionError
-from motet.models.generate_codes import CodesModel
-from motet.models.predict import PredictModel
-from motet.motion.humanoid import HUMANOID, on_humanoid
+from motet.figures.humanoid import HUMANOID, on_humanoid
+from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.predict.model import PredictModel
 from motet_train.evaluate.positions import BALLS, length, slide, stances
 from motet_train.evaluate.tables import Report, aligned, short_names
 

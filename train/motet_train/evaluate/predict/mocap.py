@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from motet.models.predict import PredictModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.predict.model import PredictModel
 from motet.representation.contract import named
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store

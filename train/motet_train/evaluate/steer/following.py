@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import sole_points
-from motet.motion.pose import Pose
+from motet.figures.humanoid import sole_points
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 from motet.representation.root_sixd import ROOT_SIXD
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
 from motet_train.data.matching_rows import MatchingRows
 from motet_train.data.recorded import Recording
 from motet_train.data.sixd_windows import poses_of
@@ -67,7 +67,7 @@ AHEAD: Asked = {"direction": 0.0, "facing": 0.0}
 @dataclass(frozen=True, eq=False)
 class Track:
     """B figures in T frames; metres, y up. ground: (T, B, 3) x, z and facing in radians, float64. rotations:
-    (T, B, J, 4) quaternions (x, y, z, w) and height (T, B) as :class:`motet.motion.pose.Pose` has them."""
+    (T, B, J, 4) quaternions (x, y, z, w) and height (T, B) as :class:`motet.steering.pose.Pose` has them."""
 
     ground: Array
     rotations: Floats

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from motet.models.steer import SteerModel
 from motet.motion.rotations import Array
+from motet.steering.model import SteerModel
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import Track, slide_of
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.decode.steering_settings import SteeringSettings
 from motet.errors import ControlWarning
-from motet.models.steer import SteerModel
-from motet.motion.humanoid import BONES, HUMANOID
+from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
+from motet.steering.model import SteerModel
+from motet.steering.settings import SteeringSettings
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import rows_of
 from motet_train.data.recorded import Recording, gaits_of, recordings

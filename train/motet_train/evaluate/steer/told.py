@@ -4,15 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from motet.decode.acting import UPPER
-from motet.decode.acts import Act
-from motet.models.generate_codes import CodesModel
+from motet.generate.model import CodesModel
 from motet.models.load import load_as
-from motet.models.said_acts import SaidActs
-from motet.models.steer import SteerModel
-from motet.models.steer_session import SteerSession
-from motet.motion.pose import Pose
 from motet.motion.rotations import Array
+from motet.steering.action_layer import UPPER
+from motet.steering.acts import Act
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.sentence_acts import SaidActs
+from motet.steering.session import SteerSession
 from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import MEASURED_SPEEDS, Track

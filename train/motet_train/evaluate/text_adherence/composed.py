@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from motet.models.generate_codes import CodesModel, Story
+from motet.generate.model import CodesModel, Story
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import track_of

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from motet.errors import TextWarning
-from motet.models.generate import GenerateModel
+from motet.generate.base import GenerateModel
 from motet_train.evaluate.positions import length, spells
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.rules import HANDS

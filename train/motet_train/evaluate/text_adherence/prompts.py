@@ -11,9 +11,9 @@ from typing import Any
 
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
-from motet.models.language import RULES as TEXT_RULES
 from motet.motion.motion import Motion
 from motet.representation.contract import named
+from motet.text.vocabulary import RULES as TEXT_RULES
 from motet_train.data.corpus import Record, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, Store

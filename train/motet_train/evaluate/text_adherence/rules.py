@@ -5,7 +5,7 @@ side: "left", "right", or "both", and where it says so "either".
 
 import numpy as np
 
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
 from motet.motion.rotations import Array
 from motet_train.evaluate.positions import Flags, length, spells
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, direction, longest, pair, swings

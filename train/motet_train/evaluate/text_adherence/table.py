@@ -10,12 +10,12 @@ from tqdm import tqdm
 
 from motet.bundle.graph import Floats
 from motet.errors import TextError
-from motet.models.generate import GenerateModel
-from motet.models.search import SearchModel, direction
-from motet.motion.feet.contacts import feet_of, ground_of
-from motet.motion.humanoid import HUMANOID
+from motet.figures.feet.contacts import feet_of, ground_of
+from motet.figures.humanoid import HUMANOID
+from motet.generate.base import GenerateModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
+from motet.search.model import SearchModel, direction
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed

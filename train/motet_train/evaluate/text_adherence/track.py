@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.motion.humanoid import HUMANOID, LEFT_RIGHT, on_humanoid, sided
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, on_humanoid, sided
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion, resampled
 from motet.motion.rotations import Array

@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.models.predict import PredictModel
 from motet.motion.kinematics import skeleton_of
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
+from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import cmu_trial
 from motet_train.evaluate.figures import SPACING, Drawings, bones_of, error_over_time, in_profile, panels, stick_figures
 from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, SEED_FRAMES, STRIDE, ExpmapCorpus

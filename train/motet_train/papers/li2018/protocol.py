@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.models.predict import PredictModel
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.predict.model import PredictModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.predict.floors import (
     CONSTANT,

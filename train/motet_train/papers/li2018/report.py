@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from motet.models.predict import PredictModel
 from motet.motion.rotations import Array
+from motet.predict.model import PredictModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.predict.floors import FLOORS, REPORTED, by_frame, key
 from motet_train.evaluate.tables import aligned, short_names

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from sklearn.manifold import TSNE
 
+from motet.generate.base import GenerateModel
 from motet.models.describe import DescribeModel
-from motet.models.generate import GenerateModel
 from motet.representation.root_block import from_root_block
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, panels, strips

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.errors import MotionError
-from motet.motion.feet.contacts import lay_root_path
-from motet.motion.humanoid import map_of
+from motet.figures.feet.contacts import lay_root_path
+from motet.figures.humanoid import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array

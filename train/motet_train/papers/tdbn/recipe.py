@@ -10,8 +10,8 @@ import torch
 from torch import nn
 
 from motet.bundle.manifest import Manifest
-from motet.models.tdbn_control import TdbnModel
 from motet.motion.skeleton import Skeleton
+from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
 from motet_train import distributed
 from motet_train.data.errors import DataError

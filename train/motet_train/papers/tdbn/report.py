@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from motet.models.tdbn_control import TdbnModel
+from motet.papers.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Goals, Report, gathered, reached
 from motet_train.papers.tdbn import experiments

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.bundle.graph import Floats
-from motet.models.tdbn_control import TdbnModel
-from motet.motion.feet.contacts import ContactSettings, standing
-from motet.motion.feet.lock import FootLock
-from motet.motion.humanoid import sole_points
+from motet.figures.feet.contacts import ContactSettings, standing
+from motet.figures.humanoid import sole_points
 from motet.motion.motion import Motion
-from motet.motion.pose import Pose
 from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, wrapped
+from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
 from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
+from motet.steering.foot_lock import FootLock
+from motet.steering.pose import Pose
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
@@ -121,8 +121,8 @@ def mirrored_too(store: Store, found: Sequence[Recording]) -> tuple[MotionContra
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """A control model with :data:`LABELS`, to be measured in place of :class:`motet.models.steer.SteerModel`: the part
-    of it that measures use."""
+    """A control model with :data:`LABELS`, to be measured in place of :class:`motet.steering.model.SteerModel`: the
+    part of it that measures use."""
 
     model: TdbnModel
     gaits: tuple[str, ...] = tuple(GAITS)
@@ -148,7 +148,7 @@ class Driven:
 
 
 class DrivenSession:
-    """Figures that are told what :class:`motet.models.steer_session.SteerSession` is told."""
+    """Figures that are told what :class:`motet.steering.session.SteerSession` is told."""
 
     def __init__(self, model: TdbnModel, characters: int, hold_feet: bool) -> None:
         self.session, self.fps = model.start(characters=characters), model.fps

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.models.tdbn_control import TdbnModel, TdbnSession
 from motet.motion.motion import lines
 from motet.motion.rotations import Array
+from motet.papers.tdbn_control import TdbnModel, TdbnSession
 from motet.representation.contract import LIVING_STD
 from motet_train.evaluate.positions import arrival
 from motet_train.papers.tdbn.clips import period

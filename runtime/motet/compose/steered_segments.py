@@ -1,0 +1,150 @@
+"""Walks and runs that are steered from place to place in the time that is given, as parts of compositions."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.kinematics import local_translations
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, wrapped
+from motet.representation.root_sixd import facing
+from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.session import SteerSession
+from motet.text.clauses import FUNCTION_WORDS, stem
+
+GAITS = {"walk": "walk", "stroll": "walk", "go": "walk", "run": "run", "jog": "run", "skip": "skip", "zombi": "zombie"}
+"""Stems of words -> the gait that they ask for."""
+
+EASY = {stem("forward"), stem("straight"), stem("ahead"), stem("slowly"), stem("quickly"), stem("fast"), stem("like")}
+"""Stems of what steering does by itself, where a place says where and how fast to go."""
+
+GOAL = re.compile(r"\b(to|towards?|into|past|around|across|along)\s+(a|an|the|his|her|their)\s+\w+")
+"""Where to: a place says it better."""
+
+BACK = {stem("backward"), stem("backwards")}
+
+STOP, TURN, START = 0.5, 0.8, 0.3
+"""Seconds in which a figure stops, in which it then turns by 90 degrees, and until it is on the way."""
+
+HURRIED = 0.5
+"""Share of the time to stop and turn in which it can be done."""
+
+AHEAD = math.radians(30)
+"""A figure walks on through a place where it is to face no further from the way that it goes."""
+
+NEAR = 0.05
+"""Metres within which it is at a place."""
+
+AGAIN = 0.2
+"""Seconds after which it is told anew where to go."""
+
+
+class Gait(NamedTuple):
+    """A gait of a steered figure, its slowest, usual and fastest speed in m/s, and whether it goes backwards."""
+
+    name: str
+    low: float
+    usual: float
+    high: float
+    back: bool
+
+
+class Leg(NamedTuple):
+    """Where a figure is to be at a frame, metres (2,), and which way to face there, radians; each may be None."""
+
+    frame: int
+    place: Array | None
+    facing: float | None
+
+
+class Walk(NamedTuple):
+    """A prompt for a gait, the frames in which it is shown, and its legs. halts: whether another act follows."""
+
+    text: str
+    start: int
+    stop: int
+    gait: Gait
+    legs: Sequence[Leg]
+    halts: bool
+
+
+def gait_of(text: str, model: SteerModel) -> Gait | None:
+    """The gait that a prompt asks for and nothing else, such as that of "a person walks slowly"; else None."""
+    words = [stem(word) for word in re.findall(r"\w+", GOAL.sub("", text.lower())) if word not in FUNCTION_WORDS]
+    named = [GAITS[word] for word in words if GAITS.get(word) in model.gaits]
+    if not named or not all(word in GAITS or word in EASY or word in BACK for word in words):
+        return None
+    back = not BACK.isdisjoint(words)
+    low, usual, ahead, _, backwards = model.abilities.speeds[model.abilities.number(named[-1])].tolist()
+    high = backwards if back else ahead
+    return Gait(named[-1], min(low, high), min(usual, high), high, back) if high > 0 else None
+
+
+def walked(model: SteerModel, walk: Walk, after: Motion | None) -> Motion:
+    """The motion of a walk that continues another one, in the same channels; from the origin without one. What lacks
+    at its places is left to be added. MotionError for a place that is out of reach, with the time it takes."""
+    session, ground = model.start(walk.gait.name), np.zeros(3)
+    if after is not None:
+        x, z = local_translations(after[-6:])[:, 0, [0, 2]].T
+        ground = np.array([x[-1], z[-1], facing(after[-60:])[-1]])
+        session.take(model.pose_of(after[-60:]))
+        session.put((x[-1], z[-1], math.degrees(ground[2])))
+        session.push(np.array([np.ptp(x), np.ptp(z)]) * [np.sign(x[-1] - x[0]), np.sign(z[-1] - z[0])] * model.fps / 5)
+    _check(walk, ground, model.fps)
+    poses = list[Pose]()
+    for now in range(walk.start, walk.stop):
+        leg = next((leg for leg in walk.legs if leg.frame >= now), walk.legs[-1])
+        if (now - walk.start) % round(AGAIN * model.fps) == 0:
+            _tell(session, walk, leg, (leg.frame + 1 - now) / model.fps, poses[-1].ground[0] if poses else ground)
+        poses.append(session.tick())
+    poses.insert(0, replace(poses[0], ground=ground[None]))
+    return model.contract.motion(session.frames_of(poses)[0, 1:], after=after, plant=False)
+
+
+def _tell(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: Array) -> None:
+    """Say where to go: to the place in the seconds left, but no slower than the gait, and to stand there."""
+    gait, gap = walk.gait, np.zeros(2) if leg.place is None else leg.place - ground[:2]
+    far, way = float(np.hypot(*gap)), float(np.arctan2(*gap))
+    left -= _pause(walk, leg, way)
+    if leg.place is None and leg.facing is not None:
+        speed, way = gait.usual, leg.facing + math.pi * gait.back
+    elif far < NEAR or left <= 0:
+        session.control(speed=0, facing=None if leg.facing is None else math.degrees(leg.facing))
+        return
+    else:
+        speed = float(np.clip(far / max(left, AGAIN), gait.low, gait.high))
+    degrees = math.degrees(way)
+    session.control(gait=gait.name, speed=speed, direction=degrees, facing=degrees + 180 * gait.back)
+
+
+def _pause(walk: Walk, leg: Leg, way: float) -> float:
+    """Seconds that a figure stands at a place: before another act, and to turn; it walks through all others."""
+    ahead = way + math.pi * walk.gait.back
+    turn = 0.0 if leg.facing is None else abs(float(wrapped(np.array(leg.facing - ahead))))
+    turn = turn if turn > AHEAD else 0.0
+    stands = walk.halts and leg is walk.legs[-1]
+    return STOP * (stands or turn > 0) + TURN * turn / (math.pi / 2)
+
+
+def _check(walk: Walk, ground: Array, fps: float) -> None:
+    """MotionError for a place that is out of reach."""
+    at, now = ground[:2], walk.start / fps
+    for leg in walk.legs:
+        if leg.place is None:
+            continue
+        far, way = float(np.hypot(*(leg.place - at))), float(np.arctan2(*(leg.place - at)))
+        at, then = leg.place, (leg.frame + 1) / fps
+        begun = START * min(1.0, then - now) if leg is walk.legs[0] else 0.0
+        need = far / walk.gait.high + HURRIED * _pause(walk, leg, way) + begun
+        if far > NEAR and need > then - now:
+            raise MotionError(
+                f"{walk.text!r} cannot be at the place of {then:.3g} s in time: {far:.1f} m at up to "
+                f"{walk.gait.high:g} m/s take {need:.1f} s, so be there at {now + need:.1f} s, or go faster"
+            )
+        now = then

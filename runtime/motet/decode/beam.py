@@ -1,0 +1,254 @@
+"""Loops over words: beam search, draws from a model's distribution, and the sentence that agrees best with all draws.
+
+Beam search: section 4.2.3 of Plappert et al. 2017. Agreement is minimum Bayes risk decoding (Kumar and Byrne 2004),
+from many draws, as Eikema and Aziz (2020) do: "Is MAP decoding all you need?"
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Arrays, Floats, Graph
+from motet.decode.loop import Ids, Loop, Scores, advance, two_rows, zero_state
+from motet.settings import Range, Settings
+
+
+class Limits(NamedTuple):
+    """Ids of start and end, the most words in a sequence, and ids never chosen."""
+
+    start: int
+    end: int
+    longest: int
+    banned: Sequence[int] = ()
+
+    def possible(self, log_probabilities: NDArray[Any], length: int) -> NDArray[Any]:
+        """A copy (N, V) where what cannot follow ``length`` words is -inf: after the longest, all but the end."""
+        left = np.array(log_probabilities)
+        left[:, list(self.banned)] = -np.inf
+        if length == self.longest:
+            left[:, np.arange(left.shape[1]) != self.end] = -np.inf
+        return left
+
+
+class Hypothesis(NamedTuple):
+    """A finished sequence: its ids without start and end, and the sum of its steps' log-probabilities, end included.
+
+    score: what sequences are ranked by, the higher the better.
+    """
+
+    ids: tuple[int, ...]
+    log_probability: float
+    score: float
+
+
+class Drawn(NamedTuple):
+    """A sequence as in :class:`Hypothesis`, and how often it came.
+
+    The log-probability is the model's own, whatever the temperature was.
+    """
+
+    ids: tuple[int, ...]
+    log_probability: float
+    times: int
+
+
+def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> list[list[Hypothesis]]:
+    """For each row of ``context`` (B, C) up to ``beams`` hypotheses, the most probable first.
+
+    step: word (N,), context (N, C) and fed back states -> log_probabilities (N, V). One call for all rows and beams.
+    Scores are log-probabilities, not divided by length. A hypothesis that ended keeps its score and its place as long
+    as no ``beams`` others are better; a row is done when all of its have ended.
+    """
+    rows, end = len(context), limits.end
+    scores = np.where(np.arange(beams) == 0, 0.0, -np.inf) * np.ones((rows, 1))
+    words = np.full((rows, beams, 1), limits.start, dtype=np.int64)
+    state = zero_state(step, rows * beams)
+    for length in range(limits.longest + 1):
+        alive = two_rows(np.flatnonzero((words[:, :, -1] != end) & np.isfinite(scores)))
+        if not len(alive):
+            break
+        inputs: Arrays = {"word": words[:, :, -1].ravel()[alive], "context": context[alive // beams]}
+        outputs, following = advance(step, {name: array[alive] for name, array in state.items()}, inputs)
+        left = limits.possible(outputs["log_probabilities"], length)
+        scores, parents, chosen = _best(scores, alive, left, end)
+        words = np.concatenate([np.take_along_axis(words, parents[:, :, None], 1), chosen[:, :, None]], axis=2)
+        places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * beams).ravel() % len(alive)
+        state = {name: np.take(array, places, axis=0) for name, array in following.items()}
+    return [
+        [Hypothesis(tuple(ids[: ids.index(end)]), one, one) for ids, one in zip(*row, strict=True) if np.isfinite(one)]
+        for row in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)
+    ]
+
+
+def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Scores, Ids, Ids]:
+    """The best hypotheses of each row among ended ones and the extensions: score, parent and word, each (B, beams).
+
+    left: log-probabilities (N, V) of the words after those ``alive``; used up.
+    """
+    (rows, beams), width, one = scores.shape, min(scores.shape[1], left.shape[1]), np.arange(len(left))
+    pool, words = np.full((rows * beams, width), -np.inf), np.full((rows * beams, width), end, dtype=np.int64)
+    pool[:, 0] = scores.ravel()  # ended hypotheses are kept unchanged
+    for place in range(width):  # a few passes of argmax take a fraction of argpartition's time
+        likeliest = left.argmax(axis=1)
+        words[alive, place] = likeliest
+        pool[alive, place] = scores.ravel()[alive] + left[one, likeliest]
+        left[one, likeliest] = -np.inf
+    pool, words = pool.reshape(rows, -1), words.reshape(rows, -1)
+    order = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
+    return np.take_along_axis(pool, order, 1), order // width, np.take_along_axis(words, order, 1)
+
+
+def noise_of(limits: Limits, draws: int, seed: int = 0) -> Floats:
+    """The uniform numbers (longest + 1, draws) float32 that every row is drawn with, and so as it would be alone."""
+    return np.random.Generator(np.random.PCG64(seed)).random((limits.longest + 1, draws), np.float32)
+
+
+def draw_sequences(
+    step: Graph, context: Floats, limits: Limits, draws: int, temperature: float, noise: Floats | None = None
+) -> list[list[Drawn]]:
+    """For each row of ``context`` (B, C) the different ones of ``draws`` sequences; ``draws`` in all.
+
+    step: as :func:`beam_search`; N is how many different beginnings the draws have. Temperature T divides the
+    log-probabilities. noise: uniform numbers (longest + 1, draws), those of :func:`noise_of` by default.
+
+    The n draws that begin alike take the words at u / n, (1 + u) / n, ... (n - 1 + u) / n of the distribution, with one
+    uniform number u (systematic sampling). A word of probability p then comes n p times, rounded up or down, and n p
+    times on average: the draws show the distribution better than independent ones.
+    """
+    rows, noise = len(context), noise_of(limits, draws) if noise is None else noise
+    found = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
+    scores = np.zeros(rows * draws)
+    alive = np.arange(rows * draws)  # the draws that have not ended; those that begin alike are neighbours
+    row = two_rows(np.arange(rows))  # of each beginning, as the last word and the state
+    last, state = np.full(len(row), limits.start, dtype=np.int64), zero_state(step, len(row))
+    begun = alive // draws  # of each draw the beginning
+    for length in range(limits.longest + 1):
+        if not len(alive):
+            break
+        outputs, following = advance(step, state, {"word": last, "context": context[row]})
+        left = limits.possible(outputs["log_probabilities"].astype(np.float64), length)
+        shares = np.cumsum(np.exp((left - left.max(axis=1, keepdims=True)) / temperature), axis=1)
+        chosen = _spread(shares / shares[:, -1:], begun, noise[length, alive % draws])
+        found[alive, length] = chosen
+        scores[alive] += outputs["log_probabilities"][begun, chosen]
+        goes_on = chosen != limits.end
+        longer = (begun * left.shape[1] + chosen)[goes_on]
+        alive, unique = alive[goes_on], two_rows(np.unique(longer))
+        begun = np.searchsorted(unique, longer)
+        parent, last = np.divmod(unique, left.shape[1])
+        row, state = row[parent], {name: array[parent] for name, array in following.items()}
+    return [
+        _counted(found[at : at + draws].tolist(), scores[at : at + draws].tolist(), limits.end)
+        for at in range(0, rows * draws, draws)
+    ]
+
+
+def _spread(shares: Scores, begun: Ids, uniform: Floats) -> Ids:
+    """The word of each draw (n,), from row ``begun`` of where each word's share of 0 to 1 ends (N, V), sorted."""
+    first = np.searchsorted(begun, begun)
+    rank = np.arange(len(begun)) - first
+    place = (rank + uniform[first].astype(np.float64)) / np.bincount(begun)[begun]
+    chosen: Ids = (shares[begun] > place[:, None]).argmax(axis=1)
+    return chosen
+
+
+def _counted(found: list[list[int]], scores: list[float], end: int) -> list[Drawn]:
+    sequences = [tuple(ids[: ids.index(end)]) for ids in found]
+    score = dict(zip(sequences, scores, strict=True))
+    return [Drawn(ids, score[ids], times) for ids, times in Counter(sequences).items()]
+
+
+def consensus(
+    step: Graph,
+    context: Floats,
+    limits: Limits,
+    beams: int,
+    draws: int,
+    temperature: float,
+    noise: Floats | None = None,
+) -> list[list[Hypothesis]]:
+    """For each row of ``context`` (B, C) up to ``beams`` of the sequences drawn, the one that agrees best first.
+
+    The others: see :func:`draw_sequences`. Scores are agreements, 0 to 1.
+    """
+    return [by_consensus(row)[:beams] for row in draw_sequences(step, context, limits, draws, temperature, noise)]
+
+
+def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
+    """The drawn sequences by falling :func:`agreement` with all draws; of equal ones the most probable first."""
+    scores = agreement([one.ids for one in drawn], np.array([one.times for one in drawn]))
+    falling = -scores.round(9)  # what only rounding tells apart is equal
+    order = sorted(range(len(drawn)), key=lambda i: (falling[i], -drawn[i].log_probability))
+    return [Hypothesis(drawn[i].ids, drawn[i].log_probability, float(scores[i])) for i in order]
+
+
+def agreement(sequences: Sequence[tuple[int, ...]], times: Ids) -> Scores:
+    """What each of S sequences has in common with the others and itself, each as often as it came: means (S,), 0 to 1.
+
+    In common: the mean of two F1, of the words and of the pairs of neighbouring words that both have.
+    """
+    found = np.zeros(len(sequences))
+    for order in (1, 2):
+        columns: dict[tuple[tuple[int, ...], int], int] = {}  # of an n-gram for the first, second, ... time
+        places = []
+        for row, ids in enumerate(sequences):
+            seen: Counter[tuple[int, ...]] = Counter()
+            for gram in zip(*(ids[shift:] for shift in range(order)), strict=False):
+                seen[gram] += 1
+                places.append((row, columns.setdefault((gram, seen[gram]), len(columns))))
+        marks = np.zeros((len(sequences), len(columns)))
+        marks[tuple(np.array(places, dtype=np.intp).reshape(-1, 2).T)] = 1
+        sizes = marks.sum(axis=1)
+        shared = 2 * (marks @ marks.T) / np.maximum(sizes[:, None] + sizes, 1)  # a product counts what both have
+        found += shared @ (times / times.sum()) / 2
+    return found
+
+
+def score_words(step: Graph, contexts: Floats, rows: Ids, words: Ids) -> Scores:
+    """Log-probabilities (N,) of N sequences of words, each under the context of its row.
+
+    step: as :func:`beam_search`. contexts: (R, C). rows: (N,) of contexts. words: (N, W), the start, the words, the
+    end, and 0 behind it. Sequences of one row share the steps of the words with which they all begin.
+    """
+    found, group = np.zeros(len(rows)), rows
+    state, count = zero_state(step, len(contexts)), int(words.max()) + 1
+    for given, coming in zip(words.T, words.T[1:], strict=False):
+        alive = np.flatnonzero(coming)
+        if not len(alive):
+            break
+        _, first, same = np.unique(group[alive] * count + given[alive], return_index=True, return_inverse=True)
+        chosen = two_rows(alive[first])
+        before = {name: array[group[chosen]] for name, array in state.items()}
+        outputs, state = advance(step, before, {"word": given[chosen], "context": contexts[rows[chosen]]})
+        group = np.zeros_like(rows)
+        group[alive] = same
+        found[alive] += outputs["log_probabilities"][same, coming[alive]]
+    return found
+
+
+@dataclass(frozen=True)
+class BeamSettings(Settings):
+    """max_words: the longest sentence, in words. beams: hypotheses kept, and returned."""
+
+    max_words: Annotated[int, Range(1, 1000)]
+    beams: Annotated[int, Range(1, 100)] = 5
+
+
+@dataclass(frozen=True)
+class ConsensusSettings(BeamSettings):
+    """beams: sentences that are given. draws: sentences that are drawn."""
+
+    draws: Annotated[int, Range(1, 1000)] = 100
+    temperature: Annotated[float, Range(0.01, 100)] = 1.0
+
+
+_STEP = {"word": "*batch", "context": "batch C"}, {"log_probabilities": "batch V"}
+
+LOOPS: Mapping[str, Loop] = {
+    "beam": Loop(beam_search, *_STEP, BeamSettings, batch=128),
+    "consensus": Loop(consensus, *_STEP, ConsensusSettings, batch=16),
+}

@@ -1,0 +1,143 @@
+"""Clips in place, as game engines keep them: found by their feet, and given the path that their feet imply.
+
+A foot that carries weight stays where it is, in a walk as in a dance or a march on the spot. In a clip in place it
+slides back under a body that stays, as on a treadmill, while the other foot swings forward. So a clip is in place where
+its feet, by turns, slide much further than its root goes. Crawling, swimming, rolling and hopping on both feet are not
+found, and neither is a clip whose root goes half as far as its feet.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from motet.errors import MotionError, TravelWarning, warn
+from motet.figures.feet.contacts import ADULT_HEIGHT, feet_of, has_feet, lay_root_path, smoothed, velocity_by_feet
+from motet.figures.humanoid import HUMANOID, ground_under, is_mmm, leg_length, sole_points, to_humanoid, with_figure
+from motet.motion.kinematics import AXES, global_transforms, local_translations, positions, skeleton_of, with_channels
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array
+from motet.motion.skeleton import Skeleton
+
+IMPLIED = "the feet stride while the root stays: models take it with the path that the feet imply"
+
+
+@dataclass(frozen=True)
+class TreadmillSettings:
+    """What a clip in place is, in metres of the humanoid.
+
+    room: the root stays within it. share: of the way of the feet that the root goes itself, at most. speed: metres a
+    second that the feet go, at least. stride: the least standard deviation of how far one foot is ahead of the other.
+    hips: their least mean height over the feet; who lies or crawls has less. span: seconds over which velocities are
+    averaged, since feet that twist or shuffle go nowhere. calm: seconds, the deviation of the window that feet are
+    smoothed by. fps: faster clips are looked at in so many frames a second.
+    """
+
+    room: float = 0.5
+    share: float = 0.25
+    speed: float = 0.3
+    stride: float = 0.15
+    hips: float = 0.3
+    span: float = 1.0
+    calm: float = 0.015
+    fps: float = 30.0
+
+
+STANDARD = TreadmillSettings()
+
+
+def travelling(motion: Motion) -> Motion:
+    """The motion, or if it is a clip in place the motion :func:`with_travel`, of which a TravelWarning tells."""
+    if not is_in_place(motion):
+        return motion
+    warn(IMPLIED, TravelWarning)
+    return with_travel(motion)
+
+
+def is_in_place(motion: Motion, settings: TreadmillSettings = STANDARD) -> bool:
+    """Whether the feet of a human figure stride while its root stays; False for a figure that is not human, and for a
+    motion that does not say where its root is."""
+    skeleton = motion.skeleton
+    if skeleton is None or not any(name.endswith(".tx") for name in motion.channels):
+        return False
+    motion = motion.resample(min(motion.fps, settings.fps))
+    try:
+        if len(motion) < 3 or not _may_be(motion, skeleton, settings):
+            return False
+        found = _on_humanoid(motion)[0]
+    except MotionError:
+        return False
+    return _stays(found, settings) and _strides(found, settings)
+
+
+def with_travel(motion: Motion) -> Motion:
+    """The motion of a human figure with the path over the ground that its feet imply added to its own, the opposite of
+    :func:`motet.motion.in_place`.
+
+    Height, turns and sway stay; the path begins where the motion does. MotionError, with the reason, for a figure that
+    is not human.
+    """
+    motion = with_figure(motion) if is_mmm(motion) else motion
+    found, to_file = _on_humanoid(motion)
+    was, laid = (local_translations(each)[:, 0] for each in (found, lay_root_path(found)))
+    path = (laid - was + was[:1]) * [1, 0, 1]
+    moved = local_translations(motion)[:, 0] + path @ to_file
+    names = tuple(f"{skeleton_of(motion).names[0]}.t{axis}" for axis in AXES)
+    return with_channels(motion, names, moved, ("length",) * 3)
+
+
+def _may_be(motion: Motion, skeleton: Skeleton, settings: TreadmillSettings) -> bool:
+    """Whether a first look, before the figure is measured, leaves it open: most recordings end here."""
+    unit = skeleton.height / ADULT_HEIGHT
+    moved = np.ptp(local_translations(motion), axis=0)
+    moving = moved[moved.max(axis=1) > 0]
+    if len(moving) and np.hypot(*moving[0, [0, 2]]) > 1.5 * settings.room * unit:  # with y up
+        return False
+    if not has_feet(skeleton):
+        return True
+    reach = np.ptp(positions(motion)[:, feet_of(skeleton)], axis=0)
+    return bool(np.linalg.norm(reach, axis=1).max() > settings.stride * unit)
+
+
+def _on_humanoid(motion: Motion) -> tuple[Motion, Array]:
+    """The motion on the humanoid, and the matrix (3, 3) that brings its paths to the file's world, as path @ matrix."""
+    if motion.skeleton == HUMANOID:
+        return motion, np.eye(3)
+    found = to_humanoid(motion)
+    return found.motion, found.figure.turn * (found.figure.fitted.leg / leg_length())
+
+
+def _stays(motion: Motion, settings: TreadmillSettings) -> bool:
+    """Whether the root of the humanoid stays."""
+    root = local_translations(motion)[:, 0]
+    return bool(np.hypot(*np.ptp(root[:, [0, 2]], axis=0)) <= settings.room)
+
+
+def _strides(motion: Motion, settings: TreadmillSettings) -> bool:
+    """Whether the feet of the humanoid, which stands, stride further than its root goes."""
+    points, root = sole_points(*global_transforms(motion)), local_translations(motion)[:, 0]
+    slid = _averaged(_slid(motion, points, settings), settings.span * motion.fps)
+    went = _averaged(np.diff(root[:, [0, 2]], axis=0) * motion.fps, settings.span * motion.fps)
+    speeds = np.linalg.norm(slid, axis=1)
+    ahead = slid / np.maximum(speeds, 1e-9)[:, None]
+    feet = (points - root[:, None])[1:].reshape(-1, 2, len(points[0]) // 2, 3).mean(axis=2)[..., [0, 2]]
+    left, right = np.einsum("tfa,ta->ft", feet, ahead)
+    return bool(
+        speeds.mean() >= settings.speed
+        and np.linalg.norm(went, axis=1).sum() <= settings.share * speeds.sum()
+        and (left - right).std() >= settings.stride
+        and (left - left.mean()) @ (right - right.mean()) < 0
+        and root[:, 1].mean() - points[..., 1].mean() >= settings.hips
+    )
+
+
+def _slid(motion: Motion, points: Array, settings: TreadmillSettings) -> Array:
+    """The velocity (T - 1, 2) in m/s that would keep points (T, P, 3) of the humanoid's soles from sliding."""
+    plane = smoothed(points[..., [0, 2]], settings.calm, motion.fps)
+    return velocity_by_feet(plane, points[..., 1] - ground_under(points), motion.fps)
+
+
+def _averaged(velocity: Array, frames: float) -> Array:
+    """Velocities (T, 2), each the mean of so many frames around it, of fewer at the ends."""
+    window = np.ones(max(1, min(round(frames), len(velocity))))
+    count = np.convolve(np.ones(len(velocity)), window, "same")
+    return np.stack([np.convolve(column, window, "same") / count for column in velocity.T], axis=1)

@@ -1,0 +1,73 @@
+"""Bodies that lie, kneel or crawl on the floor instead of in it: the body is lifted, and limbs are turned upwards."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from motet.figures.feet.hold import lift
+from motet.figures.humanoid import HUMANOID
+from motet.motion.kinematics import global_transforms, motion_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, product, rotated, swing
+
+THICKNESS = {
+    "hips": 0.07,
+    "spine": 0.07,
+    "chest": 0.07,
+    "upperChest": 0.07,
+    "neck": 0.05,
+    "head": 0.05,
+    "LowerLeg": 0.04,
+}
+"""Metres from a joint to the skin, less than most people's: nobody who touches the floor is to float over it."""
+
+LIMBS = ("LowerArm", "Hand", "Foot", "Toes", "Hand_end", "Toes_end")
+"""What is turned upwards about the joint before it; the rest of the body is lifted as a whole."""
+
+TOLERATED = 0.015
+"""Metres that a wrist, an elbow or an ankle may be under the floor: to lift the wrist of an arm that stands on it bends
+the arm."""
+
+SOFT = 0.1
+"""Seconds before and after, in which what is under the floor leaves and returns."""
+
+
+def above_floor(motion: Motion) -> Motion:
+    """A motion of the humanoid, on a ground at height 0, with nothing under the floor.
+
+    First the whole body is lifted until its trunk, head and knees are above the floor, as thick as they are; then each
+    forearm, hand, foot and toe still under it is turned upwards about the joint before it, with all that hangs on it.
+    Nothing changes where nothing is under the floor. Recordings need it where hands and toes have no joint of
+    their own, or the performer was larger than the skeleton.
+    """
+    turned, places = global_transforms(motion)
+    turned, places, reach = np.array(turned), np.array(places), SOFT * motion.fps
+    thick = np.array([THICKNESS.get(name.removeprefix("left").removeprefix("right"), 0.0) for name in HUMANOID.names])
+    thick -= [TOLERATED * name.endswith(LIMBS[:4]) for name in HUMANOID.names]
+    limbs = [joint for joint, name in enumerate(HUMANOID.names) if name.endswith(LIMBS)]
+    body = np.setdiff1d(np.arange(len(thick)), limbs)
+    places[..., 1] += lift((thick[body] - places[:, body, 1]).max(axis=1), reach)[:, None]
+    for joint in limbs:
+        parent = HUMANOID.joints[joint].parent
+        bone = places[:, joint] - places[:, parent]
+        # straight down, a shin goes forward, a hand or foot the way its back faces
+        side = turned[:, parent, :, 2 if HUMANOID.names[joint].endswith("Foot") else 1]
+        raised = _raised(bone, side, lift(thick[joint] - places[:, joint, 1], reach))
+        turn = swing(bone, raised)[:, None]
+        hanging = list(HUMANOID.subtree(HUMANOID.names[parent]))
+        places[:, hanging] = places[:, [parent]] + rotated(turn, places[:, hanging] - places[:, [parent]])
+        turned[:, hanging] = product(turn, turned[:, hanging])
+    lifted = motion_of(HUMANOID, turned, {0: places[:, 0]}, motion.fps)
+    return replace(motion, values=lifted.select(motion.channels, motion.units).values)
+
+
+def _raised(bone: Array, side: Array, height: Array) -> Array:
+    """Vectors (T, 3) of the same lengths whose ends are higher by ``height`` (T,), or upright.
+
+    side: directions (T, 3); the more is missing, the more a bone that points straight down bends that way.
+    """
+    length = np.linalg.norm(bone, axis=-1, keepdims=True)
+    rise = np.minimum(bone[:, 1:2] + height[:, None], 0.999 * length)
+    flat = bone[:, [0, 2]] + height[:, None] * side[:, [0, 2]]
+    flat *= np.sqrt(length**2 - rise**2) / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1e-9)
+    return np.concatenate([flat[:, :1], rise, flat[:, 1:]], axis=-1)

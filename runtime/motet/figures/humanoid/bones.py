@@ -1,0 +1,206 @@
+"""The humanoid, the one figure through which motions of every skeleton are retargeted; and figures known by name.
+
+The humanoid's bones have the names of the VRM 1.0 humanoid. At rest (every angle 0) it stands in a T-pose: y up, facing
++z, the left at +x, palms down, soles at y = 0 where the root is at its offset; lengths are metres. Every joint's frame
+is that of the world at rest, so a joint's rotation says the same on every figure.
+
+Proportions: an adult of 1.70 m. Heights of knee, hip, shoulder and chin are the fractions of stature of Drillis and
+Contini (1966), as in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1, rounded to centimetres;
+the joint of the upper arm lies inside the shoulder's width, the ankle at the height of the joint's centre. The figures
+are in humanoid.json, for readers in other languages, too: of the trunk, and of the left side, which the right mirrors,
+each joint's parent, offset and Euler order.
+"""
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, rotated
+from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+
+LEFT_RIGHT = ("left", "right")
+
+SPINE = ("spine", "chest", "upperChest")
+NECK = ("neck", "head")
+LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
+ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
+
+Places = Mapping[str, tuple[str, tuple[float, float, float], str]]
+"""Joint -> parent, "" for none, offset and Euler order."""
+
+
+def sided(side: str, part: str) -> str:
+    """The name of a joint on one side: ``sided("left", "UpperArm")`` is "leftUpperArm"."""
+    return side + part
+
+
+def part_of(bone: str) -> str:
+    """The name of a bone without its side."""
+    return bone.removeprefix("left").removeprefix("right")
+
+
+def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 1.0) -> tuple[Joint, ...]:
+    """The joints of a trunk and, mirrored for the right, of a side, whose names lack the side."""
+    places = dict(trunk)
+    for side, sign in zip(sides, (1.0, -1.0), strict=True):
+        for part, (parent, (x, y, z), order) in left.items():
+            places[side + part] = (side + parent if parent in left else parent, (sign * x, y, z), order)
+    names = list(places)
+    return tuple(
+        Joint(name, names.index(parent) if parent else -1, (scale * x, scale * y, scale * z), order)
+        for name, (parent, (x, y, z), order) in places.items()
+    )
+
+
+_TABLES = json.loads((files("motet.figures.humanoid") / "humanoid.json").read_text("utf-8"))
+
+# an order's middle axis is the one that the joint turns least about, which keeps poses away from gimbal locks
+HUMANOID = Skeleton(_joints(_TABLES["trunk"], _TABLES["left"], LEFT_RIGHT), metres_per_unit=1.0)
+"""The humanoid's skeleton: 22 bones and the tips of head, hands and toes."""
+
+BONES = tuple(name for name in HUMANOID.names if not name.endswith(END_SUFFIX))
+"""The bones of the humanoid: all joints but the tips, each after its parent."""
+
+REQUIRED = tuple(bone for bone in BONES if part_of(bone) in ("hips", "spine", "head", *LEG[:3], *ARM[1:]))
+"""The bones required by VRM; the others stay at rest if a figure lacks them."""
+
+PARENTS = {name: HUMANOID.names[max(0, HUMANOID.joints[HUMANOID.index(name)].parent)] for name in BONES[1:]}
+"""For each bone but the hips its parent."""
+
+T_POSE = HUMANOID.rest_positions + HUMANOID.offsets[0]
+"""Positions (J, 3) of the humanoid's joints in the T-pose, with the soles at y = 0."""
+
+SOLE: Mapping[str, tuple[tuple[float, float, float], ...]] = {
+    part: tuple(map(tuple, points)) for part, points in _TABLES["soles"].items()
+}
+"""Points of the sole in the frames of the foot (heel, ball) and of the toes (tip)."""
+
+
+def leg_length() -> float:
+    """Length of the humanoid's thigh and shin together, in metres: the measure by which figures are scaled."""
+    return float(sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(sided("left", part))]) for part in LEG[1:3]))
+
+
+def sole_points(rotations: Array, positions: Array) -> Array:
+    """Points (T, 6, 3) of both soles, from the joints' world rotations (T, J, 3, 3) and positions (T, J, 3)."""
+    points = []
+    for side in LEFT_RIGHT:
+        for part, places in SOLE.items():
+            joint = HUMANOID.index(sided(side, part))
+            points += [positions[:, joint] + rotated(rotations[:, joint], np.array(place)) for place in places]
+    return np.stack(points, axis=1)
+
+
+def ground_under(soles: Array) -> float:
+    """The height of the ground under points (T, P, 3) of the soles: the lowest is deeper in 5 % of the frames; 0 for
+    no frames."""
+    return float(np.percentile(soles[..., 1].min(axis=1), 5)) if len(soles) else 0.0
+
+
+FINGERS: Places = _TABLES["fingers"]
+"""VRM's fingers of the left hand, each after its parent, "Hand" or another finger's bone."""
+
+MMM_SKELETON = Skeleton(
+    _joints(
+        {
+            "root": ("", (0.0, 0.0, 0.0), "yzx"),
+            "BP": ("root", (0.0, 0.08, 0.0), "xyz"),
+            "BT": ("BP", (0.0, 0.12, 0.0), "xyz"),
+            "BLN": ("BT", (0.0, 0.232, 0.0), "xyz"),
+            "BUN": ("BLN", (0.0, 0.03, 0.0), "xyz"),
+            "BUN_end": ("BUN", (0.0, 0.13, 0.0), "xyz"),
+        },
+        {
+            "H": ("root", (0.052, 0.0, 0.0), "xyz"),
+            "K": ("H", (0.0, -0.245, 0.0), "xyz"),
+            "A": ("K", (0.0, -0.246, 0.0), "xyz"),
+            "F": ("A", (0.0, -0.033, 0.075), "xyz"),
+            "F_end": ("F", (0.0, -0.006, 0.04), "xyz"),
+            "SC": ("BT", (0.087, 0.188, 0.0), "xyz"),
+            "S": ("SC", (0.11, 0.0, 0.0), "xyz"),
+            "E": ("S", (0.0, -0.188, 0.0), "xyz"),
+            "W": ("E", (0.0, -0.145, 0.0), "xyz"),
+            "W_end": ("W", (0.0, -0.108, 0.0), "xyz"),
+        },
+        ("L", "R"),
+        scale=1.7,  # metres of the body, which the angles do not tell
+    ),
+    metres_per_unit=1.0,
+)
+"""The figure of MMM files (KIT), which have no skeleton, and one channel for each angle: the Master Motor Map's
+reference body. Its segments are Winter's fractions of the body's height; it rests with arms down, and a joint turns
+about its three axes one after the other. Here y is up and the figure faces z; it is 1.7 m tall, in metres."""
+
+
+def is_mmm(motion: Motion) -> bool:
+    """Whether the channels are those of an MMM file."""
+    return motion.skeleton is None and {"root.rx", "LHx_joint", "RHx_joint"} <= set(motion.channels)
+
+
+def with_figure(motion: Motion) -> Motion:
+    """The motion of an MMM file on its figure; angles of joints that the figure lacks are left out."""
+    # an angle of MMM, whose x points right, y forward and z up -> the channel here, and its sign
+    axes = {"x": ("rx", -1.0), "y": ("rz", 1.0), "z": ("ry", 1.0)}
+    names, columns = [], []
+    for i, channel in enumerate(motion.channels):
+        joint, axis = channel.removesuffix("_joint")[:-1], channel.removesuffix("_joint")[-1]
+        if channel.startswith("root."):
+            names.append(channel)
+            columns.append(motion.values[:, i])
+        elif axis in axes and joint in MMM_SKELETON.names:
+            names.append(f"{joint}.{axes[axis][0]}")
+            columns.append(axes[axis][1] * motion.values[:, i])
+    units = tuple("m" if name[-2] == "t" else "rad" for name in names)
+    return Motion(np.stack(columns, axis=1), tuple(names), units, motion.fps, MMM_SKELETON)
+
+
+RIGS = ("mixamo", "rigify", "unity", "unreal")
+
+
+@cache
+def rig(name: str) -> Skeleton:
+    """The skeleton of a rig out of :data:`RIGS`, its lengths in the rig's unit; MotionError for another name.
+
+    It has the joints' names and the unit of a well-known rig, with the humanoid's proportions, in a T-pose, for
+    programs that know figures by these names and retarget from their T-pose, as engines do. Its convention's table
+    (:mod:`motet.figures.humanoid.joint_map`) has each bone's name first, back and neck all of them; "rig" says the
+    "unit" in metres, and where there is one the "prefix" of all names and the "root" at the floor that the hips hang
+    on.
+    """
+    if name not in RIGS:
+        raise MotionError(f"there is no rig {name!r}; expected one of {', '.join(RIGS)}")
+    content = json.loads((files("motet.figures.humanoid") / "conventions" / f"{name}.json").read_text("utf-8"))
+    known, rig, place = content["joints"], content["rig"], dict(zip(HUMANOID.names, T_POSE, strict=True))
+    back = _shared_out([place[bone] for bone in ("hips", *SPINE)], len(known["spine"]))
+    neck = _shared_out([place[bone] for bone in (SPINE[-1], *NECK)], len(known["neck"]) + 1)[:-1]
+    trunk = [known["hips"][0], *known["spine"], *known["neck"]]
+    # joint -> the one that it hangs on, "" for none, and its place (3,) in metres
+    tree: dict[str, tuple[str, Array]] = {rig["root"]: ("", np.zeros(3))} if "root" in rig else {}
+    above = [rig.get("root", ""), *trunk[:-1]]
+    tree |= dict(zip(trunk, zip(above, [place["hips"], *back, *neck], strict=True), strict=True))
+    called = {"hips": trunk[0], "upperChest": known["spine"][-1], "neck": known["neck"][-1], "head": known["head"][0]}
+    for side, word in zip(LEFT_RIGHT, content["sides"][0], strict=True):
+        called |= {sided(side, part): known[part][0].replace("{s}", word) for part in (*LEG, *ARM)}
+    called |= {bone + END_SUFFIX: name + END_SUFFIX for bone, name in called.items()}
+    for joint in HUMANOID.joints[1:]:
+        if joint.name not in (*SPINE, "neck"):
+            tree[called[joint.name]] = (called[HUMANOID.names[joint.parent]], place[joint.name])
+    joints = []
+    for own, (parent, at) in tree.items():
+        x, y, z = ((at - tree[parent][1] if parent else at) / rig["unit"]).tolist()
+        joints.append(Joint(rig.get("prefix", "") + own, list(tree).index(parent) if parent else -1, (x, y, z)))
+    return Skeleton(tuple(joints), rig["unit"])
+
+
+def _shared_out(chain: list[Array], count: int) -> list[Array]:
+    """Places (3,) of the joints of another chain, as far up as retargeting shares turns out."""
+    up = np.arange(1, count + 1) * (len(chain) - 1) / count
+    return list(np.stack([np.interp(up, range(len(chain)), along) for along in np.transpose(chain)], axis=1))
+
+
+MIXAMO = rig("mixamo")

@@ -1,0 +1,297 @@
+"""Finding the bones of the humanoid by the tree of joints alone, where no convention knows the names.
+
+A human's skeleton forks twice into two limbs that are alike: at the hips into legs, and higher up into arms. Within a
+limb lengths tell which joint is which. Left and right come from the halves of names, else from the side on which a
+limb lies when the feet point forward.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, pairwise, permutations
+
+import numpy as np
+
+from motet.errors import MotionError
+from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
+from motet.figures.humanoid.joint_map import (
+    BY_THE_TREE,
+    HalfKnownError,
+    JointMap,
+    check_map,
+    map_by_names,
+    without_numbers,
+)
+from motet.motion.kinematics import local_translations, positions, skeleton_of
+from motet.motion.motion import Motion
+from motet.motion.rotations import Array, unit
+from motet.motion.skeleton import END_SUFFIX, LEFT, RIGHT, Skeleton, partners_of, sides_of
+
+NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
+
+WORN = re.compile("hair|braid|bangs|skirt|cape|cloak|ribbon|scarf|backpack|髪|スカート|マント|リボン", re.IGNORECASE)
+"""What names of chains of joints contain that are no limbs."""
+
+Limbs = list[dict[str, int]]
+"""Of both limbs of a pair the joint of each part."""
+
+
+@dataclass(frozen=True)
+class _Fork:
+    """A joint and two similar limbs below it, by their first joints; whether names say so, and how unlike they are."""
+
+    joint: int
+    limbs: tuple[int, int]
+    length: float
+    is_named: bool
+    unlike: float
+
+
+class _Tree:
+    """A skeleton with the length of the bone to each joint (J) and the length of the longest path from each joint."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.skeleton = skeleton_of(motion)
+        self.names = without_numbers(self.skeleton.names)
+        self.partners = partners_of(self.names)
+        self.lengths = np.linalg.norm(local_translations(motion)[0] if len(motion) else self.skeleton.offsets, axis=1)
+        self.lengths[0] = 0.0
+        self.reach = np.zeros(len(self.lengths))
+        for i in range(len(self.lengths) - 1, 0, -1):
+            parent = self.skeleton.joints[i].parent
+            self.reach[parent] = max(self.reach[parent], self.lengths[i] + self.reach[i])
+
+    def longest(self, joints: list[int] | tuple[int, ...]) -> int:
+        """That of some joints from whose parent the path over it is longest."""
+        return max(joints, key=lambda joint: float(self.lengths[joint] + self.reach[joint]))
+
+    def path(self, joint: int) -> list[int]:
+        """The joints of the longest path down from a joint, without a tip."""
+        path = [joint]
+        while children := self.skeleton.children[path[-1]]:
+            path.append(self.longest(children))
+        return path[:-1] if self.skeleton.names[path[-1]].endswith(END_SUFFIX) and len(path) > 1 else path
+
+    def forks(self, joint: int) -> list[_Fork]:
+        """The pairs of branches of a joint that are alike and have three joints and more, the most alike first."""
+        branches = [child for child in self.skeleton.children[joint] if not WORN.search(self.names[child])]
+        branches = [child for child in branches if len(self.path(child)) >= 3]
+        # of many, such as strands of hair, the longest: every pair is compared
+        branches = sorted(sorted(branches, key=lambda child: -self.lengths[child] - self.reach[child])[:60])
+        pairs = [self._fork(joint, pair) for pair in combinations(branches, 2)]
+        return sorted((fork for fork in pairs if fork), key=lambda fork: fork.unlike)
+
+    def _fork(self, joint: int, pair: tuple[int, int]) -> _Fork | None:
+        shorter, longer = sorted(float(self.lengths[i] + self.reach[i]) for i in pair)
+        counts = [len(self.path(limb)) for limb in pair]
+        # two limbs of a pair may differ in length by 15 %
+        if not longer or 1 - shorter / longer > 0.15:
+            return None
+        is_named = self.partners[pair[0]] == pair[1]
+        unlike = 1 - shorter / longer + 0.1 * abs(counts[0] - counts[1]) - (1.0 if is_named else 0.0)
+        return _Fork(joint, pair, longer, is_named, unlike)
+
+    def legs_and_arms(self) -> tuple[_Fork, _Fork]:
+        """The two forks with the longest limbs, of those whose names say so if there are, nearer to the root first."""
+        forks = [fork for joint in range(len(self.lengths)) for fork in self.forks(joint)[:1]]
+        forks.sort(key=lambda fork: -fork.length)
+        limbs = self._apart([fork for fork in forks if fork.is_named])
+        if len(limbs) < 2 or limbs[1].length < 0.3 * forks[0].length:
+            limbs = self._apart(forks)
+        if len(limbs) < 2 or limbs[1].length < 0.3 * limbs[0].length:
+            found = f"one pair of limbs, at {self.skeleton.names[limbs[0].joint]!r}" if limbs else "no pair of limbs"
+            raise MotionError(f"{NO_HUMAN}; found {found}")
+        first, second = sorted(limbs[:2], key=lambda fork: len(self.skeleton.ancestors(fork.joint)))
+        return first, second
+
+    def _apart(self, forks: list[_Fork]) -> list[_Fork]:
+        """Those forks that are not on the limbs of one before them."""
+        limbs: list[_Fork] = []
+        for fork in forks:
+            above = self.skeleton.ancestors(fork.joint)
+            if not any(limb in above for other in limbs for limb in other.limbs):
+                limbs.append(fork)
+        return limbs
+
+    def mirrored_legs_and_arms(self) -> Iterator[tuple[_Fork, _Fork]]:
+        """Other choices of legs and arms, the longest first: pairs of limbs whose bones are equally long one by one."""
+        forks = [fork for joint in range(len(self.lengths)) for fork in self.forks(joint) if self._is_mirrored(fork)]
+        forks.sort(key=lambda fork: -fork.length)
+        forks = forks[:12]  # of many strands of hair the longest
+        for legs, arms in sorted(permutations(forks, 2), key=lambda pair: -pair[0].length - pair[1].length):
+            apart = not {*legs.limbs} & {*self.skeleton.ancestors(arms.joint)}
+            if apart and legs.joint in self.skeleton.ancestors(arms.joint)[1:] and arms.length > 0.3 * legs.length:
+                yield legs, arms
+
+    def _is_mirrored(self, fork: _Fork) -> bool:
+        one, other = (self.lengths[self.path(limb)] for limb in fork.limbs)
+        return len(one) == len(other) and bool(np.abs(one - other).max() < 0.02 * fork.length)
+
+    def pair(self, fork: _Fork) -> tuple[list[list[int]], list[float]]:
+        """The paths of two limbs, as long as the shorter, and how far down their joints are, the mean of both."""
+        paths = [self.path(limb) for limb in fork.limbs]
+        paths = [path[: min(map(len, paths))] for path in paths]
+        ends = [[0.0, *np.cumsum(self.lengths[path[1:]]).tolist(), self.reach[path[0]]] for path in paths]
+        return paths, np.mean(ends, axis=0).tolist()
+
+    def legs(self, fork: _Fork) -> Limbs:
+        """Thighs, shins, feet and toes: the ankle leaves the foot's length, the knee halves what is above it."""
+        paths, places = self.pair(fork)
+        last = len(places) - 2
+        # what comes after the ankle is within these parts of a leg
+        feet = [k for k in range(2, last + 1) if 0.08 <= 1 - places[k] / places[-1] <= 0.35] or [last]
+        thigh, shin, foot = _two_bones(places, feet)
+        parts = {"UpperLeg": thigh, "LowerLeg": shin, "Foot": foot, "Toes": foot + 1}
+        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
+
+    def arms(self, fork: _Fork) -> Limbs:
+        """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves.
+
+        An arm that ends in one long bone has no joint for the hand: its tip is the wrist.
+        """
+        paths, places = self.pair(fork)
+        last = len(places) - 2
+        start, elbow, hand = _two_bones(places, self._wrists(paths, places))
+        parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
+        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
+
+    def _wrists(self, paths: list[list[int]], places: list[float]) -> list[int]:
+        """Where on an arm the hand may begin."""
+        last = len(places) - 2
+        forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(self.skeleton.children[joint]) >= 2]
+        # what comes after the wrist is within this part of an arm
+        near = [k for k in range(2, last + 1) if 1 - places[k] / places[-1] <= 0.35]
+        is_leaf = not any(self.skeleton.children[path[last]] for path in paths)
+        # a leaf that is near to the joint before it is the hand's end
+        if is_leaf and len(near) > 1 and places[-1] - places[last - 1] < 0.25 * places[-1]:
+            near = near[:-1]
+        return forks[:1] or near or [last + 1]
+
+    def neck(self, arms: _Fork) -> tuple[tuple[int, ...], int | None]:
+        """The joints between the arms and the head, and the head's, where there are."""
+        branches = [child for child in self.skeleton.children[arms.joint] if child not in arms.limbs]
+        branches = [child for child in branches if self.reach[child] + self.lengths[child] > 0]
+        if not branches:
+            return (), None
+        path = self.path(self.longest(branches))
+        named = [k for k, joint in enumerate(path) if "head" in self.skeleton.names[joint].lower()]
+        head = named[0] if named else min(1, len(path) - 1)
+        return tuple(path[:head]), path[head]
+
+
+def map_of(motion: Motion) -> JointMap:
+    """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is not human.
+
+    Where names fit in part, and the tree does not tell either, the error says which bones the names lack.
+    """
+    try:
+        return map_by_names(skeleton_of(motion)) or map_by_tree(motion)
+    except HalfKnownError as half:
+        try:
+            found = map_by_tree(motion)
+        except MotionError:
+            raise half from None
+        if not half.agreed.items() <= found.joints.items():
+            raise
+        return found
+
+
+def map_by_tree(motion: Motion) -> JointMap:
+    """The map by lengths, forks and sides; MotionError where the tree is not that of a human."""
+    tree, skeleton = _Tree(motion), skeleton_of(motion)
+    frames = positions(motion) if len(motion) else skeleton.rest_positions[None]
+    try:
+        return _mapped(tree, frames, *tree.legs_and_arms())
+    except MotionError as error:
+        # what a body wears and carries can be longer than its limbs; beasts do not stand with their backs upright
+        for legs, arms in tree.mirrored_legs_and_arms():
+            if _stands(skeleton.rest_positions, tree.legs(legs), arms):
+                try:
+                    return _mapped(tree, frames, legs, arms)
+                except MotionError:
+                    continue
+        raise error
+
+
+def _mapped(tree: _Tree, frames: Array, legs: _Fork, arms: _Fork) -> JointMap:
+    """The map by the tree with given legs and arms, in frames (T, J, 3)."""
+    skeleton = tree.skeleton
+    hips_up = skeleton.ancestors(legs.joint)
+    back = [joint for joint in skeleton.ancestors(arms.joint) if joint not in hips_up]
+    if not back:
+        raise MotionError(f"{NO_HUMAN}; there is no back between {skeleton.names[legs.joint]!r} and the arms")
+    leg_pair, arm_pair = tree.legs(legs), tree.arms(arms)
+    # legs that are folded or crossed do not tell sides, as they do at rest where the figure stands there
+    shown = skeleton.rest_positions[None] if _stands(skeleton.rest_positions, leg_pair, arms) else frames
+    to_left = _to_left(shown, leg_pair, skeleton)
+    joints, named = {"hips": legs.joint}, False
+    for pair, parts, first in ((leg_pair, LEG, "UpperLeg"), (arm_pair, ARM, "UpperArm")):
+        left_first, by_name = _left_first(tree, shown, to_left, [limb[first] for limb in pair])
+        named = named or by_name
+        for side, limb in zip(LEFT_RIGHT, pair if left_first else pair[::-1], strict=True):
+            joints |= {sided(side, part): limb[part] for part in parts if part in limb}
+    neck, head = tree.neck(arms)
+    joints |= {} if head is None else {"head": head}
+    _check_straight(skeleton, frames, joints)
+    return check_map(skeleton, JointMap(joints, tuple(back[::-1]), neck, BY_THE_TREE, 0.8 if named else 0.6))
+
+
+def _two_bones(places: list[float], ends: list[int]) -> tuple[int, int, int]:
+    """Where on a limb two bones begin, meet and end: those nearest to one length and most of the limb."""
+
+    def unlike(choice: tuple[int, int, int]) -> float:
+        start, middle, end = choice
+        upper, lower, first = places[middle] - places[start], places[end] - places[middle], start + 1
+        whole = upper + lower
+        # a bone begins with at least .15 of its limb: hips and buttocks often have a short one before the thigh
+        begins = places[first] - places[start] > 0.15 * whole > 0
+        return abs(upper - lower) / whole - 0.1 * whole / places[-1] if begins else np.inf
+
+    return min(((start, middle, end) for end in ends for start, middle in combinations(range(end), 2)), key=unlike)
+
+
+def _check_straight(skeleton: Skeleton, frames: Array, joints: dict[str, int]) -> None:
+    """Refuse limbs whose bones are not straight from joint to joint in most frames (T, J, 3)."""
+    for side in LEFT_RIGHT:
+        for one, other in (*pairwise(LEG[:3]), *pairwise(ARM[1:])):
+            if sided(side, other) not in joints:
+                continue
+            upper, lower = joints[sided(side, one)], joints[sided(side, other)]
+            above = skeleton.ancestors(lower)
+            within = above[: above.index(upper) + 1]
+            pieces = sum(np.linalg.norm(frames[:, low] - frames[:, high], axis=-1) for low, high in pairwise(within))
+            # joints that take a bone's twist lie in line with it; limbs of beasts have more bones, and bend at them
+            if np.median(pieces) > 1.1 * np.median(np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)):
+                bent = f"this one is bent between {skeleton.names[upper]!r} and {skeleton.names[lower]!r}"
+                raise MotionError(f"a human's bones are straight, {bent}: if it is human all the same, give a map")
+
+
+def _stands(pose: Array, legs: Limbs, arms: _Fork) -> bool:
+    """Whether in a pose (J, 3) both legs are straight, and the arms above them."""
+    thighs, shins = (
+        unit(np.array([pose[leg[one]] - pose[leg[next_]] for leg in legs])) for one, next_ in pairwise(LEG[:3])
+    )
+    trunk = unit(pose[list(arms.limbs)].mean(axis=0) - pose[[leg["UpperLeg"] for leg in legs]].mean(axis=0))
+    return bool(min(*(thighs @ trunk), *(shins @ trunk)) > 0.75)
+
+
+def _to_left(frames: Array, legs: Limbs, skeleton: Skeleton) -> Array:
+    """Directions (T, 3) to the figure's left, told from its feet."""
+    forward, up = np.zeros(frames[:, 0].shape), np.zeros(frames[:, 0].shape)
+    for leg in legs:
+        ends = [*([leg["Toes"]] if "Toes" in leg else []), *skeleton.children[leg["Foot"]]]
+        forward += unit(frames[:, ends[0]] - frames[:, leg["Foot"]]) if ends else 0.0
+        up += unit(frames[:, leg["UpperLeg"]] - frames[:, leg["Foot"]])
+    return np.cross(up, forward)
+
+
+def _left_first(tree: _Tree, frames: Array, to_left: Array, pair: list[int]) -> tuple[bool, bool]:
+    """Whether the first of two joints is the left one, and whether their names say so."""
+    sides = [sides_of(tree.names)[joint] for joint in pair]
+    if sorted(sides) == sorted((LEFT, RIGHT)):
+        return sides[0] == LEFT, True
+    across = np.mean(np.sum((frames[:, pair[0]] - frames[:, pair[1]]) * to_left, axis=-1))
+    if not across:
+        names = " and ".join(repr(tree.skeleton.names[joint]) for joint in pair)
+        raise MotionError(f"left and right of {names} cannot be told apart by names or feet; give a map")
+    return bool(across > 0), False

@@ -1,0 +1,73 @@
+"""The inverse kinematics of the humanoid's legs: an ankle brought to a place, of one figure or of many at once."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, sided
+from motet.figures.two_bones import TwoBones
+from motet.motion.scalar_or_batch import Part, Quaternion, Vector, inverse, plus, product, rotated, rotated_axis
+
+Floats = NDArray[np.float32]
+
+
+LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in LEG] for side in LEFT_RIGHT])
+"""Bones (2, 4) of both legs among the humanoid's."""
+
+
+OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES]]
+"""Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
+
+
+class Limb(NamedTuple):
+    """What is played of a leg: rotations of its joints, where they begin, both in their parents' frames, and how much
+    its foot stands."""
+
+    local: list[Quaternion]
+    offsets: list[Vector]
+    contact: Part
+
+
+def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
+    """The left and the right leg of one character, or the legs of all as one; of poses' rotations and contacts."""
+    if len(rotations) == 1:
+        for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), contacts[0].tolist(), strict=True):
+            yield Limb(rotations[0, bones].tolist(), offsets, contact)
+    else:
+        local = np.array(rotations.transpose(1, 2, 0)[LEG_BONES].transpose(1, 2, 0, 3), dtype=np.float64, order="C")
+        offsets = OFFSETS.transpose(1, 2, 0)[..., None]
+        yield Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], contacts.T)
+
+
+def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
+    """Rotations of poses with others of thighs, shins and feet, of legs as :func:`limbs` gives them."""
+    # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
+    turned: NDArray[Any] = np.array(legs)
+    found = rotations.copy("K")
+    found.transpose(1, 2, 0)[LEG_BONES[:, :3]] = (
+        turned[..., None] if len(legs) == 2 else turned[0].transpose(2, 0, 1, 3)
+    )
+    return found
+
+
+def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quaternion], list[Vector]]:
+    """Rotations and places of a leg's joints where the hips are."""
+    turned, places, above = list[Quaternion](), list[Vector](), hips
+    for local, offset in zip(limb.local, limb.offsets, strict=True):
+        place = plus(place, rotated(above, offset))
+        above = product(above, local)
+        turned.append(above)
+        places.append(place)
+    return turned, places
+
+
+def reached_by(hips: Quaternion, turned: list[Quaternion], places: list[Vector], target: Vector) -> list[Quaternion]:
+    """Rotations of thigh, shin and foot in their parents' frames, of a leg with its ankle at a target; the foot stays
+    as it is in the world."""
+    thigh, shin, foot = turned[:3]
+    leg = TwoBones(places[0], places[1], places[2], rotated_axis(shin, 0))
+    turn_thigh, turn_shin = leg.turns(leg.eased(target))
+    thigh, shin = product(turn_thigh, thigh), product(turn_shin, shin)
+    return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]

@@ -1,0 +1,89 @@
+"""A leg or an arm that reaches for a place: two-bone inverse kinematics, of one limb or of many at once."""
+
+import numpy as np
+
+from motet.motion.scalar_or_batch import (
+    Part,
+    Quaternion,
+    Vector,
+    computed,
+    cross,
+    dot,
+    larger,
+    length,
+    minus,
+    normalised,
+    plus,
+    product,
+    root,
+    rotated,
+    swing,
+    times,
+    unit,
+    where,
+)
+
+
+class TwoBones:
+    """A thigh and a shin, or an upper arm and a forearm: positions of hip, knee and ankle, and the knee's axis, about
+    which the shin turns when the knee bends; or of shoulder, elbow and hand. Any unit of length; all of them vectors
+    as :mod:`motet.motion.scalar_or_batch` has them."""
+
+    SHORTEST = -0.95
+    """The cosine of the largest bend of a knee, 162 degrees: targets beyond it are not reached."""
+
+    EASED_SHARE = 0.5
+    """The largest lengthening of a leg, as a share of the length left until it is straight."""
+
+    GIVES = (0.012, 0.006)
+    """Shares of the length of a straight leg: 1 cm, how much too long it stays when it has to bend; and 5 mm short of
+    straight, or a knee bent by 12 degrees, where that is e times less."""
+
+    def __init__(self, hip: Vector, knee: Vector, ankle: Vector, hinge: Vector) -> None:
+        self.hip, self.ankle = hip, ankle
+        self._along, self._down = along, down = minus(knee, hip), minus(ankle, knee)
+        upper, lower = dot(along, along), dot(down, down)
+        self._axis = unit(minus(hinge, times(along, dot(hinge, along) / upper)))
+        # the part of the shin in the plane of the bend
+        in_plane = larger(1 - dot(down, self._axis) ** 2 / lower, 1e-12)
+        self._squares, self._twice = upper + lower, 2 * root(upper * lower * in_plane)
+        self.longest = root(self._squares + self._twice)
+
+    def eased(self, target: Vector) -> Vector:
+        """The position near a target, on the line to the hip, that the ankle reaches without a snap.
+
+        Near straight, a knee bends or straightens infinitely fast relative to the leg's length. So a leg lengthens less
+        the straighter it gets, and a straight one bends only softly.
+        """
+        away = minus(target, self.hip)
+        now, wanted = length(minus(self.ankle, self.hip)), length(away)
+        left = larger(self.longest - now, 1e-9)
+        longer = -self.EASED_SHARE * left * computed(np.expm1, -larger(wanted - now, 0.0) / (self.EASED_SHARE * left))
+        less = larger(now - wanted, 0.0)
+        give, fade = (part * self.longest for part in self.GIVES)
+        shorter = less * less / larger(less + give * computed(np.exp, -left / fade), 1e-12)
+        return plus(self.hip, times(away, (now + longer - shorter) / larger(wanted, 1e-12)))
+
+    def turns(self, target: Vector) -> tuple[Quaternion, Quaternion]:
+        """Rotations in the world of thigh and shin that bring the ankle to a target, or as near as possible.
+
+        The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
+        bent back even where it was bent forward; then thigh and shin turn together the shortest way.
+        """
+        away = minus(target, self.hip)
+        bend = self._bend((dot(away, away) - self._squares) / self._twice)
+        turn = swing(plus(self._along, rotated(bend, self._down)), away)
+        return turn, product(turn, bend)
+
+    def _bend(self, cosine: Part) -> Quaternion:
+        """The turn about the axis after which the shin is bent by the angle of a cosine."""
+        cosine = -larger(-larger(cosine, self.SHORTEST), -1.0)
+        sine = root(1 - cosine * cosine)
+        now, aside = dot(self._along, self._down), dot(cross(self._along, self._down), self._axis)  # negative: forward
+        by = 1 / larger(root(now * now + aside * aside), 1e-300)
+        # the cosine and sine of the difference of the angles, and half of it
+        cosine, sine = (cosine * now + sine * aside) * by, (sine * now - cosine * aside) * by
+        half = 1 + cosine
+        sine = where(half > 1e-12, sine, 1.0)
+        x, y, z = times(self._axis, sine)
+        return normalised((x, y, z, half))

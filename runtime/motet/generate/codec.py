@@ -1,0 +1,197 @@
+"""Codes of frames, and frames of codes as they come: as many as the decoder can give before it knows what follows.
+
+A pose on the ground is (..., 3): x and z in metres, and the facing in radians about the vertical axis, 0 along z. A
+move is (..., 3): forward and to the left in metres, and a turn to the left in radians, seen from the pose that it
+starts from.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.bundle.graph import Graph
+from motet.decode.loop import Ids
+from motet.motion.rotations import Array
+from motet.motion.springs import damped, damping_of
+
+REACH = 0.5
+"""Metres that count as much as a radian where moves are compared."""
+
+
+def moved(pose: Array, move: Array) -> Array:
+    """The poses (..., 3) that moves (..., 3) lead to."""
+    sin, cos = np.sin(pose[..., 2]), np.cos(pose[..., 2])
+    x = pose[..., 0] + move[..., 0] * sin + move[..., 1] * cos
+    z = pose[..., 1] + move[..., 0] * cos - move[..., 1] * sin
+    found: Array = np.stack([x, z, pose[..., 2] + move[..., 2]], axis=-1)
+    return found
+
+
+def seen_from(pose: Array, other: Array) -> Array:
+    """The moves (..., 3) that lead from poses (..., 3) to others: :func:`moved` undone. Turns are not wrapped."""
+    sin, cos = np.sin(pose[..., 2]), np.cos(pose[..., 2])
+    x, z = other[..., 0] - pose[..., 0], other[..., 1] - pose[..., 1]
+    found: Array = np.stack([x * sin + z * cos, x * cos - z * sin, other[..., 2] - pose[..., 2]], axis=-1)
+    return found
+
+
+def way_of(start: Array, moves: Array) -> Array:
+    """The poses (..., N + 1, 3) on the way from ``start`` (..., 3) by moves (..., N, 3), both ends included."""
+    poses = [start]
+    for place in range(moves.shape[-2]):
+        poses.append(moved(poses[-1], moves[..., place, :]))
+    return np.stack(poses, axis=-2)
+
+
+def nearest_moves(poses: Array, book: Array) -> tuple[NDArray[np.int64], Array]:
+    """Entries (..., N) int64 of a book (K, 3), and the way (..., N + 1, 3) they lead, along poses (..., N + 1, 3).
+
+    The way starts at the first pose; each entry is the one that leads nearest to the next pose from where the way is.
+    """
+    scale, way, found = np.array([1.0, 1.0, REACH]), [poses[..., 0, :]], []
+    for place in range(1, poses.shape[-2]):
+        wanted = seen_from(way[-1], poses[..., place, :])
+        off = ((wanted[..., None, :] - book) * scale) ** 2
+        found.append(off.sum(axis=-1).argmin(axis=-1))
+        way.append(moved(way[-1], book[found[-1]]))
+    return np.stack(found, axis=-1), np.stack(way, axis=-2)
+
+
+PATH = 3
+"""Of the decoder's channels the first: the root's forward, left and turn, seen from where the moves have led."""
+
+
+class ReceptiveField(NamedTuple):
+    """Steps of codes the decoder looks back and ahead, and frames in a step."""
+
+    back: int
+    ahead: int
+    hop: int
+
+
+class Context(NamedTuple):
+    """The end of the motion to continue: frames (G, D) in the contract's units, and their steps of codes (N, P)."""
+
+    frames: Array
+    codes: Ids
+
+
+@dataclass(frozen=True, eq=False)
+class Codec:
+    """The graphs "decoder" and "tokens" of a model that writes codes, and how many moves of the root its codes have."""
+
+    decoder: Graph
+    tokens: Graph
+    field: ReceptiveField
+    moves: int
+    fps: float
+    half_life: float
+    """Seconds of the spring by which decoded frames continue a motion."""
+
+    @property
+    def seconds(self) -> float:
+        """Of a step."""
+        return self.field.hop / self.fps
+
+    @cached_property
+    def book(self) -> Array:
+        """The moves (K, 3) that codes stand for: metres forward and to the left, and radians to the left."""
+        codes = np.zeros((2, self.moves, self.decoder.spec.input("codes").size(-1)), dtype=np.int64)
+        codes[..., 0] = np.arange(self.moves)
+        moves: Array = self.decoder({"codes": codes})["moves"][0].astype(np.float64)
+        return moves
+
+    def steps(self, seconds: float) -> int:
+        """The number of steps that cover a duration, ignoring rounding errors."""
+        return math.ceil(seconds * self.fps / self.field.hop - 1e-9)
+
+    def codes_of(self, frames: Array) -> Ids:
+        """Steps of codes (N, P) int64 of frames (T, D) in the contract's units; T is a multiple of a step's frames."""
+        steps = frames.reshape(-1, self.field.hop, frames.shape[1]).astype(np.float32)
+        body = self.tokens({"frames": np.stack([steps, steps])})["codes"][0]
+        poses = way_of(np.zeros(PATH), np.concatenate([frames[:, :PATH], frames[-1:, :PATH]]) / self.fps)[1:]
+        moves, _ = nearest_moves(poses[:: self.field.hop], self.book)
+        return np.concatenate([moves[:, None], body], axis=1)
+
+    def frames_of(self, codes: Ids) -> Array:
+        """Frames (T, D) in the contract's units of steps of codes (N, P), from the origin."""
+        decoder = StreamingDecoder(self)
+        return np.concatenate([decoder.push(codes), decoder.finish()])
+
+
+class Inertialization:
+    """What a motion's last frames (2, D) are beside those found in their place goes from the frames that follow.
+
+    By a critically damped spring, so that neither poses nor velocities leap (Bollo 2016). What the root's rates are off
+    by is a speed already, and has none.
+    """
+
+    def __init__(self, given: Array, found: Array, fps: float, half_life: float) -> None:
+        self.seconds, self.damping = 1 / fps, damping_of(half_life)
+        before, self.off = given - found
+        self.speed = (self.off - before) * fps
+        self.speed[:PATH] = 0
+
+    def __call__(self, frames: Array) -> Array:
+        """The next frames (T, D) with what is left."""
+        joined = np.array(frames)
+        for place in range(len(joined)):
+            self.off, self.speed = damped(self.off, self.speed, self.damping, self.seconds)
+            joined[place] += self.off
+        return joined
+
+
+class StreamingDecoder:
+    """Frames (T, D) of steps of codes (N, P) that are pushed as they come; holds all state of one request.
+
+    The root's forward, left and turn come as rates a second, from each frame to the next, so that adding them up gives
+    the way. context: the end of a motion, which the frames continue without a leap.
+    """
+
+    def __init__(self, codec: Codec, context: Context | None = None) -> None:
+        self.codec = codec
+        self.codes = [] if context is None else list(context.codes)
+        self.given = None if context is None else context.frames[-2:]
+        self.count = max(0, len(self.codes) - 1)  # steps of which frames were given; the last is decoded to be joined
+        self.way, self.pose = np.zeros((1, 3)), np.zeros((0, PATH))
+        self.join: Inertialization | None = None
+
+    def push(self, steps: Ids) -> Array:
+        """Frames (T, D) that further steps settle; none at first."""
+        self.codes += list(steps)
+        found = self._settled(len(self.codes) - self.codec.field.ahead)
+        over = max(0, self.count - self.codec.field.back)  # out of sight
+        self.codes, self.count = self.codes[over:], self.count - over
+        return found
+
+    def finish(self) -> Array:
+        """The remaining frames, with nothing to follow."""
+        return self._settled(len(self.codes))
+
+    def _settled(self, until: int) -> Array:
+        codec, hop = self.codec, self.codec.field.hop
+        if until <= self.count:
+            return np.empty((0, codec.decoder.spec.output("frames").size(-1)))
+        start = max(0, self.count - codec.field.back)
+        part = np.array(self.codes[start : until + codec.field.ahead])
+        found = codec.decoder({"codes": np.stack([part, part])})  # two rows: a lone one is rounded differently
+        moves = found["moves"][0].astype(np.float64)
+        frames = found["frames"][0, self.count - start : until - start].astype(np.float64)
+        way = way_of(self.way[-1], moves[self.count - start : until - start])
+        self.way, self.count = way[-1:], until
+        # the root, seen from the way, as rates
+        poses = moved(way[:-1, None], frames[..., :PATH]).reshape(-1, PATH)
+        earlier = self.pose if len(self.pose) else poses[:1]
+        rates = seen_from(np.concatenate([earlier, poses[:-1]]), poses) * codec.fps
+        if not len(self.pose):
+            rates[:1] = rates[1:2]
+        self.pose = poses[-1:]
+        frames = np.concatenate([rates, frames.reshape(len(poses), -1)[:, PATH:]], axis=1)
+        if self.given is not None:
+            self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, codec.half_life)
+            self.given, frames = None, frames[hop:]
+        return frames if self.join is None else self.join(frames)

@@ -1,0 +1,215 @@
+"""Steer: figures that follow live controls over the ground."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from motet.bundle.fields import LARGEST, Fields
+from motet.bundle.graph import Arrays, Floats, Graph
+from motet.bundle.manifest import Manifest
+from motet.errors import ArgumentError, BundleError, ControlError
+from motet.figures.feet.treadmill import travelling
+from motet.figures.humanoid import BONES
+from motet.generate.base import GenerateModel
+from motet.models.control import LARGEST_CROWD, ControlModel, captions
+from motet.motion.motion import Motion
+from motet.motion.rotations import rotmat_to_quat
+from motet.representation.root_block import way
+from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
+from motet.settings import checked_int
+from motet.steering.acts import Act, ActSettings
+from motet.steering.foot_lock import FootLockSettings
+from motet.steering.gaits import Gaits
+from motet.steering.matching import FEATURES, Matcher, Playback, Rows, Table
+from motet.steering.pose import Pose
+from motet.steering.scripts import parse_orders
+from motet.steering.sentence_acts import SaidActs
+from motet.steering.session import SteerSession
+from motet.steering.settings import SteeringSettings
+from motet.steering.step import LOOPS, PoseCodes
+
+SPREAD_FROM = 32
+"""From so many characters on the searches of a session are spread over the ticks."""
+
+FEATURE_STEPS = 16  # in which tables hold a scaled unit of a feature, in 8 bits
+
+
+class SteerModel(ControlModel):
+    """A model of a steerable figure; sessions and threads can share it.
+
+    tables: of N rows "codes" (N, K), "moves" (N, 6), "features" (N, F), "shows" (N, G) and "left" (N,), the
+        parts of a :class:`motet.steering.matching.Table`; "feature_mean" and "feature_scale" (F,); "pose_mean" (P,) and
+        "pose_basis" (K, P), see :class:`motet.steering.step.PoseCodes`.
+    """
+
+    LOOPS = LOOPS
+    ROLES = ()
+    SETTINGS = (SteeringSettings, FootLockSettings, ActSettings)
+
+    def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        super().__init__(manifest, graphs, tables)
+        config, how = Fields(manifest.config, "config"), self.settings(SteeringSettings)
+        self.abilities = Gaits.read(config, how)
+        self.gaits = self.abilities.names
+        low, usual, high = (column.tolist() for column in self.abilities.speeds.T[:3])
+        self.speeds = dict(zip(self.gaits, zip(low, high, strict=True), strict=True))
+        self.usual = dict(zip(self.gaits, usual, strict=True))
+        if self.contract.channels != (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS)):
+            raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
+        self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
+        self.matcher = Matcher(self._table(config), how, self.fps)
+        self.pose_codes = PoseCodes(
+            self.table("pose_mean", "P", "float32").astype(np.float64),
+            self.table("pose_basis", "K P", "float16").astype(np.float64),
+        )
+        for gait, goals in zip(self.gaits, self.matcher.goals, strict=True):
+            if not len(goals.rows):
+                need = self.matcher.least_left
+                raise BundleError(f"table left: no row of {gait!r} is followed by {need} more of its recording")
+
+    def _table(self, config: Fields) -> Table:
+        codes, moves = self.table("codes", "N K", "float16"), self._bounded("moves", "N 6", "float32")
+        return Table.of(
+            np.concatenate([codes, moves], axis=1, dtype=np.float32),
+            (self.table("features", "N F", "int8") / FEATURE_STEPS).astype(np.float32),
+            config.whole("odd", 0, self.sizes["K"]),
+            shows=self._bounded("shows", "N G", "uint8", 0, 1) > 0,
+            left=self._bounded("left", "N", "int32", 0, np.arange(len(codes))[::-1]).astype(np.int64),
+            mean=self._bounded("feature_mean", "F", "float32").astype(np.float64),
+            scale=self._bounded("feature_scale", "F", "float32", 1e-6).astype(np.float64),
+        )
+
+    def _bounded(
+        self, name: str, shape: str, dtype: str, low: float = -LARGEST, high: ArrayLike = LARGEST
+    ) -> NDArray[Any]:
+        """A table whose numbers are within limits, one for all or one for each; BundleError where one is not."""
+        found = self.table(name, shape, dtype)
+        if not ((found >= low) & (found <= np.asarray(high))).all():
+            raise BundleError(f"table {name}: holds a number that is out of range")
+        return found
+
+    def start(
+        self,
+        start: Motion | str | None = None,
+        *,
+        characters: int = 1,
+        places: ArrayLike | None = None,
+        hold_feet: bool = True,
+        strict: bool = False,
+        phases: ArrayLike | None = None,
+        words: GenerateModel | SaidActs | None = None,
+    ) -> SteerSession:
+        """A session of ``characters`` figures that stand still, or continue from a motion's last pose.
+
+        start: a gait, by default the first; or a motion of any human figure. places: (characters, 3) x and z in metres
+            and facing in degrees; by default all are at the origin and face z.
+        hold_feet: keep planted feet in place, by turning hips and knees. strict: refuse a speed outside a gait's range,
+            instead of clamping it, and acts in words of which a word is left out.
+        phases: a whole number for all or for each, from 0, less than the ``search_every`` of the bundle's settings: the
+            ticks until its first search of the table. From then on it searches in its turn alone, every
+            ``search_every`` ticks, and what it is told waits for that. By default the phases of 32 characters or more
+            are 0, 1, 2 and so on in turn, so that each tick costs the same; fewer search after every command. A
+            character moves as it would alone with its phase.
+        words: a generate model, which makes what the session's ``act`` is told in sentences; or the
+            :class:`motet.steering.sentence_acts.SaidActs` of one, which sessions share.
+        ControlError for values out of range, MotionError for a motion that does not fit.
+        """
+        characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)
+        gait = self.gaits[0] if start is None or isinstance(start, Motion) else start
+        number = self.abilities.number(gait)
+        spread = self.phases(characters, phases)
+        playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
+        if not (words is None or hasattr(words, "act") or isinstance(words, GenerateModel)):
+            raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
+        said = SaidActs(self, words) if isinstance(words, GenerateModel) else words
+        session = SteerSession(self, playback, number, hold_feet, strict, said)
+        if isinstance(start, Motion):
+            session.take(self.pose_of(start))
+        if places is not None:
+            session.put(places)
+        return session
+
+    def phases(self, characters: int, given: ArrayLike | None = None) -> Rows | None:
+        """The phase of each character; None for those that search after every command."""
+        every = self.matcher.settings.search_every
+        if given is None:
+            return np.arange(characters) % every if characters >= SPREAD_FROM else None
+        found = np.asarray(given)
+        fits = found.shape in ((), (characters,)) and found.dtype.kind in "iu"
+        if not (fits and (found >= 0).all() and (found < every).all()):
+            raise ControlError(
+                f"phases must be whole numbers from 0 to {every - 1}, for all or for each of {characters}"
+            )
+        return np.broadcast_to(found.astype(np.int64), characters)
+
+    def pose_of(self, motion: Motion) -> Pose:
+        """The last pose of a motion, at the origin; MotionError for one that is not of a human figure."""
+        features = self.contract.features(self.contract.frames(self.at_own_rate(motion))[-1:])
+        quats, height = self._bodies(features)
+        return Pose(np.zeros((1, 3)), quats, height, np.ones((1, 2), np.float32))
+
+    def act_of(self, motion: Motion, name: str = "act") -> Act:
+        """A motion of any human figure as an act: what a session's ``act`` takes, for many characters and often.
+
+        A clip in place gets the path that its feet imply, and a TravelWarning tells. What rests at both ends is left
+        out. MotionError for one that is not of a human figure, ControlError for one of less than three ticks.
+        """
+        features = self.contract.features(self.contract.frames(self.at_own_rate(travelling(motion))))
+        return self._act(name, *self._bodies(features), features.select(ROOT_SIXD[:3]).values)
+
+    @cached_property
+    def takes(self) -> dict[str, tuple[Act, ...]]:
+        """The recordings of gaits that go nowhere, such as "jump", as acts, by the gait's name."""
+        table, found = self.matcher.table, dict[str, tuple[Act, ...]]()
+        for gait, name in enumerate(self.gaits):
+            if not self.usual[name]:
+                rows = np.flatnonzero(table.shows[:, gait])
+                each = np.split(rows, np.flatnonzero(table.left[rows] == 0)[:-1] + 1)
+                found[name] = tuple(self._take(name, table.frames[0, part]) for part in each)
+        return found
+
+    def _take(self, name: str, frames: Floats) -> Act:
+        """Frames (T, K + 6) of the table as an act."""
+        quats, height = self.pose_codes.decode(frames[:, :-6].astype(np.float64))
+        return self._act(name, quats, height, frames[:, -6:-3])
+
+    def _act(self, name: str, quats: Floats, height: Floats, velocities: NDArray[Any]) -> Act:
+        """An act of quaternions (T, J, 4), heights (T,) of the hips and velocities (T, 3): forward, left and turn."""
+        facing, x, z = way(velocities / self.fps)
+        numbers = np.column_stack([quats.reshape(len(quats), -1), x, z, facing, height]).astype(np.float32)
+        return Act.of(name, numbers, self.fps, self.settings(ActSettings))
+
+    def _bodies(self, features: Motion) -> tuple[Floats, Floats]:
+        """Quaternions (T, J, 4) and the hips' height (T,) of features."""
+        local = joint_rotations(features)
+        quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1).astype(np.float32)
+        return quats, features.select(("root.height",)).values[:, 0].astype(np.float32)
+
+    def run(
+        self,
+        script: str,
+        start: Motion | str | None = None,
+        *,
+        hold_feet: bool = True,
+        words: GenerateModel | SaidActs | None = None,
+    ) -> Motion:
+        """The motion of one figure that is steered by a script (:mod:`motet.steering.scripts`).
+
+        start, hold_feet, words: like :meth:`start`; by default the script's first gait.
+        """
+        orders = parse_orders(script, self.gaits)
+        first = orders[0].gait if start is None else start
+        return self.start(first, hold_feet=hold_feet, words=words).run(script)[0]
+
+    def captions(self, script: str) -> list[tuple[float, str]]:
+        """See :meth:`ControlModel.captions`."""
+        return captions(parse_orders(script, self.gaits))
+
+    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+        """A track (T, 3) of velocities along x and z, m/s, and facings, radians, to frames (T, D)."""
+        session = self.start(hold_feet=False)
+        poses = [session.tick_to(target[None]) for target in given["track"].astype(np.float64)]
+        return {"frames": session.frames_of(poses)[0]}

@@ -1,0 +1,108 @@
+"""Live figures: the pose of characters at one moment, for engines, and the springs that move them.
+
+A critically damped spring is the fastest return to rest without overshoot. The distance from rest after t seconds is
+(d + (v + d y) t) exp(-y t): d and v are its start and its rate there, y the damping.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motet.figures.humanoid import BONES, HUMANOID
+from motet.motion.rotations import Array, quat_product, quat_rotated, wrapped
+from motet.steering.events import Event
+
+Floats = NDArray[np.float32]
+Values = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pose:
+    """The pose of B characters on the humanoid; metres, y up. World positions are float64, all else float32.
+
+    ground: (B, 3) x, z, and the facing in radians: 0 along z, positive to the left. rotations: (B, J, 4) quaternions
+    (x, y, z, w) of the bones (:data:`motet.motion.BONES`) in their parents' frames; of the hips in the frame of the
+    facing. height: (B,) of the hips above the ground. contacts: (B, 2) from 0 to 1, ground contact of the left and the
+    right foot. events: what has happened since the pose before, such as footsteps.
+    """
+
+    ground: Array
+    rotations: Floats
+    height: Floats
+    contacts: Floats
+    events: tuple[Event, ...] = ()
+
+    def read_only(self) -> "Pose":
+        """The same, whose arrays cannot be written into: what a session gives is the state that it goes on from."""
+        ground, rotations = self.ground.view(), self.rotations.view()
+        height, contacts = self.height.view(), self.contacts.view()
+        for array in (ground, rotations, height, contacts):
+            array.flags.writeable = False
+        return Pose(ground, rotations, height, contacts, self.events)
+
+    def __len__(self) -> int:
+        """B."""
+        return len(self.ground)
+
+    def __repr__(self) -> str:
+        return f"Pose({len(self)} characters)"
+
+    @property
+    def place(self) -> Array:
+        """Positions of the characters (B, 3): on the ground under the hips."""
+        return np.insert(self.ground[:, :2], 1, 0.0, axis=1)
+
+    @property
+    def heading(self) -> Floats:
+        """Quaternions (B, 4), (x, y, z, w), of the facing: with :attr:`place` the transform of an engine's root."""
+        half = (self.ground[:, 2] / 2).astype(np.float32)
+        zero = np.zeros_like(half)
+        return np.stack([zero, np.sin(half), zero, np.cos(half)], axis=1)
+
+    def moved_since(self, before: "Pose") -> Array:
+        """Root motion (B, 3) since an earlier pose: forward and to the left in metres, seen from the facing then, and
+        the turn to the left in radians."""
+        step = self.ground - before.ground
+        sin, cos = np.sin(before.ground[:, 2]), np.cos(before.ground[:, 2])
+        forward, left = sin * step[:, 0] + cos * step[:, 1], cos * step[:, 0] - sin * step[:, 1]
+        return np.stack([forward, left, wrapped(step[:, 2])], axis=1)
+
+    def positions(self) -> Array:
+        """Positions (B, J', 3) of all joints of the humanoid in the world, in the order of ``HUMANOID.names``."""
+        return self.global_transforms()[1]
+
+    def global_transforms(self) -> tuple[Floats, Array]:
+        """Rotations (B, J', 4) and positions (B, J', 3) of all joints of the humanoid in the world."""
+        count = len(HUMANOID.names)
+        turned = np.zeros((count, len(self), 4), dtype=np.float32)
+        turned[..., 3] = 1
+        turned[[HUMANOID.index(bone) for bone in BONES]] = np.swapaxes(self.rotations, 0, 1)
+        places = np.empty((count, len(self), 3))
+        turned[0] = quat_product(self.heading, turned[0])
+        places[0] = self.place
+        places[0, :, 1] = self.height
+        offsets = HUMANOID.offsets.astype(np.float32)[:, None]
+        for level in HUMANOID.levels:
+            parents = HUMANOID.parents[level]
+            places[level] = places[parents] + quat_rotated(turned[parents], offsets[level])
+            turned[level] = quat_product(turned[parents], turned[level])
+        return np.swapaxes(turned, 0, 1), np.swapaxes(places, 0, 1)
+
+    def towards(self, other: "Pose", part: float) -> "Pose":
+        """The pose ``part`` (0 to 1) of the way to another nearby pose, for frame rates other than the model's; nothing
+        happens on the way."""
+        share = np.float32(part)
+        step = other.ground - self.ground
+        step[:, 2] = wrapped(step[:, 2])
+        signs = np.where((self.rotations * other.rotations).sum(axis=-1, keepdims=True) < 0, np.float32(-1), 1)
+        mixed = self.rotations + share * (signs * other.rotations - self.rotations)
+        return replace(
+            self,
+            ground=self.ground + part * step,
+            rotations=mixed / np.linalg.norm(mixed, axis=-1, keepdims=True),
+            height=self.height + share * (other.height - self.height),
+            contacts=self.contacts + share * (other.contacts - self.contacts),
+            events=(),
+        )

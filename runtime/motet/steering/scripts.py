@@ -1,0 +1,149 @@
+"""Scripts: what a figure does, and for how long; the parts follow each other, separated by commas.
+
+Orders in words: ``walk 3s speed 1.4, turn left 90, run 4s, walk backwards 2s, stop``. An order is a
+gait, ``turn`` or ``stop``, followed in any order by a duration (``3s``; else 2 s, or 1.5 s of a turn or stop), a speed
+(``speed 1.4`` in m/s; else the gait's usual one), a way (``backwards``, ``left``, ``right``, relative to the facing,
+which does not change), and an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone
+keeps gait, speed and way. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s;
+``act jump`` is a gait that goes nowhere, done once.
+``go to 2 -3.5`` goes to x and z in metres and stands there, facing as it comes or ``facing 90``; with a speed, or the
+gait's usual one, until the next order, after its duration or 5 s.
+"""
+
+import re
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from motet.errors import ScriptError
+from motet.models.control import LONGEST_SCRIPT
+
+OTHERS = ("turn", "stop", "act", "go")  # orders besides gaits
+WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}  # degrees from the facing to the left
+NUMBER = r"\d+\.?\d*|\.\d+"
+SIGNED = f"-?({NUMBER})"
+
+
+@dataclass(frozen=True)
+class Order:
+    """gait: None for the previous one. speed: m/s, None for the gait's usual one, -1 for the previous one.
+
+    way: of travel, in degrees from the facing, None for the previous one. turn: degrees to the left. caption: in words.
+    act: a sentence of what is done, beside what was ordered before. goal: x and z in metres to go to; facing: there, in
+    degrees, None for any.
+    """
+
+    gait: str | None
+    speed: float | None
+    way: float | None
+    turn: float
+    seconds: float
+    caption: str
+    act: str | None = None
+    goal: tuple[float, float] | None = None
+    facing: float | None = None
+
+
+def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
+    """Parse a script of orders over known gaits; ScriptError marks the place of an error."""
+    orders, words = list[Order](), list[tuple[str, int]]()
+    found = [(match[0], match.start()) for match in re.finditer(r"[^\s,]+|,", script)]
+    for word, place in [*found, (",", len(script))]:
+        if word != ",":
+            words.append((word, place))
+            continue
+        if not words:
+            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, {', '.join(OTHERS)}")
+        orders.append(_Words(script, words).order(gaits))
+        words = []
+    if sum(order.seconds for order in orders) > LONGEST_SCRIPT:
+        raise ScriptError(script, 0, f"a script lasts at most {LONGEST_SCRIPT:g} s")
+    return orders
+
+
+class _Words:
+    """The words of one order with their places, taken one after the other."""
+
+    def __init__(self, script: str, words: Sequence[tuple[str, int]]) -> None:
+        self.script, self.left, self.place = script, deque(words), 0
+        self.caption = " ".join(word for word, _ in words)
+
+    def order(self, gaits: Sequence[str]) -> Order:
+        kind = self.take("an order")
+        if kind == "act":
+            return self.act()
+        if kind == "go":
+            return self.go()
+        if kind not in (*gaits, *OTHERS):
+            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHERS))}")
+        found = self.turn() if kind == "turn" else {}
+        while self.left:
+            detail = self.detail()
+            for name in detail.keys() & found.keys():
+                raise self.fail(f"this order gives its {name} twice")
+            found |= detail
+        turn, seconds = found.get("turn", 0.0), found.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)
+        if kind == "stop":
+            return Order(None, 0.0, None, turn, seconds, self.caption)
+        if kind == "turn":
+            return Order(None, found.get("speed", -1.0), found.get("way"), turn, seconds, self.caption)
+        return Order(kind, found.get("speed"), found.get("way", 0.0), turn, seconds, self.caption)
+
+    def act(self) -> Order:
+        words = [self.take("what to do, such as 'wave'"), *(word for word, _ in self.left)]
+        last = re.fullmatch(f"({NUMBER})s", words[-1])
+        said = " ".join(words[:-1] if last else words).strip("'\"")
+        if not said:
+            raise self.fail("expected what to do, such as act 'wave'")
+        return Order(None, -1.0, None, 0.0, float(last[1]) if last else 3.0, said, said)
+
+    def go(self) -> Order:
+        if self.take("to") != "to":
+            raise self.fail("expected to, such as go to 2 3.5")
+        goal = self.number("x in metres", SIGNED), self.number("z in metres", SIGNED)
+        found = dict[str, float]()
+        while self.left:
+            if self.left[0][0] == "facing":
+                self.take("facing")
+                more = {"facing": self.number("degrees", SIGNED)}
+            else:
+                more = self.detail()
+            if more.keys() & (found.keys() | {"turn", "way"}):
+                raise self.fail("go to takes seconds, speed and facing, each once")
+            found |= more
+        seconds = found.get("seconds", 5.0)
+        return Order(None, found.get("speed"), None, 0.0, seconds, self.caption, None, goal, found.get("facing"))
+
+    def detail(self) -> dict[str, float]:
+        word = self.take("more")
+        if re.fullmatch(f"({NUMBER})s", word):
+            return {"seconds": float(word[:-1])}
+        if word in WAYS:
+            return {"way": WAYS[word]}
+        if word == "speed":
+            return {"speed": self.number("metres a second")}
+        if word == "turn":
+            return self.turn()
+        raise self.fail('expected seconds such as "3s", "speed 1.4", "turn left 90", or a way such as "backwards"')
+
+    def turn(self) -> dict[str, float]:
+        side = self.take("left or right")
+        if side not in ("left", "right"):
+            raise self.fail("expected left or right")
+        degrees = self.number("degrees")
+        return {"turn": degrees if side == "left" else -degrees}
+
+    def number(self, wanted: str, pattern: str = NUMBER) -> float:
+        word = self.take(wanted)
+        if not re.fullmatch(pattern, word):
+            raise self.fail(f"expected {wanted}, such as 1.4 or 90")
+        return float(word)
+
+    def take(self, wanted: str) -> str:
+        if not self.left:
+            raise self.fail(f"expected {wanted} after this")
+        word, self.place = self.left.popleft()
+        return word
+
+    def fail(self, reason: str) -> ScriptError:
+        return ScriptError(self.script, self.place, reason)

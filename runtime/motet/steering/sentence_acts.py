@@ -1,0 +1,75 @@
+"""Acts by sentence: what a figure that is steered is told to do in words, made by a generate model."""
+
+from typing import TYPE_CHECKING
+
+from motet.errors import TextError, TextWarning, collected, each_once, warn
+from motet.generate.base import GenerateModel
+from motet.steering.acts import Act
+from motet.text.clauses import Shown
+
+if TYPE_CHECKING:
+    from motet.steering.model import SteerModel
+
+SECONDS = 3.0
+"""That are generated: of a motion that lasts longer the act that its sentence means."""
+
+
+KEPT = 256
+"""Acts, after which the one that was made first is forgotten."""
+
+
+class SaidActs:
+    """Acts for a model, each made once: sessions and threads can share it."""
+
+    def __init__(self, model: "SteerModel", words: GenerateModel) -> None:
+        self.model, self.words = model, words
+        self._made: dict[str, tuple[Act, Shown, list[str]]] = {}
+
+    def act(self, sentence: str) -> Act:
+        """The act of a sentence, such as "wave" or "sit down"; TextError for one that the model does not know. A
+        TextWarning says what it leaves out, each time."""
+        return self.shown(sentence)[0]
+
+    def shown(self, sentence: str, strict: bool = False) -> tuple[Act, Shown]:
+        """The act of a sentence, and what that is shown as; errors and warnings like :meth:`act`.
+
+        strict: TextError for a sentence of which the action leaves out a word.
+        """
+        if strict:
+            self.words.check(self._known(sentence))
+        known = self._made.get(sentence)
+        if known is None:
+            with collected(TextWarning) as notes:
+                (made,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
+            if len(self._made) >= KEPT:
+                self._made.pop(next(iter(self._made)), None)
+            act = self.model.act_of(made.motion, sentence)
+            known = act, Shown(made.action, made.lacking, made.confidence), each_once(notes)
+            self._made[sentence] = known
+        act, shown, said = known
+        for text in said:
+            warn(text, TextWarning)
+        return act, shown
+
+    def _known(self, sentence: str) -> str:
+        """A sentence that the model knows: itself, or what a person does who is told it."""
+        self.words.vocabulary.encode(sentence)  # an order without words is none, though "a person" is known
+        try:
+            self.words.check(sentence, lacking=False)
+        except TextError:
+            told = _of_a_person(sentence)
+            try:
+                self.words.check(told, lacking=False)
+            except TextError:
+                told = ""
+            if not told:
+                raise
+            return told
+        return sentence
+
+
+def _of_a_person(order: str) -> str:
+    """An order in the third person: "wave" as "a person waves"."""
+    verb, _, rest = order.strip().partition(" ")
+    ending = "es" if verb.endswith(("s", "sh", "ch", "x", "o")) else "s"
+    return f"a person {verb}{ending} {rest}".strip()

@@ -1,0 +1,423 @@
+"""A session of steered figures: commands in, within what gaits allow, and a pose per tick out."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from motet.errors import ControlError, ControlWarning, needs, warn
+from motet.figures.humanoid import BONES
+from motet.models.control import LARGEST_CROWD
+from motet.motion.motion import Motion, is_many
+from motet.motion.rotations import Array, quat_to_rotmat, wrapped
+from motet.settings import is_number
+from motet.steering import crowd
+from motet.steering.action_layer import Acting
+from motet.steering.acts import Act, ActSettings
+from motet.steering.events import Event, Happenings
+from motet.steering.foot_lock import FootLock, FootLockSettings
+from motet.steering.gaits import Command
+from motet.steering.idle import Standing
+from motet.steering.matched import Matched, matched
+from motet.steering.matching import Playback, Rows
+from motet.steering.path_following import led, speed_of
+from motet.steering.pose import Pose
+from motet.steering.scripts import Order, parse_orders
+from motet.steering.step import tick
+from motet.steering.targets import Guidance, Guided, Who
+from motet.text.clauses import Shown
+
+if TYPE_CHECKING:
+    from motet.steering.model import SteerModel
+    from motet.steering.sentence_acts import SaidActs
+
+Doing = Motion | Act | str | None
+"""What can be acted."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SteerSnapshot:
+    """The whole state of a session."""
+
+    playback: Playback
+    acting: Acting
+    standing: Standing
+    command: Command
+    lock: FootLock | None
+    poses: tuple[Pose, Pose] | None
+    ahead: float
+    guidance: Guidance
+    happenings: Happenings
+    late: tuple[Event, ...]
+
+    def __repr__(self) -> str:
+        return f"SteerSnapshot({len(self.command.gait)} characters)"
+
+
+class SteerSession(Guided):
+    """Characters that move in one batch, each steered separately; holds their whole state. A tick is 1 / ``model.fps``
+    seconds. Angles are degrees about the vertical: 0 along z, positive to the left."""
+
+    def __init__(
+        self,
+        model: "SteerModel",
+        playback: Playback,
+        gait: int,
+        hold_feet: bool,
+        strict: bool,
+        words: "SaidActs | None",
+    ) -> None:
+        super().__init__(len(playback.row))
+        self.model, self.strict = model, strict
+        self._playback, zero = playback, np.zeros(self.characters)
+        self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
+        self._target = np.zeros((self.characters, 3))
+        self._acting, self._words = self._no_acts(), words
+        self._lock = self._new_lock() if hold_feet else None
+        self._standing = Standing.none(self.characters)
+        self._poses: tuple[Pose, Pose] | None = None
+        self._happenings = Happenings.none(self.characters)
+        self._late: tuple[Event, ...] = ()  # of a tick that was to be shown next, when characters were put elsewhere
+        self._ahead = 0.0
+        self._said: set[str] = set()
+
+    def _no_acts(self) -> Acting:
+        model = self.model
+        return Acting.of(self._playback, model.matcher, model.pose_codes, model.settings(ActSettings))
+
+    def _new_lock(self) -> FootLock:
+        return FootLock(self.characters, 1 / self.model.fps, self.model.settings(FootLockSettings))
+
+    def __repr__(self) -> str:
+        return f"SteerSession({self.characters} characters, {self.model!r})"
+
+    def control(
+        self,
+        *,
+        gait: str | Sequence[str] | None = None,
+        speed: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        facing: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+    ) -> None:
+        """Set where the characters go from now on, a number for all or one for each; values not given stay.
+
+        gait: one of ``model.gaits``. speed: m/s. direction: of travel, in degrees. facing: in degrees; if only the
+        direction is given, they face it. velocity: (2,) or (characters, 2) along x and z in m/s, for example from a
+        gamepad's stick, instead of speed and direction; (0, 0) stops, facing as before.
+        A speed outside the gait's range is clamped with one warning (ControlWarning), or refused if the session is
+        strict; a gait that only goes forward faces the way it goes. ControlError for values that are not numbers or do
+        not fit; the control is unchanged then.
+        """
+        given = {"speed": speed, "direction": direction, "facing": facing}
+        numbers = {name: self._numbers(f"{name} needs a number", one) for name, one in given.items() if one is not None}
+        numbers |= {name: np.radians(numbers[name]) for name in ("direction", "facing") if name in numbers}
+        told, gaits = self._command, None if gait is None else self._gaits(gait)
+        if velocity is None:
+            self._tell(told.told(gaits, **numbers))
+            return
+        if speed is not None or direction is not None:
+            raise ControlError("give a velocity, or speed and direction, not both")
+        x, z = self._numbers("a velocity needs x and z", velocity, 2).T
+        numbers["speed"] = np.hypot(x, z)
+        goes = numbers["speed"] > 0
+        command = told.told(gaits, direction=np.where(goes, np.arctan2(x, z), told.direction), **numbers)
+        self._tell(command if facing is not None else replace(command, faces_way=told.faces_way | goes))
+
+    @property
+    def target(self) -> Array:
+        """Velocity along x and z, m/s, and facing, radians (characters, 3), within the limits of gaits."""
+        return self._target.copy()
+
+    def _tell(self, command: Command) -> None:
+        target, beyond = self.model.abilities.target(command)
+        for gait, said in beyond:
+            if self.strict:
+                raise ControlError(said)
+            if gait not in self._said:
+                self._said.add(gait)
+                warn(said, ControlWarning)
+        changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != self._command.gait)
+        self._playback.hasten(changed)
+        self._target, self._command = target, command
+        self._guidance = self._guidance.ended()
+
+    def _gaits(self, names: str | Sequence[str]) -> Rows:
+        each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
+        if len(each) != self.characters:
+            raise ControlError(f"{len(each)} gaits do not fit {self.characters} characters")
+        return np.array([self.model.abilities.number(name) for name in each])
+
+    def tick(self) -> Pose:
+        """The next pose of all characters, 1 / ``model.fps`` seconds later."""
+        self._lead()
+        return self.tick_to(self._way)
+
+    @property
+    def _way(self) -> Array:
+        """The target as gaits go for it."""
+        return self.model.abilities.curved(self._target, self._command.gait, self._playback.root[:, 2])
+
+    def _lead(self) -> None:
+        """Let those that are on a way go on, and those that move keep apart."""
+        if not (self._guidance.going.goes.any() or self._guidance.room):
+            return
+        play, seconds = self._playback, 1 / self.model.fps
+        led_on = led(self._guidance, self.model.abilities, play, self._command, self._target, seconds)
+        self._guidance, self._command, self._target = led_on
+
+    def _start_of(self, gait: str | None, speed: Array | None, who: Rows) -> tuple[Array, Rows, Array]:
+        gaits = self._command.gait[who] if gait is None else np.full(len(who), self.model.abilities.number(gait))
+        return self._playback.root[who, :2], gaits, speed_of(self.model.abilities, gaits, speed)
+
+    def tick_to(self, target: Array) -> Pose:
+        """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
+        gait, root, seconds = self._command.gait, self._playback.root, 1 / self.model.fps
+        changed = self._acting.begin(self._playback, target, gait)
+        pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, gait)
+        if self._lock is not None:
+            whole = self._acting.whole
+            self._standing = self._standing.kept(self._playback, root, pose.contacts, target, whole, seconds)
+        pose = self._acting.laid(pose, self._playback, root, changed)
+        self._face_as_acted()
+        pose = pose if self._lock is None else self._lock.held(self._standing.breathed(pose, seconds))
+        self._guidance, pose = self._guidance.after(pose, seconds)
+        return replace(pose, events=self._happened(pose)).read_only()
+
+    def _happened(self, pose: Pose) -> tuple[Event, ...]:
+        gait, before = self._command.gait, self._happenings
+        shows = self.model.matcher.table.shows[self._playback.row, gait]
+        self._happenings = before.after(pose.contacts, gait, shows, self.arrived, self._acting.done)
+        return tuple(self._happenings.events(before, self.model.gaits))
+
+    @property
+    def matched(self) -> Matched:
+        """The rows that are played, what they cost, and the path that is asked for."""
+        return matched(self.model.matcher, self._playback, self._way, self._command.gait)
+
+    def _face_as_acted(self) -> None:
+        """Those who act with the whole body and are told to stand go on standing as they do then."""
+        told = self._command
+        if self._acting.acts and (who := self._acting.whole & (told.speed == 0)).any():
+            facing = np.where(who, self._playback.root[:, 2], told.facing)
+            direction = np.where(who, facing, told.direction)
+            self._command = replace(told, direction=direction, facing=facing)
+            self._target = np.where(who[:, None], np.insert(np.zeros((len(who), 2)), 2, facing, axis=1), self._target)
+
+    def act(self, what: Doing | Sequence[Doing], *, who: Who = None, upper: bool | None = None) -> list[Shown]:
+        """Do something, from the next tick on, in place of what is being done.
+
+        what: a motion of any human figure, without what it rests at both ends; an act, which
+            :meth:`motet.steering.model.SteerModel.act_of` makes of one once; the name of a gait that goes nowhere, such
+            as "jump", which is done once, forward by who moves; or a sentence such as "wave", of which the session's
+            ``words`` generate one, once; None ends what is done. One for all, or one for each of ``who``.
+        who: numbers of characters, by default all.
+        upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
+            the ground. By default by the whole body where a character stands, whose legs go once it is told to; or
+            where the act is one of the legs, such as a kick, after which a character that moves goes on.
+        Returns what each sentence is shown as, and warns (TextWarning) of words that are left out.
+        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not know,
+        or of which a word is left out if the session is strict, ControlError for a motion of less than three ticks, for
+        characters that are not there, and for a sentence without ``words``; nothing changes then.
+        """
+        characters = self._who(who).tolist()
+        each = list(what) if is_many(what) and not isinstance(what, Doing) else [what] * len(characters)
+        if len(each) != len(characters):
+            raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
+        shown: list[Shown] = []
+        made = {id(one): self._acts_of(one, shown) for one in each}
+        for i, one in zip(characters, each, strict=True):
+            acts, chosen = made[id(one)], max if self._target[i, :2].any() else min
+            self._acting.asked[i] = (chosen(acts, key=lambda act: act.reach) if acts else None, upper)
+        return shown
+
+    def prepare(self, *sentences: str) -> list[Shown]:
+        """Make acts of sentences, so that :meth:`act` has them at once; what they are shown as. It may be called in
+        another thread while the session ticks, such as by ``asyncio.to_thread(session.prepare, "wave")``. Errors and
+        warnings are those of :meth:`act`."""
+        shown: list[Shown] = []
+        for sentence in sentences:
+            self._acts_of(sentence, shown)
+        return shown
+
+    def _acts_of(self, what: Any, shown: list[Shown]) -> tuple[Act, ...]:
+        """The acts that are meant, of which a character does one; what a sentence is shown as is added to a list."""
+        needs(what, Doing, "a motion, an act or a sentence")
+        if what is None:
+            return ()
+        if isinstance(what, str) and what in self.model.takes:
+            return self.model.takes[what]
+        return (self._act_of(what, shown),)
+
+    def _act_of(self, what: Motion | Act | str, shown: list[Shown]) -> Act:
+        if isinstance(what, Act):
+            return what
+        if isinstance(what, Motion):
+            return self.model.act_of(what)
+        if self._words is None:
+            raise ControlError("an act in words needs a model that makes it: start(words=motet.load('generate'))")
+        act, said = self._words.shown(what, self.strict)
+        shown.append(said)
+        return act
+
+    @property
+    def acting(self) -> list[tuple[str, float] | None]:
+        """What each character does: its name and the seconds that are left; None of those that only go or stand."""
+        left = [one and (one.act.name, (len(one.act) - 1 - one.frame) / self.model.fps) for one in self._acting.playing]
+        begun = {i: act for i, (act, _) in self._acting.asked.items()}
+        asked = {i: act if act is None else (act.name, (len(act) - 1) / self.model.fps) for i, act in begun.items()}
+        return [asked.get(i, one) for i, one in enumerate(left)]
+
+    def advance(self, seconds: float) -> Pose:
+        """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. Its
+        events are those since the pose before. A command shows within a tick. ControlError unless 0 <= seconds <= 1."""
+        if not is_number(seconds) or not 0 <= seconds <= 1:
+            raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
+        events, self._late = self._late, ()
+        if self._poses is None:
+            first = self.tick()
+            self._poses, events = (first, self.tick()), events + first.events
+        self._ahead += seconds * self.model.fps
+        while self._ahead >= 1:
+            events += self._poses[1].events
+            self._poses = self._poses[1], self.tick()
+            self._ahead -= 1
+        return replace(self._poses[0].towards(self._poses[1], self._ahead), events=events)
+
+    def push(self, velocity: ArrayLike) -> None:
+        """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
+        self._playback.spring[:, :2] += self._numbers("a velocity needs x and z", velocity, 2)
+        self._playback.hasten(np.ones(self.characters, dtype=bool))
+
+    def put(self, places: ArrayLike) -> None:
+        """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
+        wanted = self._numbers("places need x, z and facing", places, 3)
+        told, facing = self._command, wrapped(np.radians(wanted[:, 2]))
+        self._playback.root = np.column_stack([wanted[:, :2], facing])
+        self._playback.spring[:, 2] = facing
+        direction = np.where(told.speed > 0, told.direction, facing)  # standing ones move the way they face
+        self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
+        self._target, _ = self.model.abilities.target(self._command)
+        self._acting, self._guidance = self._no_acts(), self._guidance.ended()
+        if self._poses is not None:
+            self._late += self._poses[1].events
+        self._poses = None  # nothing lies between there and here
+        if self._lock is not None:
+            self._lock = self._new_lock()
+
+    def add(self, places: ArrayLike, *, gait: str | None = None, phases: ArrayLike | None = None) -> list[int]:
+        """Add characters that stand at places: (3,) for one or (n, 3), x and z in metres, facing in degrees; their
+        numbers (n), which follow those that there are. Each moves as in a session of its own that starts now.
+
+        gait, phases: like ``start`` and ``phases`` of :meth:`motet.steering.model.SteerModel.start`. ControlError for
+        values out of range, and for more than 100,000 characters in all; nothing changes then.
+        """
+        wanted = _places(places)
+        count = len(wanted)
+        total = self.characters + count
+        if not 0 < count <= LARGEST_CROWD - self.characters:
+            raise ControlError(f"a session has 1 to {LARGEST_CROWD} characters; places of {count} make it {total}")
+        turns = self.model.phases(total) if phases is None else None
+        phases = phases if turns is None else turns[self.characters :]
+        held = self._lock is not None
+        more = self.model.start(gait, characters=count, places=wanted, hold_feet=held, phases=phases)
+        if self._poses is not None:
+            more.advance(0)
+        numbers = list(range(self.characters, total))
+        self.restore(crowd.picked([self.snapshot(), more.snapshot()], np.arange(total)))
+        return numbers
+
+    def remove(self, who: int | Sequence[int]) -> None:
+        """Remove characters. Those that stay keep their order: the numbers of those behind become smaller. ControlError
+        for characters that are not there, and for all of them: one stays."""
+        if who is None:
+            raise ControlError("who must be the numbers of the characters that go")
+        stay = np.delete(np.arange(self.characters), self._who(who))
+        if not len(stay):
+            raise ControlError("a session keeps one character at least")
+        self.restore(crowd.picked([self.snapshot()], stay))
+
+    def take(self, pose: Pose) -> None:
+        """Continue from a changed pose: its rotations and height, one for all characters or one for each. Their
+        positions and velocities stay. ControlError for a pose that does not fit."""
+        if len(pose) not in (1, self.characters) or pose.rotations.shape[1:] != (len(BONES), 4):
+            raise ControlError(f"a pose of {pose.rotations.shape} does not fit {self.characters} characters")
+        if not (np.isfinite(pose.rotations).all() and np.isfinite(pose.height).all()):
+            raise ControlError("a pose must be finite numbers")
+        codes = self.model.pose_codes.encode(pose.rotations, pose.height)
+        self.model.matcher.pose(self._playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
+        self._acting = self._no_acts()
+
+    def run(self, script: str) -> list[Motion]:
+        """Run a script (:mod:`motet.steering.scripts`) for all characters; one motion for each."""
+        poses = list(self.follow(parse_orders(script, self.model.gaits)))
+        return [self.model.contract.motion(frames, plant=self._lock is not None) for frames in self.frames_of(poses)]
+
+    def follow(self, orders: Sequence[Order]) -> Iterator[Pose]:
+        """The poses of all characters that follow orders, tick by tick."""
+        for order in orders:
+            self._obey(order)
+            for _ in range(max(1, round(order.seconds * self.model.fps))):
+                yield self.tick()
+
+    def _obey(self, order: Order) -> None:
+        if order.act is not None:
+            self.act(order.act)
+            return
+        if order.goal is not None:
+            self.go_to(order.goal, order.facing, speed=order.speed)
+            return
+        told = self._command
+        facing, speed = np.where(told.faces_way, told.direction, told.facing), told.speed
+        aside = wrapped(told.direction - facing) if order.way is None else np.radians(order.way)
+        if order.speed is None:
+            speed = self.model.abilities.speeds[told.gait if order.gait is None else self._gaits(order.gait), 1]
+        elif order.speed >= 0:
+            speed = np.full(self.characters, order.speed)
+        degrees = np.degrees(facing) + order.turn
+        self.control(gait=order.gait, speed=speed, direction=degrees + np.degrees(aside), facing=degrees)
+
+    def frames_of(self, poses: Sequence[Pose]) -> Array:
+        """Frames (characters, T, D) in the contract's units of consecutive poses."""
+        moved = [pose.moved_since(before) for before, pose in zip([*poses[:1], *poses[:-1]], poses, strict=True)]
+        block = np.stack(moved, axis=1) * self.model.fps
+        height = np.stack([pose.height for pose in poses], axis=1)[..., None]
+        quats = np.stack([pose.rotations for pose in poses], axis=1).astype(np.float64)
+        axes = np.swapaxes(quat_to_rotmat(quats)[..., :2], -1, -2).reshape(*height.shape[:2], -1)
+        found: Array = np.concatenate([block, height, axes], axis=-1)
+        return found
+
+    def snapshot(self) -> SteerSnapshot:
+        """The whole state, to be restored later."""
+        lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
+        told = self._playback.copy(), self._acting.copy(), self._standing, self._command, lock
+        return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings, self._late)
+
+    def restore(self, snapshot: SteerSnapshot) -> None:
+        """Go back to a snapshot of this session or of one like it, of the same model and the same ``hold_feet``, else
+        ControlError. The session has as many characters then as the snapshot."""
+        needs(snapshot, SteerSnapshot, "a snapshot of a session")
+        command = snapshot.command
+        if (snapshot.lock is None) != (self._lock is None):
+            has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")
+            raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
+        self.characters = len(command.gait)
+        self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
+        self._acting, self._standing = snapshot.acting.copy(), snapshot.standing
+        self._command, (self._target, _) = command, self.model.abilities.target(command)
+        self._guidance, self._happenings, self._late = snapshot.guidance, snapshot.happenings, snapshot.late
+        self._lock = None if snapshot.lock is None else replace(snapshot.lock)
+
+
+def _places(values: ArrayLike) -> Array:
+    """Places (n, 3) of characters, of one (3,) or more; not yet whether they are finite."""
+    needed = "places need x, z and facing, for each of the characters that are added"
+    try:
+        wanted = np.atleast_2d(np.array(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise ControlError(needed) from error
+    if wanted.shape[1:] != (3,):
+        raise ControlError(needed)
+    return wanted

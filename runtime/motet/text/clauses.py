@@ -1,0 +1,125 @@
+"""Composed sentences: "walk to the table, drink, then turn around" as parts that are shown one after another."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Set
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
+THEN = re.compile(
+    r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*", re.IGNORECASE
+)
+ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
+OPENING = re.compile(r"((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
+"""What may stand before the verb of a part: its subject, or an adverb."""
+
+# fmt: off
+FUNCTION_WORDS = frozenset((
+    "a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first",
+    "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on",
+    "or", "person", "she", "someone", "somebody", "that", "the", "their", "them", "then", "they", "this", "to", "up",
+    "while", "who", "with", "woman", "you", "your",
+))
+"""Words that say little about what is done."""
+# fmt: on
+
+
+AT_ONCE = re.compile(
+    r"\b(?:while|whilst|simultaneously|without|as (?:he|she|they|it)|(?:and )?at the same time(?: as)?)\b",
+    re.IGNORECASE,
+)
+POSTURES = {
+    "still": r"stand\w*|motionless|fre?ezes?|freezing",
+    "low": r"sit|sits|sitting|seated|lie|lies|lying|kneel\w*",
+    "going": r"(?:walk|run|jog|sprint|jump|hop|leap|skip|march|climb|crawl)\w*",
+}
+"""What a figure can only do one of at a time."""
+
+OWN = re.compile(
+    r"\b(\w+) (?:your|his|her|their|my|the|both) (?:left |right )?"
+    r"(?:arm|hand|fist|leg|foot|feet|knee|head|shoulder|elbow|hip|finger|toe|leg)s?\b"
+)
+"""A part of the body, and what is done with it."""
+
+
+class Shown(NamedTuple):
+    """What a sentence is shown as: ``action``, ``lacking`` and ``confidence`` as for
+    :class:`motet.generate.base.Generated`."""
+
+    action: str = ""
+    lacking: tuple[str, ...] = ()
+    confidence: float | None = None
+
+    def left_out(self, sentence: str) -> str:
+        """What is said of a sentence of which words are left out."""
+        words = ", ".join(f"'{word}'" for word in self.lacking)
+        return f"{sentence!r} is read as {self.action!r}, which leaves out {words}"
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action``, ``lacking``, ``confidence``,
+    ``asked`` and ``measured`` as for :class:`motet.generate.base.Generated`."""
+
+    text: str
+    start: float
+    stop: float
+    action: str = ""
+    lacking: tuple[str, ...] = ()
+    confidence: float | None = None
+    asked: Mapping[str, float] = field(default_factory=dict)
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+
+def stem(word: str) -> str:
+    """What the forms of a lower-case word share: "danc" of dance, dances and dancing."""
+    if len(word) <= 3:
+        return word
+    for ending, rest in ((r"ies$", "y"), (r"(ing|ed|es|s|e)$", ""), (r"y$", "i"), (r"([^aeiou])\1$", r"\1")):
+        word = re.sub(ending, rest, word)
+    return word
+
+
+def verbs_of(words: Iterable[str]) -> frozenset[str]:
+    """The stems of those of some words that have a form in -ing among them."""
+    return frozenset(stem(word) for word in words if len(word) > 5 and word.endswith("ing"))
+
+
+def at_odds(sentence: str) -> tuple[str, str] | None:
+    """Two things that a sentence asks for at once and that exclude each other: "stands still while running"."""
+    said = []
+    for clause in AT_ONCE.split(sentence.lower()):
+        found = [
+            (kind, match[0]) for kind, words in POSTURES.items() if (match := re.search(rf"\b(?:{words})\b", clause))
+        ]
+        said += found[:1]
+    pairs = ((one[1], other[1]) for one in said for other in said if one[0] < other[0])
+    return next(pairs, None)
+
+
+def sentences_of(text: str) -> list[str]:
+    """The sentences of a text, and what it has between semicolons and in lines."""
+    return [found for one in STOPS.split(text) if (found := one.strip(" ,"))]
+
+
+def parts_of(sentence: str, verbs: Set[str]) -> list[str]:
+    """The parts of a sentence, in the order in which they are done.
+
+    verbs: stems. "then", "after that", "afterwards", "next" and "finally" always begin a part; what follows a comma or
+    "and" does if it begins with a verb and one came before, so that "jumps up and down" stays whole.
+    """
+    sentence = re.sub(r"^first(ly)?\b,?\s*", "", sentence, flags=re.IGNORECASE)
+    pieces = [piece for piece in THEN.split(sentence) if piece.strip(" ,")]
+    return [part for piece in pieces for part in _before_verbs(piece.strip(" ,"), verbs)]
+
+
+def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:
+    """A text cut at each comma and "and" that a verb follows."""
+    start = 0
+    for match in ALSO.finditer(text):
+        done = re.findall(r"\w+", text[start : match.start()].lower())
+        opened = re.match(r"\w+", OPENING.sub("", text[match.end() :], count=1).lower())
+        if opened and stem(opened[0]) in verbs and any(stem(word) in verbs for word in done):
+            yield text[start : match.start()]
+            start = match.end()
+    yield text[start:]

@@ -1,0 +1,233 @@
+"""Numbers in sentences: "turns left 30 degrees", "two steps back", "jumps twice" as typed quantities, and what remains.
+
+Number words become digits, other ways to say a number and its unit become the usual one, then a number before a unit or
+before something that is counted is a quantity. Anything else stays a word of the sentence.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from motet.errors import TextError
+from motet.text.clauses import stem
+from motet.text.vocabulary import NUMBER_WORDS, RULES
+
+Kind = Literal["degrees", "metres", "steps", "times", "seconds", "pace"]
+"""degrees: of a turn of the whole figure, to the left; negative to the right. pace: beside how fast it is done
+otherwise."""
+
+MOST: Mapping[Kind, float] = {"degrees": 3600, "metres": 200, "steps": 200, "times": 50, "seconds": 600}
+"""The largest number of each kind that is taken."""
+
+TURN = r"(?:turn|circle|rotation|revolution|spin|twirl|pirouette|lap)s?"
+SIZE = r"(?:(?:small|little|tiny|short|big|large|long|giant|quick|slow|more|baby) )?"
+UNITS: tuple[tuple[Kind, float, str], ...] = (
+    ("degrees", 1, r"deg(?:ree)?s?"),
+    ("degrees", 360, rf"(?:(?:full|whole|complete) )?{TURN}"),
+    ("metres", 1, r"m|met(?:er|re)s?"),
+    ("metres", 0.01, r"cm|centimet(?:er|re)s?"),
+    ("metres", 1000, r"km|kilomet(?:er|re)s?"),
+    ("metres", 0.3048, r"foot|feet|ft"),
+    ("metres", 0.9144, r"yards?|yds?"),
+    ("steps", 1, rf"{SIZE}(?:foot)?(?:step|pace|stride)s?"),
+    ("seconds", 1, r"s|secs?|seconds?"),
+    ("seconds", 60, r"mins?|minutes?"),
+    ("times", 1, r"times?|x"),
+)
+"""What a number may count: its kind, how much of that it is, and how it is written."""
+
+SPELLED = "|".join([*NUMBER_WORDS, "hundred"])
+MEASURES = "|".join(unit for kind, _, unit in UNITS if kind in ("metres", "steps", "seconds"))
+SAID: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
+    (rf"\b(?:a )?(?:{SPELLED})(?:(?:[ -]| and )(?:{SPELLED}))*\b", lambda found: RULES.normalise(found[0])),
+    (r"\u2212(?=\d)", "-"),
+    (r"[\u00b0\u00ba]", " degrees "),
+    (r"(\d?)\u00bd", lambda found: f"{found[1] or 0}.5"),
+    (r"(?<=\d),(?=\d{3}\b)", ""),
+    (r"\b(?:10 ?\^ ?|1e)(\d{1,2})\b", lambda found: "1" + "0" * int(found[1])),
+    (r"\b(\d+) thousand\b", r"\g<1>000"),
+    (r"\b(\d+) million\b", r"\g<1>000000"),
+    (r"\b(?:at )?a right angle\b", "90 degrees"),
+    (r"\ba couple(?: of)?\b", "2"),
+    (r"\ba few\b", "3"),
+    (r"\bhalf a dozen\b", "6"),
+    (r"\b(?:a )?dozen\b", "12"),
+    (r"\btwice\b(?! as\b)", "2 times"),
+    (r"\bthrice\b", "3 times"),
+    (r"(?<!at )\bonce\b(?! more| again)", "1 time"),
+    (r"\b(?:a )?single\b", "1"),
+    (r"\b(\d+)[ -]and[ -]a[ -]half\b", r"\1.5"),
+    (rf"\b(?:an?|1) ({MEASURES}) and a half\b", r"1.5 \1"),
+    (r"\b3[ -]quarters?(?: of)?(?: an?)?\b", "0.75"),
+    (r"\b(?:an? |1 )?quarter(?: of)?(?: an?)?(?=[ -])", "0.25"),
+    (r"\b(?:an? )?half(?: an?)?(?=[ -])", "0.5"),
+    (rf"\b(?:an? )?(?:full|whole|complete) (?={TURN}\b)", "1 "),
+    (r"\bin circles?\b|\bin an? circle\b", "1 circle"),
+    (rf"\ban? (?=(?:{MEASURES})\b)", "1 "),
+    (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*|does an?|do an?) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
+)  # fmt: skip
+"""How numbers and their units are said otherwise, and what that becomes."""
+
+LEADING = r"(?:\b(?:for|by|about|roughly|exactly|only|just|in|within|over|of|another|an?|the)\s+)*"
+QUANTITY = re.compile(
+    rf"{LEADING}(?<![\w.-])(?P<number>-?\d+(?:\.\d+)?)[\s-]*"
+    rf"(?:{'|'.join(f'(?P<u{i}>{unit})' for i, (*_, unit) in enumerate(UNITS))})\b"
+    r"(?!\s*(?:/|per\b|high|tall|apart|off))"
+)
+"""A number and its unit, with what leads to it."""
+
+ACTS: Mapping[str, str] = {
+    **dict.fromkeys(("jump", "hop", "leap", "bounc"), "jumps"),
+    **dict.fromkeys(("jack",), "jacks"),
+    **dict.fromkeys(("kick",), "kicks"),
+    **dict.fromkeys(("punch", "jab", "hook", "uppercut", "cross"), "punches"),
+    **dict.fromkeys(("squat", "crouch", "kneel", "lung", "sit"), "dips"),
+    **dict.fromkeys(("bow",), "bows"),
+    **dict.fromkeys(("wav",), "waves"),
+    **dict.fromkeys(("nod",), "nods"),
+    **dict.fromkeys(("clap", "applaud"), "claps"),
+    **dict.fromkeys(("pushup", "pressup"), "pushups"),
+    **dict.fromkeys(("cartwheel", "flip", "backflip", "roll", "push", "press", "throw", "swing"), ""),
+}
+"""Stems of words for what is done several times, and how that is counted (:mod:`motet.generate.motion_measures`); ""
+for what is counted as often as it is begun."""
+
+
+COUNTED = re.compile(
+    rf"(?P<doing>\b(?:do|does|doing|performs?)\s+)?(?<![\w.-])(?P<number>-?\d+)\s+"
+    rf"(?P<what>(?:[a-z-]+\s+){{0,2}}?(?:(?:{'|'.join(ACTS)})\w*|(?(doing)[a-z]+s|(?!)))\b)"
+)
+"""A number of something that is done: "two squats", "does 3 cartwheels"."""
+
+LEFT = {"step": "steps", "pace": "steps", "stri": "steps", "turn": "turn", "spin": "turn", "rota": "turn"}
+"""What a quantity leaves of its unit, by how that begins."""
+
+ON_FEET = re.compile(r"(?:on|with|off|from|lifts?|raises?|puts?|both|the)\s*$|^1$")
+"""Before a number of feet, or the number: those that the figure has."""
+
+BODY = re.compile(r"\b(?:arm|hand|fist|leg|knee|head|shoulder|elbow|hip|waist|trunk|torso|finger|wrist|back|body)s?\b")
+MOVING = re.compile(
+    r"\b(?:turn|rotat|spin|pivot|twirl|circl|veer|curv|walk|r[ua]n|jog|go|stride|march|step|climb|crawl|hop|jump|skip|leap|sneak)\w*"
+)
+SIDES = re.compile(
+    r"\b(?:(left|anti-?clockwise|counter-?clockwise)|(right|clockwise))\b(?! (?:arm|hand|fist|leg|foot|knee|side of))"
+)
+PACES = re.compile(r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly))\b")
+SLOWER, FASTER = 0.75, 1.3
+
+
+ELSEWHERE = (
+    r"\b(?:spot|place|stand\w*|walk\w*|r[ua]n\w*|jog\w*|skip\w*|hop\w*|jump\w*|leap\w*|danc\w*|sit\w*|crawl\w*)\b"
+)
+"""Words that say how a turn is made."""
+
+UNSAID: Mapping[Kind, str] = {"steps": "walk forward", "metres": "walk forward", "degrees": "turn around"}
+"""What is done where a sentence says nothing but a number."""
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """What a sentence asks for in numbers. text: what it says without them. amounts: how much of what.
+
+    either: whether a turn may be to either side. act: what is done so many times, a value of :data:`ACTS`; "" for what
+    is counted as often as it is done.
+    """
+
+    text: str
+    amounts: Mapping[Kind, float] = field(default_factory=dict)
+    either: bool = False
+    act: str = ""
+
+
+def numerals(sentence: str) -> str:
+    """A sentence in lower case with numbers as digits: "half a turn" is "0.5 turn", "twice" is "2 times"."""
+    text = sentence.lower()
+    for pattern, said in SAID:
+        text = re.sub(pattern, said, text)
+    return text
+
+
+def quantities_of(sentence: str) -> Quantities:
+    """The quantities of a sentence, the first of each kind; TextError for one that makes no sense: "-3 jumps"."""
+    said = numerals(sentence)
+    amounts: dict[Kind, float] = {}
+    spans: list[tuple[int, int, str]] = []
+    for kind, value, start, stop, rest in sorted(_found(said), key=lambda one: one[2]):
+        if kind not in amounts and all(start >= end for _, end, _ in spans):
+            amounts[kind] = _sensible(kind, value, sentence)
+            spans.append((start, stop, rest))
+    for start, stop, rest in reversed(spans):
+        said = said[:start] + rest + said[stop:]
+    ways = {1 if left else -1 for left, _ in SIDES.findall(said)}
+    _turned(said, amounts, ways)
+    if pace := PACES.search(said):
+        amounts["pace"] = SLOWER if pace[1] else FASTER
+    words = re.findall("[a-z]+", re.sub(r"\b(push|press|sit|pull)[ -]?ups?\b", r"\1up", said))
+    acts = [ACTS[word] for word in map(stem, words) if word in ACTS]
+    act = "jacks" if "jacks" in acts else next(filter(None, acts), "")
+    text = _plain(said, amounts) if spans or "degrees" in amounts else sentence
+    return Quantities(text, amounts, len(ways) != 1, act)
+
+
+def known_turns(asked: Quantities) -> list[str]:
+    """What is asked for with other angles, that nearest to what is asked first: actions are known by right angles and
+    their halves, and a turn made while walking is turned best."""
+    turn = abs(asked.amounts.get("degrees", 0))
+    if not 20 <= turn <= 240:
+        return []
+    angles = sorted((45, 90, 135, 180), key=lambda angle: abs(angle - turn))
+    return [f"{asked.text} {angle} degrees" for angle in angles]
+
+
+def _found(said: str) -> Iterator[tuple[Kind, float, int, int, str]]:
+    """Quantities: kind and value, from where to where they are said, and what is left of that."""
+    for match in QUANTITY.finditer(said):
+        place = next(i for i in range(len(UNITS)) if match[f"u{i}"])
+        kind, factor, _ = UNITS[place]
+        before = said[: match.start()]
+        moves = [0, *(found.end() for found in MOVING.finditer(before))]
+        of_body = kind in ("degrees", "metres") and BODY.search(before, moves[-1])
+        own = match[f"u{place}"] in ("foot", "feet") and (ON_FEET.search(before) or match["number"] == "1")
+        if not (of_body or own or re.search(r"\b(?:after|every|each)\s*$", before)):
+            rest = "" if moves[1:] and kind == "degrees" else LEFT.get(match[f"u{place}"].split()[-1][:4], "")
+            yield kind, factor * float(match["number"]), match.start(), match.end(), f" {rest} "
+    for match in COUNTED.finditer(said):
+        yield "times", float(match["number"]), match.start("number"), match.start("what"), ""
+
+
+def _sensible(kind: Kind, value: float, sentence: str) -> float:
+    least = -MOST[kind] if kind == "degrees" else 0
+    if not least <= value <= MOST[kind] or value == 0 or (kind in ("steps", "times") and value % 1):
+        whole = "a whole number" if kind in ("steps", "times") else "a number"
+        raise TextError(f"{value:g} {kind} cannot be shown (in {sentence!r}): give {whole} up to {MOST[kind]:g}, not 0")
+    return value
+
+
+def _turned(said: str, amounts: dict[Kind, float], ways: set[int]) -> None:
+    """Make turns degrees, with the sign of their side: "turns around" is half a turn, so many times so many turns."""
+    around = re.search(r"\bturn\w*(?: all the way)? around\b", said)
+    if "degrees" not in amounts and (around or re.search(r"\b(?:spin|rotat|twirl|whirl|pirouett)\w*\b", said)):
+        if "times" in amounts:
+            amounts["degrees"] = 360 * amounts.pop("times")
+        elif around:
+            amounts["degrees"] = 360 if "all the way" in around[0] else 180
+    elif "degrees" in amounts and "times" in amounts:
+        amounts["degrees"] *= amounts.pop("times")
+    elif "times" in amounts and re.search(r"\bstep(?:s|ping)?\b", said) and "steps" not in amounts:
+        amounts["steps"] = amounts.pop("times")
+    if "degrees" in amounts and ways == {-1}:
+        amounts["degrees"] *= -1
+
+
+def _plain(said: str, amounts: Mapping[Kind, float]) -> str:
+    """What is done, without numbers: steps and turns are made walking, where nothing else is said of them."""
+    if "steps" in amounts and not re.search(r"\b(?:left|right|side\w*)\b", said):
+        steps = r"\b(?:(?:takes?|taking|makes?|does|do)\s+)?steps\b"
+        alone = not MOVING.search(re.sub(steps, "", said))
+        said = re.sub(steps, "walks" if alone else "", said)
+    if 20 <= abs(amounts.get("degrees", 0)) <= 240 and not re.search(ELSEWHERE, said):
+        said = re.sub(r"\b(?:(?:makes?|do|does)\s+)?(?:turn|pivot|rotat|veer)\w*", "walks and turns", said)
+    text = re.sub(r"\s+", " ", said).strip(" ,.")
+    text = re.sub(r"\bwalk(s|ing)?$", r"walk\1 forward", text)
+    return text or next(UNSAID[kind] for kind in (*amounts, "steps") if kind in UNSAID)
