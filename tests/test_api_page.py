@@ -12,7 +12,7 @@ import motet
 from motet.figures import humanoid
 
 ROOT = Path(__file__).parents[1]
-INNER = ("motet.bundle.", "motet.decode.")
+INNER = ("motet.bundle.", "motet.decode.", "motet.generate.codec")
 """What graphs and loops give is one level under the verbs."""
 
 ROOMS = (motet, motet.motion, humanoid)
