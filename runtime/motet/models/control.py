@@ -31,12 +31,15 @@ class ControlModel(BundleModel):
 
 
 class TimedPart(Protocol):
-    """A part of a script: how long it lasts in seconds, and its caption in words."""
+    """A part of a script."""
 
     @property
-    def seconds(self) -> float: ...  # noqa: D102
+    def seconds(self) -> float:
+        """How long it lasts."""
+
     @property
-    def caption(self) -> str: ...  # noqa: D102
+    def caption(self) -> str:
+        """In words."""
 
 
 def captions(parts: Sequence[TimedPart]) -> list[tuple[float, str]]:
