@@ -17,7 +17,7 @@ def test_geometry_imports_nothing_that_is_built_on_it() -> None:
         f"sys.modules['motet'].__path__ = [{motet.__path__[0]!r}]; "
         "import motet.motion; "
         "print([name for name in sys.modules if name.startswith('motet.') and name.split('.')[1] not in "
-        "('motion', 'errors')], 'onnxruntime' in sys.modules)"
+        "('motion', 'figures', 'errors')], 'onnxruntime' in sys.modules)"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[] False"

@@ -15,8 +15,8 @@ from motet.figures.humanoid import HUMANOID
 from motet.generate.codes import WINDOW, CodesSettings, Writer, drawn_steps
 from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
+from motet.motion.looping import looped
 from motet.motion.motion import Motion
-from motet.predict.looping import looped
 
 pytestmark = pytest.mark.numeric
 

@@ -27,10 +27,10 @@ from motet.figures.feet.treadmill import with_travel
 from motet.figures.humanoid import LENGTH_UNITS, read_map, to_humanoid
 from motet.formats import READS, WRITES, write_motion
 from motet.motion.kinematics import skeleton_of
+from motet.motion.looping import looped
 from motet.motion.mirroring import mirror as mirrored
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
-from motet.predict.looping import looped
 
 log = logging.getLogger(__name__)
 

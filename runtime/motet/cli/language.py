@@ -21,7 +21,7 @@ from motet.generate.base import PLAYED, Generated, GenerateModel
 from motet.generate.model import CodesModel, Story
 from motet.models.load import load_as
 from motet.models.nearest_neighbour import NOTHING
-from motet.predict.looping import looped
+from motet.motion.looping import looped
 from motet.text.clauses import Passage
 
 

@@ -13,10 +13,10 @@ from motet.motion.kinematics import (
     positions,
     without_heading,
 )
+from motet.motion.looping import looped
 from motet.motion.mirroring import lateral_axis, mirror
 from motet.motion.motion import UNITS, Motion
 from motet.motion.skeleton import Joint, Skeleton, partners_of, sides_of
-from motet.predict.looping import looped
 
 __all__ = [
     "HUMANOID",

@@ -4,8 +4,6 @@
     generate model continues them
     fill: frames on both sides of a gap -> placed frames -> graph "filler" (between.py) -> the frames of the gap
 
-Main names: PredictModel (model.py), FillModel (fill.py), free_run (free_run.py), between (between.py), looped
-(looping.py, which finds the part of a motion that repeats).
-Numbers: FreeRunSettings (free_run.py) and BetweenSettings (between.py), as defaults in the manifest; those of loops at
-the head of looping.py.
+Main names: PredictModel (model.py), FillModel (fill.py), free_run (free_run.py), between (between.py).
+Numbers: FreeRunSettings (free_run.py) and BetweenSettings (between.py), as defaults in the manifest.
 """

@@ -18,9 +18,9 @@ from motet.formats import ONTO, Character
 from motet.generate.base import PLAYED, Generated
 from motet.generate.model import CodesModel, Story
 from motet.models.describe import DescribeModel, Description
+from motet.motion.looping import looped
 from motet.motion.motion import Motion
 from motet.motion.skeleton import METRES
-from motet.predict.looping import looped
 from motet.predict.model import PredictModel
 from motet.serve.batches import Batcher
 from motet.serve.content import MEDIA, Order, as_json, content_of, figure_of, frames_of
