@@ -84,7 +84,7 @@ CEILINGS = {
     "motet.draw": 12_100,
     "motet.figures": 30_500,
     "motet.formats": 36_100,
-    "motet.generate": 24_700,
+    "motet.generate": 24_800,
     "motet.live": 5_700,
     "motet.models": 9_000,
     "motet.motion": 15_700,
