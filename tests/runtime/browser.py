@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 from typing import Any, Self
 
@@ -55,6 +56,7 @@ class Browser:
         os.close(from_browser)
         self.pid = self._process.pid
         self._rest, self._count, self.session = b"", 0, ""
+        self._moment = time.time()
         self.errors: list[str] = []
 
     def __enter__(self) -> Self:
@@ -97,6 +99,7 @@ class Browser:
             f"new Promise((done) => {{ const look = () => {ready} ? done(true) : setTimeout(look, 20); look(); }})"
         )
         assert self.value(waiting), self.errors
+        self._moment = time.time()
 
     def before(self, script: str) -> None:
         """Run a script in the next pages before their own."""
@@ -119,7 +122,8 @@ class Browser:
 
     def mouse(self, kind: str, x: float, y: float) -> None:
         """A "mousePressed", "mouseMoved" or "mouseReleased" of the left button."""
-        self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+        how = {"button": "left", "buttons": 1, "clickCount": 1}
+        self._call("Input.dispatchMouseEvent", type=kind, x=x, y=y, timestamp=self._next_moment(), **how)
 
     def phone(self, width: int, height: int) -> None:
         """Be a phone with a screen of so many pixels, for the next pages."""
@@ -129,7 +133,12 @@ class Browser:
     def touch(self, kind: str, *points: tuple[float, float]) -> None:
         """A "touchStart" or "touchMove" of fingers at points, or a "touchEnd" of all of them."""
         fingers = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
-        self._call("Input.dispatchTouchEvent", type=kind, touchPoints=fingers)
+        self._call("Input.dispatchTouchEvent", type=kind, touchPoints=fingers, timestamp=self._next_moment())
+
+    def _next_moment(self) -> float:
+        """The page is told that each press and move comes 20 ms after the last, however busy the machine is."""
+        self._moment += 0.02
+        return self._moment
 
     def coloured(self) -> list[float]:
         """How many pixels of the page, in the first canvas, have the colour of the left side, and of the right one."""
