@@ -71,14 +71,20 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
         take = _take(scene, *choice(gltf.path, parts, clip, figure))
         if stance and not stance.keys() & set(take.figure.names):
             raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
-        bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
-        given = Names(bones.values())  # other joints with such a name are renamed
-        joints = zip(take.figure.nodes, take.figure.names, strict=True)
-        names = [bones.get(node) or given.unique(name) for node, name in joints]
-        turns, places = _rested(take, stance)
-        skeleton = skeleton_at(names, take.figure.parents, places)
-        turned = product(take.turns, inverse(turns))
+        rest_turns, rest_places = _rested(take, stance)
+        skeleton = skeleton_at(_joint_names(gltf, take.figure), take.figure.parents, rest_places)
+        turned = product(take.turns, inverse(rest_turns))
         return motion_of(skeleton, turned, _moving(skeleton, turned, take.places), take.fps)
+
+
+def _joint_names(gltf: Gltf, figure: "Figure") -> list[str]:
+    """The names of a figure's joints: VRM's for the bones of its humanoid, and unique ones for the others."""
+    bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
+    unique_names = Names(bones.values())  # other joints with such a name are renamed
+    names = []
+    for node, name in zip(figure.nodes, figure.names, strict=True):
+        names.append(bones.get(node) or unique_names.unique(name))
+    return names
 
 
 def contents(file: File) -> Contents:
@@ -169,9 +175,13 @@ def _take(scene: _Scene, index: int | None, place: int | None) -> _Take:
     figures = list(scene.figures.values())
     figure = figure_of(gltf, likeliest(gltf, figures, moved(animation)) if place is None else figures[place])
     near = above(gltf, figure.nodes)
-    values, fps = ({}, 30.0) if index is None else _tracks(gltf, animation, scene.names[index], near)
-    _, rest_turns, rest_places = (part[0, list(figure.nodes)] for part in gltf.world(near))
-    linear, turns, places = (part[:, list(figure.nodes)] for part in gltf.world(near, values))
+    tracks: Tracks = {}
+    fps = 30.0
+    if index is not None:
+        tracks, fps = _tracks(gltf, animation, scene.names[index], near)
+    joints = list(figure.nodes)
+    _, rest_turns, rest_places = (part[0, joints] for part in gltf.world(near))
+    linear, turns, places = (part[:, joints] for part in gltf.world(near, tracks))
     _turn_with_bones(figure, linear, turns, places, rest_turns, rest_places)
     return _Take(figure, turns, places, rest_turns, rest_places, fps)
 
@@ -215,7 +225,8 @@ def _rested(take: _Take, stance: Mapping[str, Array]) -> tuple[Array, Array]:
 
     Bones keep their lengths; other joints keep their rotation relative to their parent.
     """
-    turned, places = take.rest_turns.copy(), take.rest_places.copy()
+    turned = take.rest_turns.copy()
+    places = take.rest_places.copy()
     for i, (name, parent) in enumerate(zip(take.figure.names, take.figure.parents, strict=True)):
         if parent >= 0:
             back = turned[parent] @ take.rest_turns[parent].T
@@ -250,54 +261,70 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     moved: the nodes that its animations move. Skins belong to one figure if one is below the other, or both are below a
     moved node. Where the skins' joints are no human's, and are one together with moved nodes, these are joints, too.
     """
-    skins, bones = gltf.objects("skins"), set(gltf.humanoid().values())
-    if len(skins) > MAX_SKINS:
-        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
-    given = [bones, *(set(skin.get("joints", [])) for skin in skins)]
-    if strange := set().union(*given) - set(range(len(gltf.parents))):
-        raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, strange)))}")
+    humanoid = set(gltf.humanoid().values())
+    sets = [humanoid, *_skins(gltf)]
+    joints_of_all = set().union(*sets)
+    if unknown := joints_of_all - set(range(len(gltf.parents))):
+        raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, unknown)))}")
     roots = _heads(gltf, {node for node, parent in enumerate(gltf.parents) if parent < 0})
     animated = _animated(gltf, moved, roots)
-    if not any(given):
+    if not joints_of_all:
         if not animated:
-            if gltf.document.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions"):
-                raise FormatError(gltf.path, "it animates only expressions of a face, and no bones: it has no motion")
-            names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
-            reason = f"its animations move only {names}, and nothing below"
-            reason = reason if moved else "expected a skin with joints or a VRM humanoid"
-            raise FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
+            raise _no_skeleton(gltf, moved)
         return _grouped(gltf, [animated], moved, roots)
-    found = _grouped(gltf, given, moved, roots)
-    if bones:
-        return [joints for joints in found if joints & bones]
-    if not animated - above(gltf, set().union(*found)):
-        return found
-    if _humans(gltf, found):
-        return found
-    return _humans(gltf, _grouped(gltf, [*given, animated], moved, roots)) or found
+    groups = _grouped(gltf, sets, moved, roots)
+    if humanoid:
+        return [joints for joints in groups if joints & humanoid]
+    # animated nodes beyond the skins' count where only both together are a human's
+    all_are_skinned = not animated - above(gltf, set().union(*groups))
+    if all_are_skinned or _humans(gltf, groups):
+        return groups
+    return _humans(gltf, _grouped(gltf, [*sets, animated], moved, roots)) or groups
 
 
-def _grouped(gltf: Gltf, given: list[set[int]], moved: set[int], roots: Mapping[int, int]) -> list[set[int]]:
+def _skins(gltf: Gltf) -> list[set[int]]:
+    """The joints of each skin; FormatError for too many skins."""
+    skins = gltf.objects("skins")
+    if len(skins) > MAX_SKINS:
+        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
+    return [set(skin.get("joints", [])) for skin in skins]
+
+
+def _no_skeleton(gltf: Gltf, moved: set[int]) -> FormatError:
+    """The error for a file without joints, with what its animations move instead."""
+    if gltf.document.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions"):
+        return FormatError(gltf.path, "it animates only expressions of a face, and no bones: it has no motion")
+    reason = "expected a skin with joints or a VRM humanoid"
+    if moved:
+        names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
+        reason = f"its animations move only {names}, and nothing below"
+    return FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
+
+
+def _grouped(gltf: Gltf, sets: list[set[int]], moved: set[int], roots: Mapping[int, int]) -> list[set[int]]:
     """Sets of joints put together that belong to one figure."""
+    # a set that spans several trees belongs to several figures
     parts: dict[tuple[int, int], set[int]] = {}
-    for i, joints in enumerate(given):
+    for i, joints in enumerate(sets):
         for node in joints:
             parts.setdefault((i, roots[node]), set()).add(node)
+    # parts below the same moved node, or below each other, are one figure
     tops = [_top(gltf, part) for part in parts.values()]
     heads = _heads(gltf, moved | set(tops))
-    found: dict[int, set[int]] = {}
+    groups: dict[int, set[int]] = {}
     for part, top in zip(parts.values(), tops, strict=True):
-        found.setdefault(heads[top], set()).update(part)
-    return list(found.values())
+        groups.setdefault(heads[top], set()).update(part)
+    return list(groups.values())
 
 
-def _humans(gltf: Gltf, found: list[set[int]]) -> list[set[int]]:
-    """Those figures, of the ten with the most joints, that are humans by their names or their tree at rest."""
-    places, humans = gltf.world()[2][0], []
-    for joints in sorted(found, key=len, reverse=True)[:10]:
+def _humans(gltf: Gltf, groups: list[set[int]]) -> list[set[int]]:
+    """The figures, among the ten with the most joints, that are humans by their names or their tree at rest."""
+    _, _, places = gltf.world()
+    humans = []
+    for joints in sorted(groups, key=len, reverse=True)[:10]:
         try:
             figure = figure_of(gltf, joints)
-            skeleton = skeleton_at(figure.names, figure.parents, places[list(figure.nodes)])
+            skeleton = skeleton_at(figure.names, figure.parents, places[0, list(figure.nodes)])
             map_of(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton))
         except (FormatError, MotionError):
             continue
@@ -309,17 +336,18 @@ def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]
     """In each tree the moved nodes and the bones below them, if some are below others; empty if none are."""
 
     def is_thing(node: int, *kinds: str) -> bool:
-        found = gltf.objects("nodes")[node]
-        return any(kind in found for kind in kinds) or "KHR_lights_punctual" in found.get("extensions", {})
+        properties = gltf.objects("nodes")[node]
+        is_light = "KHR_lights_punctual" in properties.get("extensions", {})
+        return is_light or any(kind in properties for kind in kinds)
 
     bones = {node for node in moved if not is_thing(node, "camera")}
-    hanging: set[int] = set()
+    below: set[int] = set()
     for node in gltf.order:
-        held = gltf.parents[node] in bones or gltf.parents[node] in hanging
-        if held and (node in bones or not is_thing(node, "mesh", "camera")):
-            hanging.add(node)
-    trees = {roots[node] for node in bones & hanging}
-    return {node for node in bones | hanging if roots[node] in trees}
+        is_below = gltf.parents[node] in bones or gltf.parents[node] in below
+        if is_below and (node in bones or not is_thing(node, "mesh", "camera")):
+            below.add(node)
+    trees = {roots[node] for node in bones & below}
+    return {node for node in bones | below if roots[node] in trees}
 
 
 def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
@@ -335,7 +363,8 @@ def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
 
 def _top(gltf: Gltf, part: set[int]) -> int:
     """The lowest common ancestor of a part: that of its first and last node in branch order."""
-    first, last = (pick(part, key=gltf.order.__getitem__) for pick in (min, max))
+    first = min(part, key=gltf.order.__getitem__)
+    last = max(part, key=gltf.order.__getitem__)
     line = above(gltf, [first])
     while last not in line:
         last = gltf.parents[last]
@@ -344,36 +373,42 @@ def _top(gltf: Gltf, part: set[int]) -> int:
 
 def above(gltf: Gltf, nodes: Iterable[int]) -> set[int]:
     """The nodes and all their ancestors."""
-    found: set[int] = set()
+    reached: set[int] = set()
     for node in nodes:
         at = node
-        while at >= 0 and at not in found:
-            found.add(at)
+        while at >= 0 and at not in reached:
+            reached.add(at)
             at = gltf.parents[at]
-    return found
+    return reached
 
 
-def likeliest(gltf: Gltf, found: list[set[int]], moved: set[int]) -> set[int]:
+def likeliest(gltf: Gltf, groups: list[set[int]], moved: set[int]) -> set[int]:
     """The figure with the most moving nodes, counting its ancestors, or else with the most joints."""
-    best = max(found, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
-    if len(found) > 1:
+    best = max(groups, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
+    if len(groups) > 1:
         name = quoted(gltf.name(_top(gltf, best)))
         message = "%s: of %d skeletons, reading that of %s, which moves the most; figure= or --figure takes another"
-        log.warning(message, gltf.path, len(found), name)
+        log.warning(message, gltf.path, len(groups), name)
     return best
 
 
 def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
     """The joints and the nodes between them, with the ends attached to them, by motet's and Blender's naming."""
-    inside, nodes = above(gltf, joints) - above(gltf, [gltf.parents[_top(gltf, joints)]]), gltf.objects("nodes")
-    ends = {node for node, found in enumerate(nodes) if str(found.get("name", "")).endswith(END_SUFFIX)}
-    ends = {node for node in ends if gltf.parents[node] in inside and not nodes[node].get("children")}
-    kept = tuple(node for node in gltf.order if node in inside or node in ends)
-    if len(kept) > MAX_JOINTS:
-        raise FormatError(gltf.path, f"its skeleton has {len(kept)} joints: expected at most {MAX_JOINTS}")
-    at, given = {node: i for i, node in enumerate(kept)}, Names()
-    names = tuple(given.unique(gltf.name(node)) for node in kept)
-    return Figure(kept, tuple(at.get(gltf.parents[node], -1) for node in kept), names)
+    over = above(gltf, [gltf.parents[_top(gltf, joints)]])
+    inside = above(gltf, joints) - over
+    ends = set()
+    for node, properties in enumerate(gltf.objects("nodes")):
+        is_end = str(properties.get("name", "")).endswith(END_SUFFIX) and not properties.get("children")
+        if is_end and gltf.parents[node] in inside:
+            ends.add(node)
+    nodes = tuple(node for node in gltf.order if node in inside or node in ends)
+    if len(nodes) > MAX_JOINTS:
+        raise FormatError(gltf.path, f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
+    index_of = {node: i for i, node in enumerate(nodes)}
+    parents = tuple(index_of.get(gltf.parents[node], -1) for node in nodes)
+    unique_names = Names()
+    names = tuple(unique_names.unique(gltf.name(node)) for node in nodes)
+    return Figure(nodes, parents, names)
 
 
 def moved(animation: Mapping[str, Any]) -> set[int]:
@@ -385,18 +420,22 @@ def moved(animation: Mapping[str, Any]) -> set[int]:
 def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> tuple[Tracks, float]:
     """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
     keys = _keys(gltf, animation, name, nodes)
-    times = [at for at, _, _ in keys.values()]
-    if not all(map(len, times)):
+    times_of_tracks = [times for times, _, _ in keys.values()]
+    if not all(map(len, times_of_tracks)):
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
-    start, end = min(at[0] for at in times), max(at[-1] for at in times)
+    start = min(times[0] for times in times_of_tracks)
+    end = max(times[-1] for times in times_of_tracks)
     if start > LATE_START:
         log.warning("%s: its animation %s starts at %.3g s: read from there", gltf.path, quoted(name), start)
-    fps = _rate(times)
+    fps = _rate(times_of_tracks)
     count = (end - start) * fps + 1
     if not count * len(gltf.objects("nodes")) < most_poses(gltf.size):
         raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
-    frames = start + np.arange(round(count)) / fps
-    return {place: _sampled(*key, frames, place[1]) for place, key in keys.items()}, fps
+    frame_times = start + np.arange(round(count)) / fps
+    tracks = {}
+    for (node, path), (times, values, interpolation) in keys.items():
+        tracks[node, path] = _sampled(times, values, interpolation, frame_times, path)
+    return tracks, fps
 
 
 Keys = dict[tuple[int, str], tuple[Array, Array, str]]
@@ -408,38 +447,28 @@ def _keys(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) 
     samplers = animation.get("samplers", [])
     keys: Keys = {}
     for channel in animation.get("channels", []):
-        node, path = channel["target"].get("node"), channel["target"].get("path")
+        node = channel["target"].get("node")
+        path = channel["target"].get("path")
         if node not in nodes or path not in PATHS:
             continue
         sampler = samplers[channel["sampler"]]
         times = gltf.array(sampler["input"])
         values = gltf.array(sampler["output"])
-        kind = sampler.get("interpolation", "LINEAR")
-        expected = times.size * (3 if kind == "CUBICSPLINE" else 1)  # a spline's keys have tangents
+        interpolation = sampler.get("interpolation", "LINEAR")
+        expected = times.size * (3 if interpolation == "CUBICSPLINE" else 1)  # a spline's keys have tangents
         if values.size != expected * PATHS[path]:
             counts = f"{times.size} times and {len(values)} values, not {expected},"
-            place = f"the {path} of {quoted(gltf.name(node))}"
-            raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {place}: export it again")
-        keys[node, path] = times.reshape(-1), values, kind
+            track = f"the {path} of {quoted(gltf.name(node))}"
+            raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {track}: export it again")
+        keys[node, path] = (times.reshape(-1), values, interpolation)
     return keys
 
 
-def _rate(times: Iterable[Array]) -> float:
-    """The frame rate that the times of keys tell, in seconds, each (K,): that of the closest keys, 30 if none is near.
-
-    Times are 32-bit numbers, so a step between two is rough: it is measured over all whole steps of its track.
-    """
-    least = 0.0
-    for at in times:
-        if len(at) < 2:
-            continue
-        gaps = np.diff(at)
-        step = float(np.median(gaps))
-        if step > 0:
-            whole = np.rint(gaps / step)
-            if np.abs(gaps - whole * step).max() < 0.01 * step and whole.sum() > 0:
-                step = float((at[-1] - at[0]) / whole.sum())
-        least = min(least, step) if least else step
+def _rate(times_of_tracks: Iterable[Array]) -> float:
+    """The frame rate of tracks by the times of their keys, (K,) in seconds: that of the closest keys, 30 if none is
+    near."""
+    steps = [_step(times) for times in times_of_tracks if len(times) > 1]
+    least = min((step for step in steps if step), default=0.0)
     if not 0 < least < 0.1:  # keys further apart do not tell a frame rate
         return 30.0
     rate = 1 / least
@@ -450,28 +479,68 @@ def _rate(times: Iterable[Array]) -> float:
     return rate
 
 
+def _step(times: Array) -> float:
+    """The seconds between two keys of a track (K,).
+
+    Times are 32-bit numbers, so a step between two is rough: it is measured over all whole steps of the track.
+    """
+    gaps = np.diff(times)
+    step = float(np.median(gaps))
+    if step > 0:
+        whole = np.rint(gaps / step)
+        if np.abs(gaps - whole * step).max() < 0.01 * step and whole.sum() > 0:
+            step = float((times[-1] - times[0]) / whole.sum())
+    return step
+
+
 def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -> Array:
-    """Values (T, 3 or 4) at given times: linear (turns the shortest way), in steps, or by the tangents of splines."""
-    values = values.reshape(len(times), -1, PATHS[name])
-    before = np.clip(np.searchsorted(times, frames + 1e-6, side="right") - 1, 0, max(len(times) - 2, 0))
+    """Values (T, 3 or 4) at given times: linear (rotations the shortest way), in steps, or by the tangents of splines.
+
+    Beyond the first and last key the value stays (glTF 2.0, section 3.11 and appendix C).
+    """
+    values = values.reshape(len(times), -1, PATHS[name])  # a key of a spline: in-tangent, value, out-tangent
+    # the keys around each frame, and how far between them it is
+    before = np.searchsorted(times, frames + 1e-6, side="right") - 1
+    before = np.clip(before, 0, max(len(times) - 2, 0))
     after = np.minimum(before + 1, len(times) - 1)
-    span = np.maximum(times[after] - times[before], 1e-9)
-    part = np.clip((frames - times[before]) / span, 0, 1)[:, None]
-    low, high = values[before, 0], values[after, 0]
-    mixed: Array
+    span = np.maximum(times[after] - times[before], 1e-9)[:, None]
+    share = np.clip((frames - times[before])[:, None] / span, 0, 1)
     if kind == "CUBICSPLINE":
-        t, u, p, q = part, 1 - part, values[before, 1], values[after, 1]
-        m0, m1 = values[before, 2] * span[:, None], high * span[:, None]
-        mixed = (1 + 2 * t) * u**2 * p + t * u**2 * m0 + t**2 * (3 - 2 * t) * q - t**2 * u * m1
-    elif kind == "STEP":
-        mixed = np.where(part < 1 - 1e-4, low, high)
-    elif name != "rotation":
-        mixed = low + part * (high - low)
-    else:  # the shortest way at constant speed
-        low, high = (quats / np.linalg.norm(quats, axis=-1, keepdims=True) for quats in (low, high))
-        cosine = np.sum(low * high, axis=-1, keepdims=True)
-        high, angle = np.where(cosine < 0, -high, high), np.arccos(np.clip(np.abs(cosine), -1, 1))
-        near, sine = angle < 1e-4, np.where(angle < 1e-4, 1.0, np.sin(angle))
-        one, other = (np.where(near, share, np.sin(share * angle) / sine) for share in (1 - part, part))
-        mixed = one * low + other * high
-    return mixed
+        return _on_spline(values[before], values[after], span, share)
+    low = values[before, 0]
+    high = values[after, 0]
+    if kind == "STEP":
+        steps: Array = np.where(share < 1 - 1e-4, low, high)
+        return steps
+    if name == "rotation":
+        return _on_great_circle(low, high, share)
+    between: Array = low + share * (high - low)
+    return between
+
+
+def _on_spline(before: Array, after: Array, span: Array, share: Array) -> Array:
+    """Values (T, D) on cubic Hermite splines between keys (T, 3, D) that are ``span`` seconds (T, 1) apart."""
+    left = 1 - share
+    tangent_before = before[:, 2] * span
+    tangent_after = after[:, 0] * span
+    value = (1 + 2 * share) * left**2 * before[:, 1]
+    value = value + share * left**2 * tangent_before
+    value = value + share**2 * (3 - 2 * share) * after[:, 1]
+    return value - share**2 * left * tangent_after
+
+
+def _on_great_circle(low: Array, high: Array, share: Array) -> Array:
+    """Quaternions (T, 4) between others, the shortest way at constant speed; ends need not be normalised."""
+    low = low / np.linalg.norm(low, axis=-1, keepdims=True)
+    high = high / np.linalg.norm(high, axis=-1, keepdims=True)
+    # of the two quaternions of a rotation, the nearer one
+    cosine = np.sum(low * high, axis=-1, keepdims=True)
+    high = np.where(cosine < 0, -high, high)
+    angle = np.arccos(np.clip(np.abs(cosine), -1, 1))
+    # for angles too small to divide by their sine, the straight line
+    is_near = angle < 1e-4
+    sine = np.where(is_near, 1.0, np.sin(angle))
+    weight_low = np.where(is_near, 1 - share, np.sin((1 - share) * angle) / sine)
+    weight_high = np.where(is_near, share, np.sin(share * angle) / sine)
+    turned: Array = weight_low * low + weight_high * high
+    return turned
