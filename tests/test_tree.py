@@ -83,7 +83,7 @@ CEILINGS = {
     "motet.decode": 4_000,
     "motet.draw": 12_100,
     "motet.figures": 30_500,
-    "motet.formats": 36_100,
+    "motet.formats": 36_300,
     "motet.generate": 24_800,
     "motet.live": 5_700,
     "motet.models": 9_000,
