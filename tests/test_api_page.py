@@ -20,8 +20,8 @@ CLASSES = [kind for name in motet.__all__ if inspect.isclass(kind := getattr(mot
 
 
 def test_the_page_is_what_the_docstrings_say() -> None:
-    script = runpy.run_path(str(ROOT / "docs/api.py"))
-    assert script["PAGE"].read_text(encoding="utf-8") == script["page"](), "run  python docs/api.py"
+    script = runpy.run_path(str(ROOT / "docs/reference/api.py"))
+    assert script["PAGE"].read_text(encoding="utf-8") == script["page"](), "run  python docs/reference/api.py"
 
 
 def classes(hint: Any) -> Iterator[type]:

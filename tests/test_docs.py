@@ -136,7 +136,7 @@ def test_the_speeds_of_the_servers_first_message_are_the_models() -> None:
     model = load_as(SteerModel, "control")
     slowest, fastest = model.speeds["walk"]
     said = f'"walk": [{slowest:.2f}, {model.usual["walk"]:.2f}, {fastest:.2f}]'
-    assert said in PAGES["docs/live.md"].read_text()
+    assert said in PAGES["docs/reference/live-protocol.md"].read_text()
 
 
 def test_the_readme_names_commands_and_wrong_ones_are_found() -> None:

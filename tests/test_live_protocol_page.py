@@ -1,4 +1,4 @@
-"""What docs/live.md says of the server's protocol: every message on the page is sent, and answered as it says; and the
+"""What docs/reference/live-protocol.md says of the server's protocol: every message on the page is sent, and answered as it says; and the
 clients in examples/ say nothing else."""
 
 import asyncio
@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed
 from motet.live.server import LiveServer
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs/live.md").read_text()
+PAGE = (ROOT / "docs/reference/live-protocol.md").read_text()
 CLIENTS = {name: (ROOT / "examples" / name).read_text() for name in ("unity/MotetFigure.cs", "godot/motet_figure.gd")}
 
 Message = dict[str, Any]

@@ -1,4 +1,4 @@
-# A humanoid steered by motet's live server: motet live --port 8765 (docs/live.md has the protocol).
+# A humanoid steered by motet's live server: motet live --port 8765 (docs/reference/live-protocol.md has the protocol).
 # Put it on the node above the skeleton, whose bones have the names of Godot's
 # SkeletonProfileHumanoid and rest in a T-pose that faces z, as the importer makes them.
 extends Node3D

@@ -1,4 +1,4 @@
-// A humanoid avatar steered by motet's live server: motet live --port 8765 (docs/live.md has the protocol).
+// A humanoid avatar steered by motet's live server: motet live --port 8765 (docs/reference/live-protocol.md has the protocol).
 // Put it on the avatar, which has an Animator of the type Humanoid without a controller and starts in its T-pose.
 // Needs the package com.unity.nuget.newtonsoft-json.
 using System;

@@ -29,7 +29,7 @@ def model() -> TdbnModel:
 
 
 def test_the_documented_loop_gives_the_same_frames(model: TdbnModel) -> None:
-    """docs/bundle.md in plain onnxruntime: no code of motet between the bundle and the frames."""
+    """docs/reference/bundle.md in plain onnxruntime: no code of motet between the bundle and the frames."""
     with zipfile.ZipFile(list_bundles()["cmu-control"]) as archive:
         manifest = json.loads(archive.read("manifest.json"))
         encoder, step = (

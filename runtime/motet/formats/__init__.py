@@ -3,7 +3,7 @@
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
 binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions
 or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes "clip", "figure" or both. To
-add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of docs/formats.md and
+add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of docs/reference/formats.md and
 the lists of corpora are built from.
 """
 
@@ -79,8 +79,8 @@ _KEEPS = {
     ".xml": "angles and root; the skeleton is not in the file",
     ".glb": "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
     ".gltf": _CHARACTER,
-    ".vrm": f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](humanoid.md#characters))",
-    ".vrma": "the humanoid: motions of other human figures are retargeted ([humanoid.md](humanoid.md))",
+    ".vrm": f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](../humanoid.md#characters))",
+    ".vrma": "the humanoid: motions of other human figures are retargeted ([humanoid.md](../humanoid.md))",
     ".fbx": "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`",
     ".html": "a page with a player: orbit, play, scrub, no network",
     ".gif": "an animated picture; needs Pillow: `pip install 'motet[plot]'`",

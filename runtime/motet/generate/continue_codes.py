@@ -23,7 +23,7 @@ from motet.settings import Range, Settings
 @dataclass(frozen=True)
 class ContinuationSettings(Settings):
     """What a motion shows, how it continues, and how the continuation is joined to it; tuned on people who are not in
-    the figures of docs/alive.md.
+    the figures of docs/predict.md.
 
     context: of a motion's end that becomes codes. context_steps: of these the last steps by which it is found what the
         motion shows, each of which counts ``context_fading`` of the one after it.

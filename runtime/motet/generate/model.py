@@ -106,7 +106,7 @@ class Understood:
 
 
 class CodesModel(GenerateModel):
-    """A model that generates motion codes; docs/bundle.md has its graphs and tables. A context is the log-probabilities
+    """A model that generates motion codes; docs/reference/bundle.md has its graphs and tables. A context is the log-probabilities
     of actions."""
 
     SETTINGS = (FamiliaritySettings, ContinuationSettings)

@@ -120,4 +120,4 @@ class BundleModel(ABC):
 
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
-        """The complete run of the golden vectors (docs/bundle.md): outputs from its inputs and settings."""
+        """The complete run of the golden vectors (docs/reference/bundle.md): outputs from its inputs and settings."""

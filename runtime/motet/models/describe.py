@@ -37,7 +37,7 @@ LEAST = 1e-6
 
 @dataclass(frozen=True)
 class ConfidenceSettings(Settings):
-    """log_probability: least of a confident description. Training finds it (docs/language.md)."""
+    """log_probability: least of a confident description. Training finds it (docs/describe.md)."""
 
     FEATURE: ClassVar[str] = "confidence"
     log_probability: Annotated[float, Range(-1000, 0, "nats")] = -5.5

@@ -1,4 +1,4 @@
-"""What a motion shows, answered from known motions that are near it in a space of motions (docs/bundle.md, Describe).
+"""What a motion shows, answered from known motions that are near it in a space of motions (docs/reference/bundle.md, Describe).
 
 Sentences are not compared with each other: all wordings of one kind of action count together, and a sentence is as
 good as the share of near motions that it would be right about (minimum Bayes risk, Kumar and Byrne 2004).
@@ -36,7 +36,7 @@ BACKWARDS = re.compile("backward|in reverse|retreat")
 
 @dataclass(frozen=True)
 class AnswerSettings(Settings):
-    """How known motions answer. Training finds the last four (docs/language.md).
+    """How known motions answer. Training finds the last four (docs/describe.md).
 
     near: how many of the nearest motions count. temperature: a motion this much less similar counts e times less.
     turned, straight: from how many degrees on a path turns, and up to how many it is straight. backwards: mean speed

@@ -105,7 +105,7 @@ class PredictModel(BundleModel):
         append: return the resampled motion followed by the prediction.
         progress: called with the number of motions done and in total.
         beyond: a motion-code model such as ``motet.load("generate")``. It continues a prediction longer than the
-            horizon, at the motion's pace (docs/alive.md), after SURE seconds by the predictor. Without it the
+            horizon, at the motion's pace (docs/predict.md), after SURE seconds by the predictor. Without it the
             predictor continues from its own last frames, and its motion fades out.
         seed: of sampling by ``beyond``; motion i uses seed + i (or seed[i]).
         Several motions are continued in one batch, each as it would be alone. MotionError for a motion that is too
@@ -158,7 +158,7 @@ class PredictModel(BundleModel):
         """``samples`` different futures of a motion, each of ``seconds`` or ``frames`` (the horizon by default).
 
         beyond: a motion-code model such as ``motet.load("generate")``. It draws all frames from the first on
-        (docs/alive.md): they differ as far as the future is open, whereas :meth:`predict` begins with the average
+        (docs/predict.md): they differ as far as the future is open, whereas :meth:`predict` begins with the average
         future. Sample i is the one drawn alone with seed + i. append, channels and errors: like :meth:`predict`;
         progress: called with the number of samples done and in total. DecodingError unless samples is 1 to MAX_SAMPLES.
         """

@@ -1,4 +1,4 @@
-/* What a steered figure is told to do, laid over its steps: docs/bundle.md, "Acts". */
+/* What a steered figure is told to do, laid over its steps: docs/reference/bundle.md, "Acts". */
 import { ACTING, MATCHING, actSettings } from "./generated.js";
 import { type Act, stepOf } from "./acts.js";
 import type { ControlModel } from "./control.js";

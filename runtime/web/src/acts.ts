@@ -1,4 +1,4 @@
-/* Acts, short motions of the humanoid that a steered figure can be told to do: docs/bundle.md, "Acts". */
+/* Acts, short motions of the humanoid that a steered figure can be told to do: docs/reference/bundle.md, "Acts". */
 import { ACTS } from "./generated.js";
 import type { ControlModel } from "./control.js";
 import { ControlError } from "./errors.js";

@@ -1,6 +1,6 @@
 /*
  * How joints stand against the humanoid's bones: of each joint the rotation A with which a bone turns as G A, where G is
- * the joint's rotation in the world. From a pose that is a standing body: docs/retargeting.md, "Rest poses that stand".
+ * the joint's rotation in the world. From a pose that is a standing body: docs/reference/retargeting.md, "Rest poses that stand".
  */
 import type { Body } from "./body.js";
 import { ARM, directionOf, LEG, SIDES } from "./humanoid.js";

@@ -22,7 +22,7 @@ export interface Limits {
   longest: number;
 }
 
-/** The most probable sequences for a context (1, C), best first: docs/bundle.md, the loop `beam`. */
+/** The most probable sequences for a context (1, C), best first: docs/reference/bundle.md, the loop `beam`. */
 export async function beamSearch(step: Graph, context: NumberArray<Float32Array>, limits: Limits, beams: number): Promise<Hypothesis[]> {
   const { start, end, banned, longest } = limits;
   let kept: Open[] = [{ ids: [], score: 0, ended: false }];

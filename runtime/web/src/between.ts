@@ -1,4 +1,4 @@
-/* Filling gaps of placed frames: docs/bundle.md, the loop `between`. Three numbers of place, then two axes a bone. */
+/* Filling gaps of placed frames: docs/reference/bundle.md, the loop `between`. Three numbers of place, then two axes a bone. */
 import { PLACED } from "./generated.js";
 import { stacked } from "./arrays.js";
 import type { Graph } from "./graph.js";

@@ -5,7 +5,7 @@ import { type GraphSpec, Graph, type SessionSettings } from "./graph.js";
 import { checkManifest, isObject } from "./manifestChecks.js";
 import { openZip, type Archive } from "./zip.js";
 
-/** manifest.json, as docs/bundle.md describes it. */
+/** manifest.json, as docs/reference/bundle.md describes it. */
 export interface Manifest {
   format: number;
   name: string;

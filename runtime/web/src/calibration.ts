@@ -1,4 +1,4 @@
-/* A of joints from frames, where the rest pose is no body's: docs/retargeting.md, "Rest poses that do not stand". */
+/* A of joints from frames, where the rest pose is no body's: docs/reference/retargeting.md, "Rest poses that do not stand". */
 import { ALIGNMENT } from "./generated.js";
 import { frame, knownAxes, meanDirection, nearAxes } from "./alignment.js";
 import type { Body } from "./body.js";

@@ -1,4 +1,4 @@
-/* Frames of steps of codes, and steps of codes of frames: docs/bundle.md, the loop `codes`. */
+/* Frames of steps of codes, and steps of codes of frames: docs/reference/bundle.md, the loop `codes`. */
 import { CODEC } from "./generated.js";
 import { integers, stacked } from "./arrays.js";
 import type { Graph } from "./graph.js";

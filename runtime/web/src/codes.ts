@@ -1,4 +1,4 @@
-/* Motions drawn code by code: docs/bundle.md, the loop `codes`. */
+/* Motions drawn code by code: docs/reference/bundle.md, the loop `codes`. */
 import { CODES, MEMORY } from "./generated.js";
 import { integers, type NumberArray } from "./arrays.js";
 import { type Graph, taken } from "./graph.js";

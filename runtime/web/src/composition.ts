@@ -1,4 +1,4 @@
-/* Sentences that ask for several things in a row, as parts: docs/bundle.md, "Several things in one text". */
+/* Sentences that ask for several things in a row, as parts: docs/reference/bundle.md, "Several things in one text". */
 import { COMPOSITION } from "./generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
 const THEN = /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*/iu;

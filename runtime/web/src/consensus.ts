@@ -1,4 +1,4 @@
-/* The sentence that agrees best with many drawn ones: docs/bundle.md, the loop `consensus`. */
+/* The sentence that agrees best with many drawn ones: docs/reference/bundle.md, the loop `consensus`. */
 import { integers, type NumberArray } from "./arrays.js";
 import type { Hypothesis, Limits } from "./beam.js";
 import { type Graph, taken } from "./graph.js";

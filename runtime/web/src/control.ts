@@ -120,7 +120,7 @@ function configOf({ config, motion: { channels } }: Manifest, codes: number): { 
   return { names, speeds, odd };
 }
 
-/** The model of a bundle, whose tables are checked: docs/bundle.md, the loop `matching`. */
+/** The model of a bundle, whose tables are checked: docs/reference/bundle.md, the loop `matching`. */
 export async function controlModel(bundle: Bundle): Promise<ControlModel> {
   return new ControlModel(bundle.manifest, await tablesOf(bundle));
 }

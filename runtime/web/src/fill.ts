@@ -10,7 +10,7 @@ export class FillModel extends Model {
     super(manifest);
   }
 
-  /** The frames between those before a gap (P, E) and those after it (A, E), all placed (docs/bundle.md, Fill). */
+  /** The frames between those before a gap (P, E) and those after it (A, E), all placed (docs/reference/bundle.md, Fill). */
   async fill(past: Frames, after: Frames, count: number): Promise<Float64Array[]> {
     const width = Number(this.graphs.filler!.spec.inputs[0]!.shape[2]);
     const [least, context] = [this.setting("least"), this.setting("context")];

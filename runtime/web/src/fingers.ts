@@ -11,7 +11,7 @@ const SHARES = Object.entries(RETARGET.FINGER_SHARES).map(([words, share]): [Reg
 const THUMB = 0;
 const INDEX = 1;
 
-/** Local rotations of a pose with its hands relaxed (docs/retargeting.md, "Fingers"); joints: of "leftHand", "rightHand". */
+/** Local rotations of a pose with its hands relaxed (docs/reference/retargeting.md, "Fingers"); joints: of "leftHand", "rightHand". */
 export function relaxed(skeleton: Skeleton, still: Quaternion[], joints: Record<string, number>): Quaternion[] {
   const bent = [...still];
   const turns: Quaternion[] = [];

@@ -1,4 +1,4 @@
-/* A foot lock for live figures, standing feet stay in place without look-ahead: docs/bundle.md, "The foot lock". */
+/* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
 import { LOCK, footLockSettings } from "./generated.js";
 import { BONES, HUMANOID, LEG, SIDES, SOLES } from "./humanoid.js";
 import { TwoBones } from "./twoBones.js";

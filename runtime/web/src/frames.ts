@@ -1,4 +1,4 @@
-/* Motions as the frames of a model, and back: docs/bundle.md, "Frames". */
+/* Motions as the frames of a model, and back: docs/reference/bundle.md, "Frames". */
 import type { Manifest } from "./bundle.js";
 import { DecodingError, MotionError } from "./errors.js";
 import { eulersOf, fromEuler } from "./euler.js";
@@ -115,7 +115,7 @@ function sixd(root: Quaternion[], places: Vector[], joints: Quaternion[][], fps:
   });
 }
 
-/** The turn about the vertical axis, smoothed over time, calm where the root is tilted: docs/bundle.md, "Frames". */
+/** The turn about the vertical axis, smoothed over time, calm where the root is tilted: docs/reference/bundle.md, "Frames". */
 function facingOf(root: Quaternion[], fps: number): number[] {
   const deviation = (4 / 30) * fps;
   const reach = Math.max(1, rounded(4 * deviation));

@@ -1,7 +1,7 @@
 import { type NumberArray, stacked } from "./arrays.js";
 import type { Arrays, Graph } from "./graph.js";
 
-/** The frames that follow seed frames (L, D): docs/bundle.md, the loop `free_run`. */
+/** The frames that follow seed frames (L, D): docs/reference/bundle.md, the loop `free_run`. */
 export async function freeRun(encoder: Graph, step: Graph, seed: ArrayLike<number>[], frames: number, horizon: number) {
   const seen = [...seed];
   const width = seed[0]!.length;

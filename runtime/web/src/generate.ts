@@ -130,7 +130,7 @@ export class GenerateModel extends LanguageModel {
     return this.drawn(text, noise, settings);
   }
 
-  /** What a text asks for one after another: docs/bundle.md, "Several things in one text". */
+  /** What a text asks for one after another: docs/reference/bundle.md, "Several things in one text". */
   async parts(text: string): Promise<string[]> {
     this.words(text);
     const found: string[] = [];
@@ -231,7 +231,7 @@ export class GenerateModel extends LanguageModel {
     })();
   }
 
-  /** How well a sentence is known, and the nearest known sentences: docs/bundle.md, the loop `codes`. */
+  /** How well a sentence is known, and the nearest known sentences: docs/reference/bundle.md, the loop `codes`. */
   async understood(text: string): Promise<Understood> {
     return this.known(text, await this.context(text));
   }

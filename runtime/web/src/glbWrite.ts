@@ -1,4 +1,4 @@
-/* Writing GLB files whose nodes are the humanoid in a T-pose: VRM Animation, docs/formats.md, and motions with a body. */
+/* Writing GLB files whose nodes are the humanoid in a T-pose: VRM Animation, docs/reference/formats.md, and motions with a body. */
 import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";

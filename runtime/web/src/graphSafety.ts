@@ -1,6 +1,6 @@
 /*
  * Graphs that could reach outside their own bytes, or never end, are refused before ONNX Runtime sees them:
- * docs/bundle.md, "What a reader has to refuse". The whole protocol buffer is walked, with every graph in an attribute.
+ * docs/reference/bundle.md, "What a reader has to refuse". The whole protocol buffer is walked, with every graph in an attribute.
  */
 import { GRAPH_SAFETY } from "./generated.js";
 import { BundleError } from "./errors.js";

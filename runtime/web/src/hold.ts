@@ -1,4 +1,4 @@
-/* Holding the feet of a whole motion: docs/retargeting.md, "Planting of feet". */
+/* Holding the feet of a whole motion: docs/reference/retargeting.md, "Planting of feet". */
 import { CONTACTS, holdSettings } from "./generated.js";
 import { groundUnder, HUMANOID, isHumanoid, LEG, SIDES, solePoints } from "./humanoid.js";
 import { TwoBones } from "./twoBones.js";

@@ -1,4 +1,4 @@
-/* Which joint of a skeleton is which bone of the humanoid, by the names of joints: docs/retargeting.md, "The tables of names". */
+/* Which joint of a skeleton is which bone of the humanoid, by the names of joints: docs/reference/retargeting.md, "The tables of names". */
 import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { ARM, LEG, SIDES } from "./humanoid.js";

@@ -1,4 +1,4 @@
-/* What a motion shows, answered from known motions that are near it: docs/bundle.md, "Describe". */
+/* What a motion shows, answered from known motions that are near it: docs/reference/bundle.md, "Describe". */
 import { KNOWN, answerSettings } from "./generated.js";
 import type { Bundle, Manifest } from "./bundle.js";
 import { BundleError } from "./errors.js";

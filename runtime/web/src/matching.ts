@@ -1,4 +1,4 @@
-/* Motion matching, which recorded frame a figure plays next: docs/bundle.md, the loop `matching`. Metres, seconds, radians. */
+/* Motion matching, which recorded frame a figure plays next: docs/reference/bundle.md, the loop `matching`. Metres, seconds, radians. */
 import { MATCHING, STEER, steeringSettings } from "./generated.js";
 import { Goals, UNIT } from "./goals.js";
 import type { Pose as Ground } from "./planar.js";

@@ -1,4 +1,4 @@
-/* How a figure stands against the humanoid, measured once: docs/retargeting.md. */
+/* How a figure stands against the humanoid, measured once: docs/reference/retargeting.md. */
 import { MEASURE } from "./generated.js";
 import { alignmentsOfPose, axesAgree, bodyFrame, RADIANS, restsInMotion } from "./alignment.js";
 import { Body } from "./body.js";

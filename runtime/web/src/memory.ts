@@ -8,7 +8,7 @@ interface Course {
   over: number[];
 }
 
-/** Remembered steps of codes: docs/bundle.md, the loop `codes`. */
+/** Remembered steps of codes: docs/reference/bundle.md, the loop `codes`. */
 export class Memory {
   readonly steps: number;
   readonly ages: Int32Array;

@@ -13,7 +13,7 @@ export interface Pose {
 
 const ROOT = ["root.forward", "root.left", "root.turn", "root.height"];
 
-/** Poses of frames in `root_sixd` (docs/bundle.md, Frames), from the origin, facing z; such as `generate` gives. */
+/** Poses of frames in `root_sixd` (docs/reference/bundle.md, Frames), from the origin, facing z; such as `generate` gives. */
 export function posesOf(frames: Frames, manifest: Manifest): Pose[] {
   return poser(manifest)(frames);
 }

@@ -1,4 +1,4 @@
-/* Motions of any human figure to the humanoid and back: docs/retargeting.md. */
+/* Motions of any human figure to the humanoid and back: docs/reference/retargeting.md. */
 import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";

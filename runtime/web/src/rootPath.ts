@@ -1,4 +1,4 @@
-/* The path over the ground that feet imply: docs/retargeting.md, "Clips in place". */
+/* The path over the ground that feet imply: docs/reference/retargeting.md, "Clips in place". */
 import { CONTACTS, treadmillSettings } from "./generated.js";
 import { rise, rounded, smoothed } from "./numbers.js";
 

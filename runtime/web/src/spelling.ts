@@ -1,4 +1,4 @@
-/* Misspelt words: docs/bundle.md, "Text". */
+/* Misspelt words: docs/reference/bundle.md, "Text". */
 import { stem } from "./composition.js";
 
 /** The known word that a misspelt one is meant to be; "" where that is not clear. */

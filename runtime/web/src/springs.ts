@@ -1,4 +1,4 @@
-/* Critically damped springs: a distance from rest and its rate, some seconds later (docs/bundle.md, the loop `matching`). */
+/* Critically damped springs: a distance from rest and its rate, some seconds later (docs/reference/bundle.md, the loop `matching`). */
 
 /** The damping, 1/s, of a spring of about this half-life in seconds. */
 export function dampingOf(halfLife: number): number {

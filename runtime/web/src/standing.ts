@@ -1,4 +1,4 @@
-/* Figures that stand keep their place, and breathe: docs/bundle.md, "Standing". */
+/* Figures that stand keep their place, and breathe: docs/reference/bundle.md, "Standing". */
 import { STANDING } from "./generated.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";

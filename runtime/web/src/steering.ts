@@ -1,4 +1,4 @@
-/* The step of a steered figure: docs/bundle.md, the loop `matching`. Metres, seconds and radians. */
+/* The step of a steered figure: docs/reference/bundle.md, the loop `matching`. Metres, seconds and radians. */
 import { MATCHING } from "./generated.js";
 import { type Matcher, type Playback, type Target } from "./matching.js";
 import { moved, type Pose as Ground } from "./planar.js";

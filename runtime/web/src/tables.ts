@@ -30,7 +30,7 @@ import xsensBvh from "../../motet/figures/humanoid/conventions/xsens-bvh.json";
 import xsens from "../../motet/figures/humanoid/conventions/xsens.json";
 import type { Vector } from "./rotations.js";
 
-/** docs/retargeting.md, "The tables of names". */
+/** docs/reference/retargeting.md, "The tables of names". */
 export interface Table {
   title: string;
   prefixes?: string[];

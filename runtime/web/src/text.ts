@@ -6,7 +6,7 @@ import { corrected } from "./spelling.js";
 
 const [PAD, SOS, EOS, UNK] = [0, 1, 2, 3];
 
-/** From a sentence to the words that a model knows, and back: docs/bundle.md, "Text". */
+/** From a sentence to the words that a model knows, and back: docs/reference/bundle.md, "Text". */
 export class Vocabulary {
   static readonly SOS = SOS!;
   static readonly EOS = EOS!;

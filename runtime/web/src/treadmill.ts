@@ -1,4 +1,4 @@
-/* Clips in place: found by their feet, and given the path that these imply: docs/retargeting.md, "Clips in place". */
+/* Clips in place: found by their feet, and given the path that these imply: docs/reference/retargeting.md, "Clips in place". */
 import { CONTACTS, treadmillSettings } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { groundUnder, HUMANOID, isHumanoid, LEG_LENGTH, SIDES, solePoints } from "./humanoid.js";

@@ -1,4 +1,4 @@
-/* Legs go another way, hips turned with them and the spine back, and with other strides: docs/bundle.md, the loop `matching`. */
+/* Legs go another way, hips turned with them and the spine back, and with other strides: docs/reference/bundle.md, the loop `matching`. */
 import { WARPING } from "./generated.js";
 import { legOf, OFFSETS, reach } from "./footLock.js";
 import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "./humanoid.js";

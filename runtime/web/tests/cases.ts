@@ -20,7 +20,7 @@ export function equal(found: unknown, wanted: unknown, what: string): void {
   if (one !== other) throw new Error(`${what}: ${one}, not ${other}`);
 }
 
-/** Within a ten-thousandth of the wanted numbers, as docs/bundle.md compares them. */
+/** Within a ten-thousandth of the wanted numbers, as docs/reference/bundle.md compares them. */
 export function close(found: ArrayLike<number>, given: ArrayLike<number | bigint>, what: string): void {
   const wanted = Array.from(given, Number);
   equal(found.length, wanted.length, `${what}, how many`);

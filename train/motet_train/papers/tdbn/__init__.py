@@ -1,1 +1,1 @@
-"""The thesis: a temporal deep belief net of RBM and CRBM for live control; its page is docs/control.md."""
+"""The thesis: a temporal deep belief net of RBM and CRBM for live control; its page is docs/results/tdbn.md."""

@@ -1,6 +1,6 @@
 """Control nets: the temporal deep belief net (thesis, chapter 4), and its baseline straight on the joint angles.
 
-Where the thesis' text and its author's code differ, the default follows what works (docs/control.md shows both):
+Where the thesis' text and its author's code differ, the default follows what works (docs/results/tdbn.md shows both):
 control units stay clamped in the reconstruction, binary layers are annealed, and the root's rotation is among the
 channels; :meth:`TDBNConfig.thesis` is the text.
 

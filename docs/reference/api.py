@@ -1,4 +1,4 @@
-"""Write the reference of the Python interface, docs/api.md, from signatures and docstrings: ``python docs/api.py``."""
+"""Write the reference of the Python interface, docs/reference/api.md, from signatures and docstrings: ``python docs/reference/api.py``."""
 
 import ast
 import inspect
@@ -16,12 +16,12 @@ PAGE = Path(__file__).with_suffix(".md")
 HEAD = """# The Python interface
 
 All public names of `motet`, then those of `motet.motion`, in the order of the alphabet. This page is made from
-docstrings by `python docs/api.py`; [architecture.md](architecture.md) has the conventions.
+docstrings by `python docs/reference/api.py`; [architecture.md](architecture.md) has the conventions.
 """
 
 
 def page() -> str:
-    """The text of docs/api.md."""
+    """The text of docs/reference/api.md."""
     geometry = [name for name in motet.motion.__all__ if name not in motet.__all__]
     parts = [HEAD]
     for module, names in ((motet, motet.__all__), (motet.motion, geometry)):

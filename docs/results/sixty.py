@@ -1,5 +1,5 @@
-"""Draw what the bundle `generate` shows for the sentences of docs/sixty.tsv, two seeds each, and print what it says of
-them: `python docs/sixty.py`. docs/sixty.md tells how they were judged."""
+"""Draw what the bundle `generate` shows for the sentences of docs/results/sixty.tsv, two seeds each, and print what it
+says of them: `python docs/results/sixty.py`. docs/results/sixty.md tells how they were judged."""
 
 import csv
 import warnings
@@ -16,7 +16,7 @@ from motet_train.evaluate.figures import bodies, panels, save
 from motet_train.evaluate.text_adherence.track import track_of
 
 TABLE = Path(__file__).with_suffix(".tsv")
-FOLDER = Path(__file__).parent / "figures"
+FOLDER = Path(__file__).parents[1] / "figures"
 SEEDS = (0, 1)
 PER_SHEET, POSES = 10, 10
 WARNED = " | warned"

@@ -1,7 +1,7 @@
 """The table of sentences that `generate` is trained on: those of the recordings, and those of the hand-keyed clips that
 show an act which no recording shows, with what the clips' own table says of each.
 
-    python docs/hand_keyed.py sentences.tsv sentences-cc0.tsv cc0-clips.zip > sentences-acts.tsv
+    python docs/results/hand_keyed.py sentences.tsv sentences-cc0.tsv cc0-clips.zip > sentences-acts.tsv
 
 Left out are gaits in place, twins of clips that travel, parts of acts, as of a jump, and acts that people recorded.
 """
