@@ -1,4 +1,4 @@
-"""Sizes and times of docs/live.md: python tests/live_ticks.py [BUNDLE]. Needs node.
+"""Sizes and times of docs/results/speed.md: python tests/live_ticks.py [BUNDLE]. Needs node.
 
 Times are of a tick, medians and 90th percentiles of 30 s of walking, running and standing.
 """

@@ -1,4 +1,4 @@
-"""Figures of docs/scale.md: python tests/ray_figures.py CLIPS [FILES]
+"""Figures of docs/results/speed.md: python tests/ray_figures.py CLIPS [FILES]
 
 Describes 10,000 files, one of a hundred broken, by one process and by Ray with two workers, one of which is killed, and
 compares the bytes of both answers. CLIPS is a folder of motions, whose first 2 s are cut to a hundred short ones; the

@@ -1,4 +1,4 @@
-"""How a command over many files scales: by one process and by several, what docs/scale.md says of it.
+"""How a command over many files scales: by one process and by several, what docs/results/speed.md says of it.
 
     python tests/scale_figures.py describe motions --json
     python tests/scale_figures.py --workers 1 2 -- describe motions --engine ray --parts {}

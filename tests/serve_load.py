@@ -1,4 +1,4 @@
-"""Figures of docs/serve.md: python tests/serve_load.py [REQUESTS] [CLIENTS] [SECONDS of each motion].
+"""Figures of docs/results/speed.md: python tests/serve_load.py [REQUESTS] [CLIENTS] [SECONDS of each motion].
 
 Clients ask a server at once, each for one motion after the other; every answer has to be the bytes that Python gives
 for it alone. Beside it the same motions by Python, one after the other and all at once, without a server.

@@ -17,7 +17,7 @@ from motet.models.load import load_as
 from motet.steering.model import SteerModel
 
 ROOT = Path(__file__).parents[1]
-PAGES = {path.relative_to(ROOT).as_posix(): path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"))}
+PAGES = {path.relative_to(ROOT).as_posix(): path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"))}
 CLIPS = {"walk": "39_14", "run": "09_07", "bend": "02_06"}
 """What files that pages only name, such as walk.bvh, are here."""
 

@@ -1,5 +1,5 @@
-"""What docs/reference/live-protocol.md says of the server's protocol: every message on the page is sent, and answered as it says; and the
-clients in examples/ say nothing else."""
+"""Every message of docs/reference/live-protocol.md is sent, and answered as the page says; and the clients in
+examples/ say nothing else."""
 
 import asyncio
 import json

@@ -1,4 +1,5 @@
-"""Write the reference of the Python interface, docs/reference/api.md, from signatures and docstrings: ``python docs/reference/api.py``."""
+"""Write the reference of the Python interface, docs/reference/api.md, from signatures and docstrings:
+``python docs/reference/api.py``."""
 
 import ast
 import inspect

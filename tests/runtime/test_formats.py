@@ -20,7 +20,7 @@ from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import FORMATS, MOCAP, READABLE, WRITABLE, read_motion, write_motion
 from motet.motion.motion import Motion
 
-DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
 
 
 def test_the_table_of_the_docs_is_made_of_the_formats() -> None:

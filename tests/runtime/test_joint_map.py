@@ -15,7 +15,7 @@ from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 
 SKELETONS = Path(__file__).parent / "skeletons"
-DOCS = Path(__file__).parents[2] / "docs" / "formats.md"
+DOCS = Path(__file__).parents[2] / "docs" / "reference" / "formats.md"
 
 
 def numbered() -> tuple[Motion, dict[str, object]]:

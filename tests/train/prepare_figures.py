@@ -1,4 +1,4 @@
-"""Figures of docs/scale.md: python tests/train/prepare_figures.py CLIPS [HOURS...]
+"""Figures of docs/results/speed.md: python tests/train/prepare_figures.py CLIPS [HOURS...]
 
 How much memory, time and disk `motet prepare --for all` takes of so many hours: the motions of the folder CLIPS, at 30
 frames a second, repeated by links until they are as many.

@@ -1,4 +1,4 @@
-"""Figures of docs/scale.md: python tests/train/training_curves.py
+"""Figures of docs/results/speed.md: python tests/train/training_curves.py
 
 Trains a small net to describe for 500 steps by one process, by two that torchrun starts, and by one that computes each
 batch in four parts, without what is drawn at random, and prints how far their curves and weights are apart.

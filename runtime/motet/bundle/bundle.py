@@ -1,8 +1,8 @@
 """The bundle: a folder or zip with graphs and a manifest of everything needed to run them.
 
 ``manifest.json`` lists every other file with size and sha256; a file is checked whenever it is read, and a graph before
-ONNX Runtime gets it (:mod:`motet.bundle.graph_safety`). Nothing in a bundle is pickled or executed. docs/reference/bundle.md
-describes the format.
+ONNX Runtime gets it (:mod:`motet.bundle.graph_safety`). Nothing in a bundle is pickled or executed.
+docs/reference/bundle.md describes the format.
 """
 
 import hashlib

@@ -1,7 +1,8 @@
 """Golden vectors: inputs, noise and outputs of a bundle's graphs and of one whole run, to be computed again anywhere.
 
 They are arrays in an .npz: ``ROLE.in.NAME`` and ``ROLE.out.NAME`` of one call of each graph, ``run.in.NAME`` and
-``run.out.NAME`` of the run, whose settings are in the manifest. docs/reference/bundle.md says what the run of each verb is.
+``run.out.NAME`` of the run, whose settings are in the manifest. docs/reference/bundle.md says what the run
+of each verb is.
 """
 
 import math

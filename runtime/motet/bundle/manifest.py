@@ -1,4 +1,4 @@
-"""The manifest of a bundle or of a training run, read once and with types; docs/reference/bundle.md says what is in it."""
+"""The manifest of a bundle or of a training run, read once and with types (docs/reference/bundle.md)."""
 
 import hashlib
 import json

@@ -3,8 +3,8 @@
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
 binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions
 or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes "clip", "figure" or both. To
-add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of docs/reference/formats.md and
-the lists of corpora are built from.
+add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of
+docs/reference/formats.md and the lists of corpora are built from.
 """
 
 import logging

@@ -106,8 +106,8 @@ class Understood:
 
 
 class CodesModel(GenerateModel):
-    """A model that generates motion codes; docs/reference/bundle.md has its graphs and tables. A context is the log-probabilities
-    of actions."""
+    """A model that generates motion codes; docs/reference/bundle.md has its graphs and tables. A context is the
+    log-probabilities of actions."""
 
     SETTINGS = (FamiliaritySettings, ContinuationSettings)
     LOOPS = LOOPS

@@ -1,4 +1,6 @@
-"""What the server of live figures and its clients say to each other: JSON objects with a "type" (docs/reference/live-protocol.md).
+"""Messages between the server of live figures and its clients, JSON objects with a "type".
+
+docs/reference/live-protocol.md describes them for authors of clients.
 
 A client tells; the server gives frames. Quaternions are (x, y, z, w); metres; y is up, a figure faces z at 0 degrees
 and x at 90.

@@ -1,4 +1,4 @@
-"""What a motion shows, answered from known motions that are near it in a space of motions (docs/reference/bundle.md, Describe).
+"""What a motion shows, answered from known motions that are near it in a space of motions.
 
 Sentences are not compared with each other: all wordings of one kind of action count together, and a sentence is as
 good as the share of near motions that it would be right about (minimum Bayes risk, Kumar and Byrne 2004).
