@@ -141,7 +141,7 @@ def test_what_is_matched_costs_what_features_differ_and_leads_where_is_asked(mod
     found, matcher, play = session.matched, model.matcher, session.snapshot().playback
     assert (found.row == play.row + (play.part > 0.5)).all()
     trajectory = matcher.desired_trajectory(play, session.target, np.zeros(2, dtype=bool))
-    asked = matcher.asked(trajectory, found.row, found.mirrored.astype(int))
+    asked = matcher.desired_features(trajectory, found.row, found.mirrored.astype(int))
     own = matcher.table.features[found.mirrored.astype(int), found.row]
     least = ((asked.clip(-16, 16) - own) ** 2).sum(axis=1) / 2
     assert (found.cost >= least - 0.05 * (1 + least)).all()

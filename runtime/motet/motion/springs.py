@@ -37,3 +37,23 @@ def damped_path(off: Values, rate: Values, damping: float, seconds: float) -> Va
     """The integral of the distance of :func:`damped` over ``seconds`` (exact)."""
     rise, left = rate / damping + off, math.exp(-damping * seconds)
     return (rise + off - left * (rise + off + rise * damping * seconds)) / damping
+
+
+class Inertializer:
+    """Transitions without a jump (Bollo, "Inertialization: High-Performance Animation Transitions in Gears of War", GDC
+    2018): what a pose would jump by is added to what follows, as an offset that a critically damped spring fades.
+
+    half_life: of the offset, in seconds. The offset and its rate belong to the caller: floats or arrays of one shape.
+    """
+
+    def __init__(self, half_life: float) -> None:
+        self.damping = damping_of(half_life)
+
+    def transition(self, offset: Part, offset_rate: Part, jump: Part, jump_rate: Part) -> tuple[Part, Part]:
+        """The offset and its rate after a transition, where values, and their rates, were larger before it by ``jump``
+        and ``jump_rate``."""
+        return offset + jump, offset_rate + jump_rate
+
+    def update(self, offset: Part, offset_rate: Part, seconds: float, stretch: Part = 1.0) -> tuple[Part, Part]:
+        """The offset and its rate ``seconds`` later. stretch: how many times as long the fade takes."""
+        return damped(offset, offset_rate, self.damping / stretch, seconds)

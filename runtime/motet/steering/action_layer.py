@@ -206,7 +206,7 @@ class Acting:
     def _free(self, shown: Array, playback: Playback, target: Array, gait: Rows, who: Rows) -> None:
         """Let the legs of figures (n,) go on from the rows that fit best after what is shown, features of it."""
         matcher, table = self.matcher, self.matcher.table
-        ahead = matcher.desired_trajectory(playback, target, matcher.creeping(target[who], gait[who]), who)
+        ahead = matcher.desired_trajectory(playback, target, matcher.is_slow_walk(target[who], gait[who]), who)
         wanted = (ahead - table.mean[:TRAJECTORY]) * table.scale[:TRAJECTORY]
         query = matcher.query(np.concatenate([wanted, self._scaled(shown)], axis=1).astype(np.float32))
         playback.row[who], playback.mirror[who], _ = matcher.best(query, gait[who])

@@ -24,8 +24,8 @@ class Matched(NamedTuple):
 def matched(matcher: Matcher, playback: Playback, target: Array, gait: Rows) -> Matched:
     """What figures play whose target is (B, 3) velocity along x and z, and facing, in gaits (B,)."""
     row, mirror = playback.row + (playback.part > 0.5), playback.mirror
-    trajectory = matcher.desired_trajectory(playback, target, matcher.creeping(target, gait))
-    asked = matcher.asked(trajectory, row, mirror)
+    trajectory = matcher.desired_trajectory(playback, target, matcher.is_slow_walk(target, gait))
+    asked = matcher.desired_features(trajectory, row, mirror)
     query = matcher.query(asked)
     cost = matcher.cost_at(query, row, mirror) + (query.features[:, :-1].astype(np.float64) ** 2).sum(axis=1) / 2
     left, forward = trajectory[:, : 2 * HORIZONS].reshape(-1, HORIZONS, 2).swapaxes(0, 2)

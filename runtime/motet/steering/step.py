@@ -1,9 +1,9 @@
 """The loop of a steered figure: recorded frames are played in turn and matched with the target.
 
-What is asked, a velocity and a facing, is approached by critically damped springs. Recordings are played a little
-slower or faster, with shorter or longer strides, to go as fast as the springs, and hips and legs are turned
-(:mod:`motet.steering.warping`), to go where they do. Letters as in :mod:`motet.steering.matching`, which says what is
-played; and J bones, P = 4 J + 1 numbers of a pose.
+The target, a velocity and a facing, is approached by critically damped springs. Recordings are played a little slower
+or faster, with shorter or longer strides, to go as fast as the springs, and hips and legs are turned
+(:mod:`motet.steering.warping`), to go where they do. Letters as in :mod:`motet.steering.matching`, which searches what
+is played; and J bones, P = 4 J + 1 numbers of a pose.
 """
 
 from collections.abc import Mapping
@@ -23,12 +23,9 @@ from motet.motion.scalar_or_batch import (
     computed,
     joined,
     larger,
-    minus,
     parts,
-    plus,
     single,
     smaller,
-    times,
     where,
     wrapped,
 )
@@ -40,23 +37,22 @@ from motet.steering.settings import SteeringSettings
 from motet.steering.warping import strided, warped
 
 BLOCK = 64
-"""Poses of a product: so few that OpenBLAS starts no threads, which on a busy machine wait for each other."""
+"""Poses of a product: few enough that OpenBLAS starts no threads, which on a busy machine wait for each other."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseCodes:
-    """Poses in few numbers: quaternions and the hips' height are a linear map of codes.
-
-    mean: (P,) the pose whose codes are 0. basis: (K, P) what each code adds to it, of float16; both float64.
-    """
+    """Poses in few numbers: quaternions and the hips' height are a linear map of codes. Both float64."""
 
     mean: Array
+    """(P,) the pose whose codes are 0."""
     basis: Array
+    """(K, P) what each code adds to it, of float16."""
 
     def decode(self, codes: Array) -> tuple[Floats, Floats]:
         """Codes (B, K) to unit quaternions (B, J, 4) and the hips' height (B,) in metres, both float32. In memory the
         figures are last, along which all that follows is computed."""
-        # so that sums are exact, and a pose is the same alone as in a block: the basis has multiples of 2^-24
+        # rounded to make sums exact, and a pose the same alone and in a block: the basis has multiples of 2^-24
         codes = np.rint(codes * 2**20) / 2**20
         values = np.empty((len(self.mean), len(codes)))
         for start in range(0, len(codes), BLOCK):
@@ -72,117 +68,198 @@ class PoseCodes:
         mean = self.mean[:-1].reshape(-1, 4)
         nearer = np.where((rotations * mean).sum(axis=2, keepdims=True) < 0, -rotations, rotations)
         values = np.concatenate([nearer.reshape(len(nearer), -1), height[:, None]], axis=1)
-        found: Array = np.matmul((values - self.mean)[:, None], self._inverse)[:, 0]
-        return found
+        codes: Array = np.matmul((values - self.mean)[:, None], self._inverse)[:, 0]
+        return codes
 
     @cached_property
     def _inverse(self) -> Array:
         return np.linalg.pinv(self.basis).astype(np.float64)
 
 
+class Recorded(NamedTuple):
+    """What figures play, relative to their facing."""
+
+    forward: Part
+    """Velocity forward, m/s."""
+    left: Part
+    """Velocity to the left, m/s."""
+    turn: Part
+    """Turn to the left, rad/s."""
+    speed: Part
+    """m/s, 0 for what has its own rate, such as a jump."""
+    way: Part
+    """The angle from the facing to where the recording goes."""
+    slow_walk: Part
+    """Whether they go more slowly than recordings do."""
+
+
+class Springs(NamedTuple):
+    """Where the springs that approach the target are."""
+
+    x: Part
+    """Velocity along x, m/s."""
+    z: Part
+    """Velocity along z, m/s."""
+    facing: Part
+    """Radians."""
+    pace: Part
+    """How fast that velocity is, m/s."""
+
+
+class Moved(NamedTuple):
+    """A figure after a tick."""
+
+    root: Vector
+    rate: Part
+    """The playback rate."""
+    stride_goal: Part
+    """The strides that the legs are to make, relative to the recorded ones."""
+
+
 def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, gait: Rows) -> Pose:
     """The next pose, 1 / fps seconds later; ``playback`` moves on.
 
-    target: (B, 3) velocity over the ground along x and z, and facing. gait: (B,) which.
+    target: (B, 3) velocity over the ground along x and z, and facing. gait: (B,) numbers.
     """
-    how, dt, table = matcher.settings, 1 / matcher.fps, matcher.table
+    dt = 1 / matcher.fps
+    # search: jump to another row where one fits better
     matcher.search(playback, target, gait)
-    part = playback.part + playback.rate
-    whole = np.floor(part)
-    playback.part, playback.row = part - whole, playback.row + whole.astype(np.int64)
-    played, _ = table.at(playback)
-    way = table.way[playback.mirror, playback.row]
-    forward, left, turn, speed = parts(played[:, -6:-2])
-    creeps = single(matcher.creeping(target, gait)) & (speed > 0)  # what has no speed, a jump, has its own rate
-    recorded = Recorded(forward, left, turn, speed, single(way), creeps)
-    _go(playback, recorded, _sprung(playback, parts(target), how, dt), how, dt)
-    playback.offset, playback.offset_rate = damped(playback.offset, playback.offset_rate, damping_of(how.blend), dt)
+    # playback: go on by the playback rate
+    _advance(playback)
+    played, _ = matcher.table.at(playback)
+    recorded = _recorded(matcher, playback, played, target, gait)
+    # the springs approach the target, and the root follows them
+    spring = _spring_update(playback, parts(target), matcher.settings, dt)
+    _follow(playback, recorded, spring, matcher.settings, dt)
+    # inertialization: the offset of the last jumps fades
+    playback.offset, playback.offset_rate = matcher.inertializer.update(playback.offset, playback.offset_rate, dt)
+    # the pose, warped
     rotations, height = body(poses, playback, played)
     return Pose(playback.root, rotations, height, played[:, -2:].astype(np.float32))
 
 
+def _advance(playback: Playback) -> None:
+    """Go on by the playback rate."""
+    part = playback.part + playback.rate
+    whole = np.floor(part)
+    playback.part = part - whole
+    playback.row = playback.row + whole.astype(np.int64)
+
+
+def _recorded(matcher: Matcher, playback: Playback, played: Array, target: Array, gait: Rows) -> Recorded:
+    """How the frames (B, K + 6) that figures play go."""
+    way = matcher.table.way[playback.mirror, playback.row]
+    forward, left, turn, speed = parts(played[:, -6:-2])
+    slow_walk = single(matcher.is_slow_walk(target, gait)) & (speed > 0)  # what has no speed has its own rate
+    return Recorded(forward, left, turn, speed, single(way), slow_walk)
+
+
 def body(poses: PoseCodes, playback: Playback, played: Array) -> tuple[Floats, Floats]:
-    """Rotations and height of figures that play numbers (B, K + 6) of the table, with their offset, turned and with
-    strides as they go."""
+    """Rotations and height of figures that play frames (B, K + 6) of the table, with their inertialization offset,
+    strides and warp."""
     rotations, height = poses.decode(played[:, :-6] + playback.offset)
-    strides = strided(rotations, played[:, -2:].astype(np.float32), playback.stride)
-    return warped(strides, playback.warp), height
+    rotations = strided(rotations, played[:, -2:].astype(np.float32), playback.stride)
+    return warped(rotations, playback.warp), height
 
 
-class Recorded(NamedTuple):
-    """What figures play: velocities forward and to the left, turn and speed, m/s and rad/s; the angle from the facing
-    to where the recording goes; and whether they creep."""
-
-    forward: Part
-    left: Part
-    turn: Part
-    speed: Part
-    way: Part
-    creeps: Part
-
-
-class Springs(NamedTuple):
-    """Where springs are: velocity along x and z, facing, and how fast that velocity is."""
-
-    x: Part
-    z: Part
-    facing: Part
-    pace: Part
-
-
-def _sprung(playback: Playback, asked: Vector, how: SteeringSettings, dt: float) -> Springs:
-    """The springs, as they have come nearer to what is asked."""
-    off_x, off_z, off_facing = minus(parts(playback.spring), asked)
-    offs, half_lives = (off_x, off_z, wrapped(off_facing)), (how.velocity, how.velocity, how.facing)
-    each = zip(offs, parts(playback.spring_rate), map(damping_of, half_lives), strict=True)
-    (x, rate_x), (z, rate_z), (facing, turn) = (damped(off, rate, damping, dt) for off, rate, damping in each)
-    x, z, facing = spring = plus(asked, (x, z, facing))
-    playback.spring, playback.spring_rate = joined(spring), joined((rate_x, rate_z, turn))
+def _spring_update(playback: Playback, target: Vector, settings: SteeringSettings, dt: float) -> Springs:
+    """The springs a tick later."""
+    spring_x, spring_z, spring_facing = parts(playback.spring)
+    rate_x, rate_z, rate_facing = parts(playback.spring_rate)
+    target_x, target_z, target_facing = target
+    velocity_damping = damping_of(settings.velocity)
+    facing_damping = damping_of(settings.facing)
+    error_x, rate_x = damped(spring_x - target_x, rate_x, velocity_damping, dt)
+    error_z, rate_z = damped(spring_z - target_z, rate_z, velocity_damping, dt)
+    error_facing, rate_facing = damped(wrapped(spring_facing - target_facing), rate_facing, facing_damping, dt)
+    x = target_x + error_x
+    z = target_z + error_z
+    facing = target_facing + error_facing
+    playback.spring = joined((x, z, facing))
+    playback.spring_rate = joined((rate_x, rate_z, rate_facing))
     return Springs(x, z, facing, computed(np.hypot, x, z))
 
 
-def _go(playback: Playback, recorded: Recorded, spring: Springs, how: SteeringSettings, dt: float) -> None:
-    """Move figures on as what they play goes, turned and with strides to go where the springs do."""
-    root, calm = parts(playback.root), damping_of(how.blend)
-    goal = _warp(recorded, spring, root[2], how)
-    off, warp_rate = damped(single(playback.warp) - goal, single(playback.warp_rate), calm, dt)
-    warp = goal + off
-    root, rate, goal = _moved(root, warp, single(playback.rate), recorded, spring, how, dt)
-    off, stride_rate = damped(single(playback.stride) - goal, single(playback.stride_rate), calm, dt)
-    playback.root, values = joined(root), joined((rate, warp, warp_rate, goal + off, stride_rate)).T
+def _follow(playback: Playback, recorded: Recorded, spring: Springs, settings: SteeringSettings, dt: float) -> None:
+    """Move figures on as their recordings go, warped to go where the springs do."""
+    root = parts(playback.root)
+    damping = damping_of(settings.blend)
+    # orientation warping: the legs turn towards the direction of travel
+    warp_goal = _warp(recorded, spring, root[2], settings)
+    warp_error = single(playback.warp) - warp_goal
+    warp_error, warp_rate = damped(warp_error, single(playback.warp_rate), damping, dt)
+    warp = warp_goal + warp_error
+    # the root goes as the warped legs do
+    moved = _moved(root, warp, single(playback.rate), recorded, spring, settings, dt)
+    # stride warping: the legs reach as far as the root goes
+    stride_error = single(playback.stride) - moved.stride_goal
+    stride_error, stride_rate = damped(stride_error, single(playback.stride_rate), damping, dt)
+    stride = moved.stride_goal + stride_error
+    playback.root = joined(moved.root)
+    values = joined((moved.rate, warp, warp_rate, stride, stride_rate)).T
     playback.rate, playback.warp, playback.warp_rate, playback.stride, playback.stride_rate = values
 
 
-def _warp(recorded: Recorded, spring: Springs, facing: Part, how: SteeringSettings) -> Part:
-    """By how many radians rows are to be turned to go where the springs do; 0 for those that stand, or go elsewhere
-    until the next search."""
+def _warp(recorded: Recorded, spring: Springs, facing: Part, settings: SteeringSettings) -> Part:
+    """Warp angle from the recorded to the desired direction of travel; 0 when idle or more than 90 degrees off."""
     angle = wrapped(computed(np.arctan2, spring.x, spring.z) - facing - recorded.way)
-    warps = (smaller(recorded.speed, spring.pace) > how.idle) & (abs(angle) <= np.pi / 2)
-    return where(warps, clipped(angle, -how.warp, how.warp), 0.0)
+    moves = smaller(recorded.speed, spring.pace) > settings.idle
+    warps = moves & (abs(angle) <= np.pi / 2)
+    return where(warps, clipped(angle, -settings.warp, settings.warp), 0.0)
 
 
 def _moved(
-    root: Vector, warp: Part, rate: Part, recorded: Recorded, spring: Springs, how: SteeringSettings, dt: float
-) -> tuple[Vector, Part, Part]:
-    """The next root and playback rate, and by how much legs are to make shorter strides."""
-    (x, z, facing), (velocity_x, velocity_z, faces, pace), creeps = root, spring, recorded.creeps
-    moving = creeps | (smaller(recorded.speed, pace) > how.idle)
-    ratio = pace / larger(recorded.speed, where(creeps, LEAST_PACE, how.idle))
-    forward, left, turn = times((recorded.forward, recorded.left, recorded.turn), rate * dt)
-    error = wrapped(faces - facing)
-    most = (how.turn_still + how.turn_moving * smaller(pace, how.turn_speed)) * dt + how.turn_turning * abs(turn)
-    turned = wrapped(facing + turn + clipped(error * (1 - 0.5 ** (dt / how.turn)), -most, most))
-    stride = where(moving, clipped(ratio / rate, where(creeps, 0.0, how.shortest), how.longest), 1.0)
-    sin, cos = computed(np.sin, facing + warp) * stride, computed(np.cos, facing + warp) * stride
-    step_x, step_z = sin * forward + cos * left, cos * forward - sin * left
-    # turned towards the velocity by a small angle, where the two do not go apart
-    along, across = step_x * velocity_x + step_z * velocity_z, step_z * velocity_x - step_x * velocity_z
-    veers = moving & (along > how.veer_within * abs(across))
-    angle = where(veers, clipped(computed(np.arctan, across / larger(along, 1e-6)), -how.veer, how.veer), 0.0)
-    slowest, rate = where(creeps, how.creep_slowest, how.slowest), where(creeps, root_of(ratio), ratio)
-    rate = where(moving, clipped(rate, slowest, how.fastest), 1.0)
-    moved = x + (step_x + angle * step_z), z + (step_z - angle * step_x), turned
-    return moved, rate, where(creeps, smaller(stride, 1.0), 1.0)
+    root: Vector, warp: Part, rate: Part, recorded: Recorded, spring: Springs, settings: SteeringSettings, dt: float
+) -> Moved:
+    """The root a tick later, the next playback rate and the strides to be made. rate: the present playback rate."""
+    x, z, facing = root
+    slow_walk = recorded.slow_walk
+    moving = slow_walk | (smaller(recorded.speed, spring.pace) > settings.idle)
+    speed_ratio = spring.pace / larger(recorded.speed, where(slow_walk, LEAST_PACE, settings.idle))
+    # how far the recording goes in this tick
+    played_seconds = rate * dt
+    forward = recorded.forward * played_seconds
+    left = recorded.left * played_seconds
+    # turn as recorded, and a little more towards the facing of the springs
+    next_facing = wrapped(
+        facing + recorded.turn * played_seconds + _facing_correction(root, rate, recorded, spring, settings, dt)
+    )
+    # stride: what the playback rate does not make up for of the speed
+    shortest = where(slow_walk, 0.0, settings.shortest)
+    stride = where(moving, clipped(speed_ratio / rate, shortest, settings.longest), 1.0)
+    # the step over the ground, turned as the legs are
+    sin = computed(np.sin, facing + warp) * stride
+    cos = computed(np.cos, facing + warp) * stride
+    step_x = sin * forward + cos * left
+    step_z = cos * forward - sin * left
+    # heading correction: the step turned towards the velocity of the springs, by a small angle
+    correction = where(moving, _heading_correction(step_x, step_z, spring, settings), 0.0)
+    next_root = x + (step_x + correction * step_z), z + (step_z - correction * step_x), next_facing
+    # the next playback rate: as fast as the springs; a slow walk shares the slowness between rate and stride
+    slowest = where(slow_walk, settings.creep_slowest, settings.slowest)
+    playback_rate = where(slow_walk, root_of(speed_ratio), speed_ratio)
+    playback_rate = where(moving, clipped(playback_rate, slowest, settings.fastest), 1.0)
+    return Moved(next_root, playback_rate, where(slow_walk, smaller(stride, 1.0), 1.0))
+
+
+def _facing_correction(
+    root: Vector, rate: Part, recorded: Recorded, spring: Springs, settings: SteeringSettings, dt: float
+) -> Part:
+    """How much more than recorded figures turn in a tick, towards the facing of the springs."""
+    error = wrapped(spring.facing - root[2])
+    recorded_turn = recorded.turn * (rate * dt)
+    most_turn_rate = settings.turn_still + settings.turn_moving * smaller(spring.pace, settings.turn_speed)
+    most = most_turn_rate * dt + settings.turn_turning * abs(recorded_turn)
+    return clipped(error * (1 - 0.5 ** (dt / settings.turn)), -most, most)
+
+
+def _heading_correction(step_x: Part, step_z: Part, spring: Springs, settings: SteeringSettings) -> Part:
+    """The angle from a step to the velocity of the springs, 0 where the two go apart."""
+    along = step_x * spring.x + step_z * spring.z
+    across = step_z * spring.x - step_x * spring.z
+    near = along > settings.veer_within * abs(across)
+    angle = computed(np.arctan, across / larger(along, 1e-6))
+    return where(near, clipped(angle, -settings.veer, settings.veer), 0.0)
 
 
 LOOPS: Mapping[str, Loop] = {"matching": Loop(tick, {}, {})}

@@ -455,10 +455,10 @@ export const LOOKING = {
 export const MATCHING = {
   // The slowest that a figure goes, m/s.
   LEAST_PACE: 0.1,
-  // The features that say where a row goes: places (left, forward) at each of the horizons, facings (sin, cos), and the speed at the second of them. The others say how it is now, all seen from the facing: places and velocities of the balls of both feet, three numbers each, the hips' velocity, and the places of both hands.
+  // Number of features of a row's trajectory: places (left, forward) at each of the horizons, facings (sin, cos), and the speed at the second of them. The features after them are of the pose, all seen from the facing: places and velocities of the balls of both feet, three numbers each, the hips' velocity, and the places of both hands.
   TRAJECTORY: 13,
   FEATURES: 34,
-  // Rows before and after a row that are a stride, over which the hips' sway is none.
+  // Rows before and after a row that make up a stride, over which the hips' sway is none.
   STRIDE_ROWS: 15,
   STEPS: 256,
 } as const;
