@@ -88,7 +88,7 @@ def test_a_window_puts_the_root_back_where_it_was(mirrored: bool) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-4)
     led = way_of(np.zeros(3), net.book.numpy()[window.moves[0]].astype(np.float64))
     np.testing.assert_allclose(window.way[0], np.repeat(led[:-1], 4, axis=0), atol=1e-5)
-    np.testing.assert_array_equal(window.given[0], frames[:-1].astype(np.float32))
+    np.testing.assert_array_equal(window.inputs[0], frames[:-1].astype(np.float32))
     assert len(window[:1]) == len(window) == 1
 
 
@@ -216,7 +216,7 @@ def test_windows_are_parts_of_recordings_half_of_them_mirrored(store: Path) -> N
             part = np.array(found[start : start + 16])
             parts[part[:, 3:].tobytes()] = record, False
             parts[contract.mirror(part)[:, 3:].astype(np.float32).tobytes()] = record, True
-    seen = [parts[given[:, 3:].numpy().tobytes()] for given in drawn.given]
+    seen = [parts[given[:, 3:].numpy().tobytes()] for given in drawn.inputs]
     assert {record for record, _ in seen} == {3, 5, 8}
     assert 15 < sum(mirrored for _, mirrored in seen) < 45
     assert drawn.moves.max() < 8
@@ -244,15 +244,15 @@ def test_windows_of_what_is_badly_shown_are_drawn_oftener(store: Path) -> None:
     middles = list(windows.middles(book))
     for record, window in zip((0, 4, 8), middles, strict=True):
         sequence = opened.sequence(record)
-        np.testing.assert_array_equal(window.given[0], sequence[(len(sequence) - 16) // 2 :][:16])
+        np.testing.assert_array_equal(window.inputs[0], sequence[(len(sequence) - 16) // 2 :][:16])
     windows.favour(np.array([1.0, 4.0, 9.0]))
     np.testing.assert_allclose(windows.chances / before, np.array([1, 4, 9]) / (before @ [1, 4, 9]))
     tree = tree_of(opened.contract(range(20)))
-    net = MotionCodec(CodecConfig(middles[0].given.shape[-1], tree, moves=8, width=12, blocks=1, fine=6)).eval()
+    net = MotionCodec(CodecConfig(middles[0].inputs.shape[-1], tree, moves=8, width=12, blocks=1, fine=6)).eval()
     net.book.copy_(torch.from_numpy(book))
     off = []
     for window in middles:
-        places = (net.decode(window.moves, net.encode(window.given)), window.frames)
+        places = (net.decode(window.moves, net.encode(window.inputs)), window.frames)
         found, true = (places_in_world(net, one, window.way).detach().numpy()[0] for one in places)
         off.append(np.linalg.norm((found - found[:, :1]) - (true - true[:, :1]), axis=-1).mean() ** 2)
     np.testing.assert_allclose(badly_shown(net, windows), off, rtol=1e-4)

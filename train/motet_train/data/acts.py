@@ -1,8 +1,8 @@
-"""Where one performance of an act ends and the next begins, in takes that show the same several times.
+"""Split takes that repeat an act into its single performances.
 
-A take of someone who sits down and rises, again and again, teaches to do so for as long; what a sentence asks for is
-done once. Each act of a take shows what the whole take shows, so that the sentences of the take are true of it.
-Letters in shapes: T frames, J joints.
+A take of someone who sits down and rises again and again would teach a model to repeat the act for as long, but a
+sentence asks for it once. Each act of a take shows everything that the take shows, so the take's sentences are true of
+it. Letters in shapes: T frames, J joints.
 """
 
 from itertools import pairwise
@@ -15,63 +15,80 @@ from motet.motion.rotations import Array
 from motet.representation.contract import named
 from motet_train.data.sixd_windows import poses_of
 
-LEAST, MOST = 4.0, 12.0
-"""Seconds of an act; a take that is not longer is one."""
+LEAST = 4.0
+"""Shortest act, in seconds."""
+
+MOST = 12.0
+"""Longest act, in seconds; a shorter take is a single act."""
 
 AHEAD = 0.4
-"""Seconds after a pose of which another pose tells what is being done."""
+"""Seconds from a pose to the later pose that is compared with it, so that movement counts as well as posture."""
 
-BACK, KNOWN = 0.4, 0.45
-"""Metres, of the joint that is farthest off, by which an act may end off its start, and a pose is off all that it
-shows: one foot that hops is an act of its own."""
+BACK = 0.4
+"""Largest distance of any joint, in metres, between the start and the end of an act."""
+
+KNOWN = 0.45
+"""Largest distance of any joint, in metres, at which an act still shows a pose: hopping on one foot is another act."""
 
 SHARE = 0.95
-"""Of a take's poses that each of its acts shows: starting and stopping are often shown once."""
+"""Share of a take's poses that each of its acts must show: starting and stopping are often shown only once."""
 
 
 def acts(motion: Motion) -> list[tuple[int, int]]:
-    """Spans of frames of the acts in a motion in ``root_sixd``, one after another; itself alone where it is none of
-    some that are alike, or short.
+    """Consecutive spans of frames (start, stop) of the acts in a motion in ``root_sixd``.
 
-    An act ends when the figure is first back in the pose and on the move in which it began, and has shown what there is
-    to show. What remains after the last is not shown.
+    An act ends when the figure has first returned to the pose and movement in which it began, and has shown all poses
+    of the take. What remains after the last act is left out. A take that is short, or does not repeat itself, is one
+    span.
     """
-    fps, end = motion.fps, len(motion)
-    if end <= MOST * fps:
-        return [(0, end)]
-    apart = _apart(_seen(motion))
+    if len(motion) <= MOST * motion.fps:
+        return [(0, len(motion))]
+    distances = _distances(_local_positions(motion))
     cuts = [0]
-    while (cut := _end(apart, cuts[-1], fps)) is not None:
+    cut = _end(distances, 0, motion.fps)
+    while cut is not None:
         cuts.append(cut)
-    return list(pairwise(cuts)) or [(0, end)]
+        cut = _end(distances, cut, motion.fps)
+    return list(pairwise(cuts)) or [(0, len(motion))]
 
 
-def _end(apart: Array, start: int, fps: float) -> int | None:
-    """Where the act that begins at a frame ends, by how far frames are from each other (T, T)."""
+def _end(distances: Array, start: int, fps: float) -> int | None:
+    """The end of the act that begins at frame ``start``, from the distances of frames (T, T)."""
     second = round(fps)
-    for stop in range(start + round(LEAST * fps), min(start + round(MOST * fps), len(apart))):
-        if apart[stop, start] <= BACK and np.mean(apart[start:stop].min(axis=0) <= KNOWN) >= SHARE:
-            return stop + int(np.argmin(apart[stop : stop + second, start]))
+    shortest = start + round(LEAST * fps)
+    longest = start + round(MOST * fps)
+    for stop in range(shortest, min(longest, len(distances))):
+        if distances[stop, start] > BACK:
+            continue
+        nearest_in_act = distances[start:stop].min(axis=0)
+        if np.mean(nearest_in_act <= KNOWN) >= SHARE:
+            # within the next second, cut where the figure is closest to its first pose
+            return stop + int(np.argmin(distances[stop : stop + second, start]))
     return None
 
 
-def _seen(motion: Motion) -> Array:
-    """Where joints are at each frame and AHEAD of it, (T, 2 J, 3) in metres, seen from where the figure then is."""
+def _local_positions(motion: Motion) -> Array:
+    """Positions of joints at each frame and AHEAD of it, (T, 2 J, 3) in metres, relative to the root at that frame."""
     ahead = round(AHEAD * motion.fps)
-    places = positions(named("root_sixd").motion(motion))
-    pose = poses_of(motion.values, motion.fps)[: len(places) - ahead]
+    world = positions(named("root_sixd").motion(motion))
+    pose = poses_of(motion.values, motion.fps)[: len(world) - ahead]
+    now_and_ahead = np.concatenate([world[: len(pose)], world[ahead:]], axis=1)
+    # translate to the root's place on the floor
     x, z, facing = (part[:, None] for part in pose.T)
-    both = np.concatenate([places[: len(pose)], places[ahead:]], axis=1)
-    aside, along = both[..., 0] - x, both[..., 2] - z
-    sin, cos = np.sin(facing), np.cos(facing)
-    return np.stack([cos * aside - sin * along, both[..., 1], sin * aside + cos * along], axis=-1)
+    side = now_and_ahead[..., 0] - x
+    forward = now_and_ahead[..., 2] - z
+    # turn to the root's facing
+    sin = np.sin(facing)
+    cos = np.cos(facing)
+    return np.stack([cos * side - sin * forward, now_and_ahead[..., 1], sin * side + cos * forward], axis=-1)
 
 
-def _apart(seen: Array) -> Array:
-    """How far frames (T, J, 3) are from each other (T, T): of each two the joint that is farthest."""
-    found = np.zeros((len(seen), len(seen)))
-    for joint in np.moveaxis(seen, 1, 0):
+def _distances(local: Array) -> Array:
+    """Distances (T, T) between frames (T, J, 3): for each pair, of the joint that is farthest."""
+    largest = np.zeros((len(local), len(local)))
+    for joint in np.moveaxis(local, 1, 0):
+        # |a - b|^2 = |a|^2 + |b|^2 - 2 a b
         squares = (joint**2).sum(axis=1)
-        np.maximum(found, squares[:, None] + squares - 2 * joint @ joint.T, out=found)
-    apart: Array = np.sqrt(found)
-    return apart
+        np.maximum(largest, squares[:, None] + squares - 2 * joint @ joint.T, out=largest)
+    distances: Array = np.sqrt(largest)
+    return distances

@@ -1,4 +1,4 @@
-"""Batches of motions with sentences, out of a store: motions of similar length together, little in memory at a time."""
+"""Draw batches of motions with sentences from a store; motions of a batch have similar lengths."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -23,19 +23,19 @@ from motet_train.data.store import Store
 Ids = NDArray[np.int64]
 
 Cut = Callable[[NDArray[Any], np.random.Generator], NDArray[Any]]
-"""What is seen of the frames (T, D) of a motion: some of them, perhaps changed."""
+"""Takes frames (T, D) of a motion and random numbers; gives an excerpt (T', D), perhaps changed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A batch: fields are tensors with a row for each of B things, or None."""
+    """A batch of B rows: each field is a tensor whose first axis is the rows, or None."""
 
     def __len__(self) -> int:
         """B."""
         return len(getattr(self, fields(self)[0].name))
 
     def __getitem__(self, rows: slice) -> Self:
-        """Some of the rows, padded like all of them."""
+        """A slice of the rows, with unchanged padding."""
         return self._each(lambda tensor: tensor[rows])
 
     def to(self, device: torch.device | str) -> Self:
@@ -43,18 +43,22 @@ class Rows:
         return self._each(lambda tensor: tensor.to(device))
 
     def _each(self, changed: Callable[[Tensor], Tensor]) -> Self:
-        tensors = {one.name: getattr(self, one.name) for one in fields(self)}
-        return replace(self, **{name: changed(tensor) for name, tensor in tensors.items() if tensor is not None})
+        tensors = {}
+        for field in fields(self):
+            tensor = getattr(self, field.name)
+            if tensor is not None:
+                tensors[field.name] = changed(tensor)
+        return replace(self, **tensors)
 
 
 @dataclass(frozen=True, eq=False)
 class Batch(Rows):
     """B motions of up to T frames, each with one sentence of up to W words, padded on the right.
 
-    frames: (B, T, D) float32 in the contract's units; finite, of any value, after the motion's end.
+    frames: (B, T, D) float32 in the contract's units; arbitrary finite values after the end of a motion.
     lengths: (B,) int64, frames of each motion, at least 1.
-    words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the sentence's end.
-    ended: (B,) bool, whether the motion ends after its last frame rather than being part of a longer one; None: all do.
+    words: (B, W) int64, ids without SOS and EOS; PAD = 0 after the end of the sentence.
+    ended: (B,) bool, False for an excerpt that stops before the end of its motion; None if all motions end.
     """
 
     frames: Tensor
@@ -65,9 +69,10 @@ class Batch(Rows):
 
 @dataclass(frozen=True, eq=False)
 class Examples:
-    """The motions of one part of a store, each with its sentences as ids, and the mirrored ones' where mirror is set.
+    """Motions of one part of a store with their sentences as word ids.
 
-    sentences: for each of ``records`` its sentences; mirrored: the same sentences, mirrored.
+    records: indices into the store. sentences: those of each record. mirrored: the same sentences with left and right
+    exchanged, empty without ``mirror``. mirror: mirrors frames.
     """
 
     store: Store
@@ -79,37 +84,55 @@ class Examples:
     def epoch(
         self, rng: np.random.Generator, batch: int, offsets: int | None = None, windows: tuple[int, int] | None = None
     ) -> Iterator[Batch]:
-        """Visit motions once in batches of at most ``batch``, each with one of its sentences, drawn afresh.
+        """Visit each motion once, in batches of at most ``batch``, each with one of its sentences drawn afresh.
 
-        Every down-sampling offset of a motion is a visit of its own; ``offsets`` draws only so many for each. With a
-        mirror every other visit, by chance, is to the mirrored motion and sentence. With ``windows`` a batch takes at
-        most :func:`drawn_length` frames of a motion, from a random place.
+        Every down-sampling offset of a motion is a visit of its own; ``offsets`` draws only so many of them. With a
+        mirror, half of the visits are to the mirrored motion and sentence. With ``windows`` a batch takes at most
+        :func:`drawn_length` frames of a motion, from a random start.
         """
         longest = windows[1] if windows else sys.maxsize
-        together = 16 * batch  # are sorted by length: more would waste less on padding, and mix motions less
-        visits = [
-            (i, int(offset))
-            for i, record in enumerate(self.records)
-            for offset in rng.permutation(len(self.store.records[record].spans))[:offsets]
-        ]
-        shuffled = [visits[i] for i in rng.permutation(len(visits))]
-        found = []
-        for start in range(0, len(shuffled), together):
-            near = sorted(shuffled[start : start + together], key=lambda visit: min(self._length(*visit), longest))
-            found += [near[i : i + batch] for i in range(0, len(near), batch)]
-        for place in rng.permutation(len(found)):
+        batches = self._batches(rng, batch, offsets, longest)
+        for place in rng.permutation(len(batches)):
             limit = drawn_length(rng, windows) if windows else sys.maxsize
-            yield _padded([self._visit(rng, i, offset, limit) for i, offset in found[place]])
+            yield _padded([self._visit(rng, i, offset, limit) for i, offset in batches[place]])
+
+    def _batches(
+        self, rng: np.random.Generator, batch: int, offsets: int | None, longest: int
+    ) -> list[list[tuple[int, int]]]:
+        """Visits (motion, offset) in random order, grouped into batches of similar length."""
+        # every motion at some or all of its offsets
+        visits = []
+        for i, record in enumerate(self.records):
+            for offset in rng.permutation(len(self.store.records[record].spans))[:offsets]:
+                visits.append((i, int(offset)))
+        shuffled = [visits[i] for i in rng.permutation(len(visits))]
+
+        def length(visit: tuple[int, int]) -> int:
+            return min(self._length(*visit), longest)
+
+        # sorting more motions together would waste less on padding, but mix them less
+        together = 16 * batch
+        batches = []
+        for start in range(0, len(shuffled), together):
+            similar = sorted(shuffled[start : start + together], key=length)
+            batches += [similar[i : i + batch] for i in range(0, len(similar), batch)]
+        return batches
 
     def everything(self, batch: int, longest: int | None = None) -> Iterator[Batch]:
         """The first ``longest`` frames of every motion, at its first offset, with each of its sentences: to validate.
 
         Sorted by length, never mirrored.
         """
-        pairs = [(i, sentence) for i, found in enumerate(self.sentences) for sentence in found]
+        pairs = []
+        for i, sentences in enumerate(self.sentences):
+            pairs += [(i, ids) for ids in sentences]
         pairs.sort(key=lambda pair: self._length(pair[0], 0))
         for start in range(0, len(pairs), batch):
-            yield _padded([(*self._part(i, 0, 0, longest or sys.maxsize), s) for i, s in pairs[start : start + batch]])
+            rows = []
+            for i, ids in pairs[start : start + batch]:
+                frames, ended = self._excerpt(i, 0, 0, longest or sys.maxsize)
+                rows.append((frames, ended, ids))
+            yield _padded(rows)
 
     def _length(self, i: int, offset: int) -> int:
         start, stop = self.store.records[self.records[i]].spans[offset]
@@ -117,42 +140,49 @@ class Examples:
 
     def _visit(self, rng: np.random.Generator, i: int, offset: int, longest: int) -> tuple[Floats, bool, Ids]:
         start = int(rng.integers(max(0, self._length(i, offset) - longest) + 1))
-        frames, ended = self._part(i, offset, start, longest)
+        frames, ended = self._excerpt(i, offset, start, longest)
         sentence = int(rng.integers(len(self.sentences[i])))
         if self.mirror is not None and rng.random() < 0.5:
             return self.mirror(frames), ended, self.mirrored[i][sentence]
         return frames, ended, self.sentences[i][sentence]
 
-    def _part(self, i: int, offset: int, start: int, longest: int) -> tuple[Floats, bool]:
-        """Frames of a motion, and whether it ends with them."""
+    def _excerpt(self, i: int, offset: int, start: int, longest: int) -> tuple[Floats, bool]:
+        """Up to ``longest`` frames of a motion, and whether the motion ends with them."""
         frames = self.store.sequence(self.records[i], offset)
-        ends = self.store.records[self.records[i]].ends and start + longest >= len(frames)
-        return frames[start : start + longest], ends
+        ended = self.store.records[self.records[i]].ends and start + longest >= len(frames)
+        return frames[start : start + longest], ended
 
 
 def drawn_length(rng: np.random.Generator, windows: tuple[int, int]) -> int:
-    """A number of frames between two, as often short as long on a logarithmic scale."""
+    """A number of frames drawn log-uniformly between two limits."""
     return round(float(np.exp(rng.uniform(*np.log(windows)))))
 
 
 def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirror: FrameMirror | None) -> Examples:
-    """The examples of those records that have a :func:`usable` sentence with a word of the vocabulary; DataError if
-    there are none."""
-    kept, sentences, mirrored = [], [], []
+    """The examples of those records that have a :func:`usable` sentence with a word of the vocabulary.
+
+    DataError if there are none.
+    """
+    kept = []
+    sentences = []
+    mirrored = []
     for record in records:
-        said = (s for s in store.records[record].sentences if usable(s))
-        found = [s for s in said if not vocabulary.ids.keys().isdisjoint(RULES.words(s))]
-        if found:
+        # a sentence without any known word teaches nothing
+        texts = []
+        for text in store.records[record].sentences:
+            if usable(text) and not vocabulary.ids.keys().isdisjoint(RULES.words(text)):
+                texts.append(text)
+        if texts:
             kept.append(record)
-            sentences.append(tuple(vocabulary.encode(s)[0] for s in found))
-            mirrored.append(tuple(vocabulary.encode(mirror_text(s))[0] for s in found) if mirror else ())
+            sentences.append(tuple(vocabulary.encode(text)[0] for text in texts))
+            mirrored.append(tuple(vocabulary.encode(mirror_text(text))[0] for text in texts) if mirror else ())
     if not kept:
         raise DataError(f"none of {len(records)} motions has a sentence of 1 to {MAX_WORDS} words that can be used")
     return Examples(store, tuple(kept), tuple(sentences), tuple(mirrored), mirror)
 
 
 def frame_mirror(contract: MotionContract) -> FrameMirror:
-    """How frames of a contract are mirrored; DataError where they cannot be."""
+    """The mirroring of frames of a contract; DataError if they cannot be mirrored."""
     try:
         return contract.mirror
     except MotionError as error:
@@ -160,7 +190,7 @@ def frame_mirror(contract: MotionContract) -> FrameMirror:
 
 
 def _padded(rows: Sequence[tuple[Floats, bool, Ids]]) -> Batch:
-    """Frames (T, D), whether the motion ends with them, and ids of a sentence, as one batch."""
+    """One batch of rows: frames (T, D), whether the motion ends with them, and the ids of a sentence."""
     frames, lengths = padded([frames for frames, _, _ in rows], "float32")
     sentences, _ = padded([sentence for _, _, sentence in rows], "int64")
     ended = torch.tensor([end for _, end, _ in rows])
@@ -183,10 +213,10 @@ class Pairs(Rows):
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """N motions, as they are and perhaps mirrored: M = 1 or 2 kinds.
+    """Views of N motions, as recorded (M = 1) or also mirrored (M = 2).
 
-    seen: (M, N, K, S), of each motion K views, of so many frames (N, K). sentences: of each kind and motion. groups:
-    (M, N).
+    seen: (M, N, K, S), K views of each motion. frames: (N, K), the lengths of these. sentences: by M and motion.
+    groups: (M, N), equal for motions with a sentence in common.
     """
 
     seen: Tensor
@@ -197,8 +227,10 @@ class Views:
     def only(self, motions: Sequence[int]) -> "Views":
         """Some of the motions."""
         rows = list(motions)
-        sentences = tuple(tuple(kind[row] for row in rows) for kind in self.sentences)
-        return Views(self.seen[:, rows], self.frames[rows], sentences, self.groups[:, rows])
+        sentences = []
+        for by_motion in self.sentences:
+            sentences.append(tuple(by_motion[row] for row in rows))
+        return Views(self.seen[:, rows], self.frames[rows], tuple(sentences), self.groups[:, rows])
 
     def epoch(self, rng: np.random.Generator, batch: int) -> Iterator[Pairs]:
         """Visit every motion once, with mirroring, view and two sentences drawn afresh."""
@@ -206,31 +238,72 @@ class Views:
         order = rng.permutation(motions)
         for start in range(0, motions, batch):
             rows = order[start : start + batch]
-            kind, view = rng.integers(kinds, size=len(rows)), rng.integers(views, size=len(rows))
-            said = [self.sentences[m][i] for m, i in zip(kind, rows, strict=True)]
-            words, others = (padded([s[rng.integers(len(s))] for s in said], "int64")[0] for _ in range(2))
+            # for each motion whether it is mirrored, and which view is seen
+            kind = rng.integers(kinds, size=len(rows))
+            view = rng.integers(views, size=len(rows))
+            # two of its sentences
+            sentences = [self.sentences[k][row] for k, row in zip(kind, rows, strict=True)]
+            words = _one_of_each(sentences, rng)
+            others = _one_of_each(sentences, rng)
             groups = torch.from_numpy(self.groups[kind, rows])
-            yield Pairs(self.seen[kind, rows, view], torch.from_numpy(words), torch.from_numpy(others), groups)
+            yield Pairs(self.seen[kind, rows, view], words, others, groups)
+
+
+def _one_of_each(sentences: Sequence[Sequence[Ids]], rng: np.random.Generator) -> Tensor:
+    """A random sentence of each motion, (B, W) int64."""
+    ids, _ = padded([choices[int(rng.integers(len(choices)))] for choices in sentences], "int64")
+    return torch.from_numpy(ids)
 
 
 def views(
-    examples: Examples, see: Callable[[Tensor, Tensor], Tensor], count: int, cut: Cut, seed: int, whole: bool = False
+    examples: Examples,
+    see: Callable[[Tensor, Tensor], Tensor],
+    count: int,
+    cut: Cut,
+    seed: int,
+    whole: bool = False,
 ) -> Views:
-    """``count`` views of each motion of the examples, of any offset.
+    """``count`` views of each motion of the examples, each of a random down-sampling offset.
 
     see: from frames (B, T, D) of lengths (B,) to the numbers (B, S) by which a net knows a motion; computed once.
-    cut: what is seen of frames (T, D). whole: one view more, the last, is of all frames.
+    cut: draws an excerpt of frames (T, D). whole: add a last view of all frames.
     """
-    rng, found, frames = np.random.default_rng(seed), [], []
+    rng = np.random.default_rng(seed)
+    mirror = examples.mirror
+    seen = []
+    frames = []
     for record in examples.records:
-        spans = len(examples.store.records[record].spans)
-        parts = [cut(examples.store.sequence(record, int(rng.integers(spans))), rng) for _ in range(count)]
-        parts += [examples.store.sequence(record).astype(np.float64)] * whole
-        mirrored = [] if examples.mirror is None else [examples.mirror(part) for part in parts]
-        frames.append(list(map(len, parts)))
-        given, lengths = padded([*parts, *mirrored], "float32")
-        found.append(see(torch.from_numpy(given), torch.from_numpy(lengths)))
-    sentences = (examples.sentences,) if examples.mirror is None else (examples.sentences, examples.mirrored)
-    seen = torch.stack(found).reshape(len(found), len(sentences), count + whole, -1).transpose(0, 1)
-    groups = alike([[ids.tobytes() for ids in said] for kind in sentences for said in kind])
-    return Views(seen, np.array(frames), sentences, np.array(groups, dtype=np.int64).reshape(len(sentences), -1))
+        excerpts = _excerpts(examples.store, record, count, cut, rng, whole)
+        frames.append(list(map(len, excerpts)))
+        if mirror is not None:
+            excerpts += [mirror(excerpt) for excerpt in excerpts]
+        # the net sees all views of a motion at once
+        rows, lengths = padded(excerpts, "float32")
+        seen.append(see(torch.from_numpy(rows), torch.from_numpy(lengths)))
+    sentences = (examples.sentences,) if mirror is None else (examples.sentences, examples.mirrored)
+    # (N, M K, S) becomes (M, N, K, S)
+    by_motion = torch.stack(seen).reshape(len(seen), len(sentences), count + whole, -1)
+    return Views(by_motion.transpose(0, 1), np.array(frames), sentences, _groups(sentences))
+
+
+def _excerpts(
+    store: Store, record: int, count: int, cut: Cut, rng: np.random.Generator, whole: bool
+) -> list[NDArray[Any]]:
+    """``count`` excerpts of a motion, and all of its frames if ``whole``."""
+    offsets = len(store.records[record].spans)
+    excerpts: list[NDArray[Any]] = []
+    for _ in range(count):
+        offset = int(rng.integers(offsets))
+        excerpts.append(cut(store.sequence(record, offset), rng))
+    if whole:
+        excerpts.append(store.sequence(record).astype(np.float64))
+    return excerpts
+
+
+def _groups(sentences: Sequence[Sequence[Sequence[Ids]]]) -> NDArray[np.int64]:
+    """Numbers (M, N), equal for motions that have a sentence in common."""
+    texts = []
+    for by_motion in sentences:
+        for of_motion in by_motion:
+            texts.append([ids.tobytes() for ids in of_motion])
+    return np.array(alike(texts), dtype=np.int64).reshape(len(sentences), -1)

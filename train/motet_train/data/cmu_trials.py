@@ -1,11 +1,11 @@
-"""Three CMU trials: the default clips of a control model, and motions for docs and tests; in the repository alone."""
+"""Three CMU trials, in the repository only: default clips of a control model, and motions for docs and tests."""
 
 from pathlib import Path
 
 from motet_train.data.errors import DataError
 
 CMU_FOLDER = Path(__file__).parent / "cmu"
-"""The wheel leaves it out."""
+"""Folder of the trials; not in the wheel."""
 
 CMU_CLIPS = {"walk": "39_14", "run": "09_07", "bend": "02_06"}
 """The default clips (thesis 5.1): CMU trials 39_14 and 09_07, and the first bend of 02_06."""

@@ -1,7 +1,7 @@
 """Corpora: motions with sentences, from the KIT Motion-Language data or from mocap files beside a table."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -15,21 +15,24 @@ from motet_train.data.archive import BROKEN, Archive
 from motet_train.data.errors import DataError
 from motet_train.data.table import Described, Gait, Person, person, read_table
 
-KIT_MOTION, KIT_SENTENCES = "_mmm.xml", "_annotations.json"
-"""Ends of the names of KIT's files."""
+KIT_MOTION = "_mmm.xml"
+"""Suffix of KIT's files of motion."""
+
+KIT_SENTENCES = "_annotations.json"
+"""Suffix of KIT's files of sentences."""
 
 NO_MOTION = "no motion file of this name"
-"""Why a clip of the table is skipped that none of the files is."""
+"""The reason for which a clip of the table is skipped if there is no file of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """One motion and what people said about it.
+    """One motion with its sentences.
 
-    subject: who moved, if the corpus tells. unseen: sentences whose wordings are for measuring, never for training.
-    take: what it is a part of that must not be divided; "" where it is a take of its own. action: what it shows, named
-    alike for all motions that show it; "" where that is not said. gaits: the ways of moving that it shows. loops:
-    whether it is one period of what repeats.
+    subject: the performer, "" if unknown. unseen: sentences reserved for measuring, never for training. take: shared by
+    motions that must not be divided between training and test; "" if the motion is a take of its own. action: the
+    action shown, named the same in all motions that show it; "" if unknown. gaits: the gaits that it shows. loops:
+    whether it is one period of a loop.
     """
 
     name: str
@@ -45,7 +48,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A motion of the corpus that cannot be used, and why."""
+    """A motion of the corpus that cannot be used, and the reason."""
 
     name: str
     reason: str
@@ -56,8 +59,8 @@ class Corpus:
     """A corpus on disk; iterating reads it anew, one motion at a time.
 
     paths: its folders and zips; later ones replace files of earlier ones. names: the motion files. kit: whether it is
-    KIT's. table: of sentences, None for motions alone. people: who moves in which clips. gaits: which motions show
-    them, in addition to what the table says.
+    KIT's. table: of sentences, None for motions alone. people: the performers of clips. unit: see :func:`motet.read`.
+    gaits: patterns of motions that show them, in addition to the gaits in the table.
     """
 
     paths: tuple[Path, ...]
@@ -69,12 +72,13 @@ class Corpus:
     gaits: tuple[Gait, ...] = ()
 
     def __len__(self) -> int:
-        """The number of motion files: each gives one Record or Skipped, or one for each of its clips."""
+        """The number of motion files; each gives a Record or Skipped, or one for each of its clips."""
         return len(self.names)
 
     def shard(self, shard: Shard) -> "Corpus":
-        """A part of it: files in a row, as many as of every other shard but for one; DataError if that is none."""
-        start, stop = (len(self) * number // shard.count for number in (shard.number - 1, shard.number))
+        """One of ``shard.count`` nearly equal runs of files; DataError if it is empty."""
+        start = len(self) * (shard.number - 1) // shard.count
+        stop = len(self) * shard.number // shard.count
         if start == stop:
             raise DataError(f"{len(self)} motion files are too few for {shard.count} shards")
         return replace(self, names=self.names[start:stop])
@@ -82,17 +86,19 @@ class Corpus:
     def __iter__(self) -> Iterator[Record | Skipped]:
         with Archive(*self.paths) as archive:
             if self.kit:
-                found = kit_recordings(archive, self.names)
+                items = kit_recordings(archive, self.names)
             else:
-                said = None if self.table is None else read_table(self.table)
-                found = recordings(archive, self.unit, said, self.people, self.names)
-            for item in found:
-                if isinstance(item, Record):
-                    action = item.action or item.take or item.name
-                    shown = (gait.name for gait in self.gaits if gait.shown(action, item.subject))
-                    yield replace(item, gaits=tuple(dict.fromkeys((*item.gaits, *shown))))
-                else:
-                    yield item
+                table = None if self.table is None else read_table(self.table)
+                items = recordings(archive, self.unit, table, self.people, self.names)
+            for item in items:
+                yield self._with_gaits(item) if isinstance(item, Record) else item
+
+    def _with_gaits(self, record: Record) -> Record:
+        """The record with the gaits whose patterns it matches."""
+        action = record.action or record.take or record.name
+        names = [*record.gaits]
+        names += [gait.name for gait in self.gaits if gait.shown(action, record.subject)]
+        return replace(record, gaits=tuple(dict.fromkeys(names)))
 
 
 def read_corpus(
@@ -103,37 +109,43 @@ def read_corpus(
     described: bool = True,
     gaits: tuple[Gait, ...] = (),
 ) -> Corpus:
-    """The corpus at ``paths``, folders and zips; DataError where there is none.
+    """The corpus at ``paths``, folders and zips; DataError if there is none.
 
-    With files ``*_annotations.json`` it is KIT's. Else it has motion files of the types .amc (with .asf) .bvh .npz
+    With files ``*_annotations.json`` it is KIT's. Otherwise it has motion files of the types .amc (with .asf) .bvh .npz
     .glb .vrma and a table of sentences: ``table``, or the only .tsv in the first folder, or the only one beside it.
     unit: the length unit of mocap files that do not state theirs, as in :func:`motet.read`. described: whether its
-    motions need sentences; if not, only a named table is used. people, gaits: see :class:`Corpus`.
+    motions need sentences; if not, a table is used only if it is named. people, gaits: see :class:`Corpus`.
     """
     places = (paths,) if isinstance(paths, Path) else tuple(paths)
     with Archive(*places) as archive:
-        names, motions = archive.names, motion_files(archive)
+        names = archive.names
+        motions = motion_files(archive)
     if any(name.endswith(KIT_SENTENCES) for name in names):
-        return Corpus(places, tuple(name for name in names if name.endswith(KIT_MOTION)), kit=True, gaits=gaits)
+        kit_motions = tuple(name for name in names if name.endswith(KIT_MOTION))
+        return Corpus(places, kit_motions, kit=True, gaits=gaits)
     if not motions:
         raise DataError(
             f"no motion files ({' '.join(MOCAP)}) in {', '.join(map(str, places))}, nor KIT's NNNNN{KIT_SENTENCES}"
         )
     if table is None and described:
-        path = places[0]
-        inside = sorted(path.glob("*.tsv")) if path.is_dir() else []
-        found = inside or sorted(path.absolute().parent.glob("*.tsv"))
-        if len(found) != 1:
-            raise DataError(
-                f"{path} needs one table of sentences (.tsv) in it or beside it, with the columns clip and sentence; "
-                f"found: {', '.join(map(str, found)) or 'none'}"
-            )
-        table = found[0]
+        table = _only_table(places[0])
     return Corpus(places, motions, False, table, people, unit, gaits)
 
 
+def _only_table(path: Path) -> Path:
+    """The only table in a folder, or else beside it or a zip; DataError if there is none or several."""
+    inside = sorted(path.glob("*.tsv")) if path.is_dir() else []
+    tables = inside or sorted(path.absolute().parent.glob("*.tsv"))
+    if len(tables) != 1:
+        raise DataError(
+            f"{path} needs one table of sentences (.tsv) in it or beside it, with the columns clip and sentence; "
+            f"found: {', '.join(map(str, tables)) or 'none'}"
+        )
+    return tables[0]
+
+
 def motion_files(archive: Archive) -> tuple[str, ...]:
-    """The motion files of an archive, in order of their names."""
+    """The motion files of an archive, sorted by name."""
     return tuple(name for name in archive.names if PurePosixPath(name).suffix.lower() in MOCAP)
 
 
@@ -144,73 +156,101 @@ def recordings(
     people: tuple[Person, ...] = (),
     files: Sequence[str] | None = None,
 ) -> Iterator[Record | Skipped]:
-    """The motion of each file of an archive, one of each clip's name; Skipped where it cannot be read or used.
+    """The motions of an archive's files; Skipped for a file that cannot be read or used.
 
-    A file of several motions gives each by the file's name and its own: "people#Walk".
-    unit: the length unit of files that do not state theirs, as in :func:`motet.read`. table: what is said of each clip,
-    without which a motion is skipped, as is a clip without a motion; by default all motions are given, without
-    sentences. A clip's subject is what the table says, or else what ``people`` say. files: which, by default all.
+    A file of several motions gives each of them, named by the file and its own name: "people#Walk".
+    unit: the length unit of files that do not state theirs, as in :func:`motet.read`. table: the description of each
+    clip; motions and clips that only one side has are skipped. Without a table, all motions are given, without
+    sentences. people: the performers of clips, unless the table names them. files: by default all.
     """
     for name in archive.names:
         if name.lower().endswith(".asf"):
             archive.place(name)  # the reader of an AMC file looks for its skeleton near it
     seen: set[str] = set()
-    for file, own in _motions(archive, motion_files(archive) if files is None else files):
-        path, behind = PurePosixPath(file), "" if own is None else f"{MARK}{own}"
-        whole = path.with_suffix("").as_posix() + behind
-        clip = whole if whole in (table or {}) else path.stem + behind
-        said = Described() if table is None else table.get(clip)
-        if said is None:
-            found: Record | Skipped = Skipped(clip, "no sentence")
+    for file, motion_name in _motions(archive, motion_files(archive) if files is None else files):
+        clip = _clip_name(file, motion_name, table or {})
+        described = Described() if table is None else table.get(clip)
+        item: Record | Skipped
+        if described is None:
+            item = Skipped(clip, "no sentence")
         elif clip in seen:
-            found = Skipped(clip, f"a second motion of this name: {file}")
+            item = Skipped(clip, f"a second motion of this name: {file}")
         else:
-            who, told = person(people, clip), (tuple(said.sentences), tuple(said.unseen))
             try:
                 with archive.opened(file) as place:
-                    motion = read_motion(place, unit=unit, clip=own)
-                motion = with_travel(motion) if said.in_place else motion
-                subject = said.subject or who.subject
-                found = Record(clip, subject, motion, *told, who.take, said.action, said.gaits, said.loops)
+                    motion = read_motion(place, unit=unit, clip=motion_name)
+                item = _record(clip, motion, described, person(people, clip))
             except BROKEN as error:
-                found = Skipped(clip, archive.reason(error))
-        yield found
+                item = Skipped(clip, archive.reason(error))
         seen.add(clip)
-    yield from (Skipped(clip, NO_MOTION) for clip in table or () if clip not in seen)
+        yield item
+    for clip in table or ():
+        if clip not in seen:
+            yield Skipped(clip, NO_MOTION)
+
+
+def _clip_name(file: str, motion_name: str | None, table: Container[str]) -> str:
+    """The name of a motion: with its folders if the table has that, else without."""
+    path = PurePosixPath(file)
+    suffix = "" if motion_name is None else f"{MARK}{motion_name}"
+    whole = path.with_suffix("").as_posix() + suffix
+    return whole if whole in table else path.stem + suffix
+
+
+def _record(clip: str, motion: Motion, described: Described, performer: Person) -> Record:
+    return Record(
+        clip,
+        described.subject or performer.subject,
+        with_travel(motion) if described.in_place else motion,
+        tuple(described.sentences),
+        tuple(described.unseen),
+        performer.take,
+        described.action,
+        described.gaits,
+        described.loops,
+    )
 
 
 def _motions(archive: Archive, files: Sequence[str]) -> Iterator[tuple[str, str | None]]:
-    """Motion files of an archive; one of several motions with the name of each."""
+    """Motion files with None, or, for a file of several motions, with the name of each."""
     for file in files:
         names: tuple[str, ...] = ()
         if PurePosixPath(file).suffix.lower() in CLIPPED:
-            with suppress(*BROKEN), archive.opened(file) as place:  # reading it will say what is wrong
+            with suppress(*BROKEN), archive.opened(file) as place:  # reading the motion reports what is wrong
                 names = clips(place)
-        yield from ((file, name) for name in (names if len(names) > 1 else (None,)))
+        if len(names) > 1:
+            for name in names:
+                yield file, name
+        else:
+            yield file, None
 
 
 def kit_recordings(archive: Archive, files: Sequence[str]) -> Iterator[Record | Skipped]:
-    """NNNNN_mmm.xml with the sentences of NNNNN_annotations.json; Skipped where there are none or a file is damaged.
-    files: the NNNNN_mmm.xml."""
+    """The motions NNNNN_mmm.xml with their sentences in NNNNN_annotations.json.
+
+    Skipped where there are no sentences or a file is damaged. files: the NNNNN_mmm.xml.
+    """
     names = frozenset(archive.names)
-    for stem in (name.removesuffix(KIT_MOTION) for name in files):
-        found: Record | Skipped = Skipped(stem, "no sentence")
+    for name in files:
+        stem = name.removesuffix(KIT_MOTION)
+        item: Record | Skipped = Skipped(stem, "no sentence")
         try:
-            if sentences := _kit_sentences(archive, stem + KIT_SENTENCES) if stem + KIT_SENTENCES in names else ():
-                with archive.opened(stem + KIT_MOTION) as place:
-                    who = mmm.motion_name(place) or stem
-                    found = Record(stem.rpartition("/")[2], who, mmm.read(place), sentences)
+            sentences = _kit_sentences(archive, stem + KIT_SENTENCES) if stem + KIT_SENTENCES in names else ()
+            if sentences:
+                with archive.opened(name) as place:
+                    subject = mmm.motion_name(place) or stem
+                    item = Record(stem.rpartition("/")[2], subject, mmm.read(place), sentences)
         except BROKEN as error:
-            found = Skipped(stem, archive.reason(error))
-        yield found
+            item = Skipped(stem, archive.reason(error))
+        yield item
 
 
 def _kit_sentences(archive: Archive, name: str) -> tuple[str, ...]:
     with archive.opened(name) as path:
         try:
-            found = json.loads(path.read_text(encoding="utf-8"))
+            sentences = json.loads(path.read_text(encoding="utf-8"))
         except (ValueError, RecursionError) as error:
             raise DataError(f"{path.name} is not JSON: {error}") from error
-        if not (isinstance(found, list) and all(isinstance(sentence, str) for sentence in found)):
+        if not (isinstance(sentences, list) and all(isinstance(sentence, str) for sentence in sentences)):
             raise DataError(f"{path.name} is not a list of sentences")
-    return tuple(sentence.strip() for sentence in found if sentence.strip())
+    return tuple(sentence.strip() for sentence in sentences if sentence.strip())

@@ -1,4 +1,4 @@
-"""Motions as files of other people show them: short, in place, repeated, on figures that were fitted otherwise."""
+"""Vary motions as files of other sources would show them: short, in place, repeated, on badly fitted skeletons."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,16 +24,19 @@ OFF = {
     "Foot": 8.0,
     "Toes": 8.0,
 }
-"""Degrees by which a bone of a file may point elsewhere throughout: its rest pose is not what it seems."""
+"""Standard deviations in degrees of the constant error in a bone's direction that a wrong rest pose causes."""
+
+ROOT_OFF = {"root.height": 0.04, "root.pitch": 6.0, "root.roll": 2.0}
+"""Standard deviations of the constant error in channels of the root: metres, degrees, degrees."""
 
 
 @dataclass(frozen=True)
 class Disguise:
-    """How motions are changed.
+    """Settings of the variation.
 
-    share: of the motions. crop: of these and of all others, how often only 1 to 4 s are seen. tempo, pace: how much
-    faster or slower all goes, and how far for its steps, as the logarithm. standing: how often the root stays where it
-    is. repeated: how often a loop of less than 1.6 s is seen several times. off: how much wrong rest poses count.
+    share: of the motions that are varied. crop: how often only 1 to 4 s of any motion are seen. tempo, pace: range of
+    the logarithm of the factors on duration and on distance travelled. standing: how often the root stays in place.
+    repeated: how often a loop of less than 1.6 s is repeated. off: factor on the errors of rest poses.
     """
 
     share: float = 0.6
@@ -48,41 +51,64 @@ class Disguise:
 def seen_as(
     frames: Array,
     rng: np.random.Generator,
-    how: Disguise,
+    disguise: Disguise,
     windows: tuple[int, int],
     channels: Sequence[str],
     fps: float,
 ) -> Array:
-    """Some frames (T', D) of a motion (T, D) of ``root_angles``, perhaps disguised; of other channels only cut.
+    """An excerpt (T', D) of a motion (T, D) of ``root_angles``, perhaps varied; other channels are only cropped.
 
-    windows: from how many to how many frames are cut out of it where that are not 1 to 4 s.
+    windows: shortest and longest excerpt in frames, where it is not cropped to 1 to 4 s.
     """
-    few = round(fps), round(4 * fps)
-    length = drawn_length(rng, few if rng.random() < how.crop else windows)
-    start = int(rng.integers(max(0, len(frames) - length) + 1))
-    frames = np.asarray(frames[start : start + length], dtype=np.float64)
-    if rng.random() >= how.share or not set(ROOT_BLOCK) <= set(channels):
+    frames = _cropped(frames, rng, disguise, windows, fps)
+    if rng.random() >= disguise.share or not set(ROOT_BLOCK) <= set(channels):
         return frames
-    frames = _paced(frames, float(np.exp(rng.uniform(-how.tempo, how.tempo))))
-    frames[:, :2] *= 0.0 if rng.random() < how.standing else np.exp(rng.uniform(-how.pace, how.pace))
-    frames = frames + rng.normal(size=len(channels)) * _off(tuple(channels)) * rng.uniform(0, 1.5 * how.off)
-    if rng.random() < how.repeated and len(frames) < 1.6 * fps:
-        frames = np.tile(frames, (-(-round(2.5 * fps) // len(frames)), 1))
+    return _varied(frames, rng, disguise, tuple(channels), fps)
+
+
+def _varied(
+    frames: Array, rng: np.random.Generator, disguise: Disguise, channels: tuple[str, ...], fps: float
+) -> Array:
+    """The same frames with another tempo, pace and rest pose, perhaps in place or repeated."""
+    frames = _resampled(frames, float(np.exp(rng.uniform(-disguise.tempo, disguise.tempo))))
+    # forward and sideways speed: in place, or shorter or longer steps
+    if rng.random() < disguise.standing:
+        frames[:, :2] *= 0.0
+    else:
+        frames[:, :2] *= np.exp(rng.uniform(-disguise.pace, disguise.pace))
+    errors = rng.normal(size=len(channels)) * _deviations(channels)
+    frames = frames + errors * rng.uniform(0, 1.5 * disguise.off)
+    if rng.random() < disguise.repeated and len(frames) < 1.6 * fps:
+        times = -(-round(2.5 * fps) // len(frames))  # rounded up
+        frames = np.tile(frames, (times, 1))
     return frames
 
 
-def _paced(frames: Array, tempo: float) -> Array:
-    """The motion so many times slower, its first three channels, which are rates, as much smaller."""
-    places = np.linspace(0, len(frames) - 1, max(5, round(len(frames) * tempo)))
+def _cropped(
+    frames: Array, rng: np.random.Generator, disguise: Disguise, windows: tuple[int, int], fps: float
+) -> Array:
+    """An excerpt of random length and place, in float64."""
+    short = (round(fps), round(4 * fps))
+    length = drawn_length(rng, short if rng.random() < disguise.crop else windows)
+    start = int(rng.integers(max(0, len(frames) - length) + 1))
+    return np.asarray(frames[start : start + length], dtype=np.float64)
+
+
+def _resampled(frames: Array, duration: float) -> Array:
+    """The motion at ``duration`` times its duration; the first three channels are rates, so they change inversely."""
+    places = np.linspace(0, len(frames) - 1, max(5, round(len(frames) * duration)))
     before = np.floor(places).astype(int)
-    part = (places - before)[:, None]
-    found: Array = frames[before] * (1 - part) + frames[np.minimum(before + 1, len(frames) - 1)] * part
-    found[:, :3] /= tempo
-    return found
+    after = np.minimum(before + 1, len(frames) - 1)
+    weight = (places - before)[:, None]
+    resampled: Array = frames[before] * (1 - weight) + frames[after] * weight
+    resampled[:, :3] /= duration
+    return resampled
 
 
-def _off(channels: tuple[str, ...]) -> Array:
-    """Standard deviations (D,) of what each channel is off: also 4 cm of the hips' height, and their tilt."""
-    root = {"root.height": 0.04, "root.pitch": 6.0, "root.roll": 2.0}
-    bones = (channel.partition(".")[0].removeprefix("left").removeprefix("right") for channel in channels)
-    return np.array([root.get(channel, OFF.get(bone, 0.0)) for channel, bone in zip(channels, bones, strict=True)])
+def _deviations(channels: tuple[str, ...]) -> Array:
+    """Standard deviations (D,) of the constant error of each channel."""
+    deviations = []
+    for channel in channels:
+        bone = channel.partition(".")[0].removeprefix("left").removeprefix("right")
+        deviations.append(ROOT_OFF.get(channel, OFF.get(bone, 0.0)))
+    return np.array(deviations)

@@ -4,4 +4,4 @@ from motet.errors import MotetError
 
 
 class DataError(MotetError, ValueError):
-    """Training data that a model cannot be trained on."""
+    """Training data that no model can be trained on."""

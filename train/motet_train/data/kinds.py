@@ -1,4 +1,4 @@
-"""Kinds of action: which a sentence names, and which a motion shows, by what is said of it."""
+"""Kinds of action: those that a sentence names, and those that a motion shows according to its sentences."""
 
 import re
 import tomllib
@@ -18,46 +18,55 @@ _WORDS = {kind: re.compile(rf"\b(?:{words})\b") for kind, words in KINDS.items()
 
 @cache
 def named(sentence: str) -> frozenset[str]:
-    """The kinds of action that a sentence names, but for words after "instead of" and "without"."""
+    """The kinds of action that a sentence names; the word after "instead of" or "without" does not count."""
     text = re.sub(r"(?:instead of|without) \w+", "", " ".join(RULES.words(sentence)))
     return frozenset(kind for kind, words in _WORDS.items() if words.search(text))
 
 
 @dataclass(frozen=True)
 class Shown:
-    """The kinds of action of a motion. shown: those that many sentences name, or its title. sayable: these, and those
-    that more than one sentence names."""
+    """The kinds of action of a motion. shown: named by many of its sentences or by its title. sayable: these, and those
+    named by more than one sentence."""
 
     shown: frozenset[str]
     sayable: frozenset[str]
 
     def right(self, sentence: str) -> bool:
-        """Whether a sentence names a kind that is shown, and none that is not sayable."""
+        """Whether a sentence names a shown kind, and only sayable ones."""
         return self.right_kinds(named(sentence))
 
     def right_kinds(self, kinds: Collection[str]) -> bool:
-        """Whether some kinds are right to be named, like a sentence that names them."""
+        """Whether a sentence that names these kinds is right."""
         return not self.shown.isdisjoint(kinds) and self.sayable.issuperset(kinds)
 
 
 def shown_by(sentences: Sequence[str], title: str = "") -> Shown:
-    """The kinds that a motion shows, by all sentences about it: at least 35 in a hundred name them, or the title.
+    """The kinds of action of a motion: shown are those that 35 % of its sentences name, or its title.
 
-    Sayable is what more than one sentence in ten names, so that one careless wording makes nothing right.
+    If there are none, shown are the two most frequent kinds that several sentences name. Sayable are kinds named by at
+    least two sentences and a tenth of all, so that a single careless wording makes nothing right.
     """
-    counts, told = Counter(kind for sentence in sentences for kind in named(sentence)), named(title)
-    shown = frozenset(kind for kind, count in counts.items() if count >= 0.35 * len(sentences)) | told
-    shown = shown or frozenset(kind for kind, count in counts.most_common(2) if count > 1)
-    least = max(2.0, 0.1 * len(sentences))
-    return Shown(shown, shown | {kind for kind, count in counts.items() if count >= least})
+    counts = Counter[str]()
+    for sentence in sentences:
+        counts.update(named(sentence))
+    shown = _at_least(counts, 0.35 * len(sentences)) | named(title)
+    if not shown:
+        shown = frozenset(kind for kind, count in counts.most_common(2) if count > 1)
+    return Shown(shown, shown | _at_least(counts, max(2.0, 0.1 * len(sentences))))
+
+
+def _at_least(counts: Counter[str], least: float) -> frozenset[str]:
+    return frozenset(kind for kind, count in counts.items() if count >= least)
 
 
 def careful(sentences: Iterable[str], shown: frozenset[str], most: int) -> list[str]:
-    """Of sentences about a motion those that name nothing but what it ``shows``: of each set of kinds up to ``most``,
-    the first."""
+    """The different sentences that name only kinds in ``shown``: for each set of kinds, the first ``most``."""
     kept: dict[frozenset[str], list[str]] = {}
     for sentence in dict.fromkeys(sentences):
         kinds = named(sentence)
         if kinds and kinds <= shown:
             kept.setdefault(kinds, []).append(sentence)
-    return [sentence for said in kept.values() for sentence in said[:most]]
+    careful_sentences = []
+    for same_kinds in kept.values():
+        careful_sentences += same_kinds[:most]
+    return careful_sentences

@@ -1,4 +1,4 @@
-"""The rows of motion matching: what its loop needs to know of each recorded frame (:mod:`motet.steering.matching`).
+"""The rows of motion matching: all that its loop (:mod:`motet.decode.matching`) needs to know of each recorded frame.
 
 Letters in shapes: T frames, N rows, J bones, F features, G gaits.
 """
@@ -31,24 +31,29 @@ GROUPS = {
     "hips_speed": (3, 1.0),
     "hands": (6, 0.5),
 }
-"""Groups of features, the length of each and its weight; most as in Holden's "Learned Motion Matching" (2020), but of
-feet a quarter more, so that fewer feet that swing are to stand at once."""
+"""Groups of features, with the length and the weight of each.
+
+Most weights are those of Holden et al. 2020, "Learned Motion Matching"; feet weigh a quarter more, so that fewer
+swinging feet have to stop at a transition."""
 
 
 STANDS = ContactSettings(heights=(0.03, 0.06), speeds=(0.2, 0.6))
-"""Of soles of recordings on level ground: a foot that turns on its ball is not let go, one that lands is not held."""
+"""Contacts of recorded soles on level ground: a foot turning on its ball is in contact, a landing foot is not yet."""
 
-LEAP, AROUND = 0.4, 0.3
-"""Seconds of a flight that is no running step, and before and after it that belong to it."""
+LEAP = 0.4
+"""Shortest flight, in seconds, that is a leap rather than part of a running step."""
+
+AROUND = 0.3
+"""Seconds before and after a leap that belong to it."""
 
 
 @dataclass(frozen=True, eq=False)
 class MatchingRows:
     """N rows, recording after recording.
 
-    poses: (N, 4 J + 1) quaternions (x, y, z, w) of the bones, the hips' seen from the facing, and the hips' height.
+    poses: (N, 4 J + 1) quaternions (x, y, z, w) of the bones, the hips' relative to the facing, and the hips' height.
     moves: (N, 3) forward and left in m/s, turn in rad/s, since the frame before. speed: (N,). contacts: (N, 2) from 0
-    to 1. features: (N, F), not scaled. gaits: (N, G) bool. left: (N,) rows that follow in the same recording.
+    to 1. features: (N, F), not scaled. gaits: (N, G) bool. left: (N,) number of later rows in the same recording.
     """
 
     poses: Array
@@ -64,67 +69,109 @@ class MatchingRows:
         return len(self.poses)
 
 
-def rows_of(found: list[Recording], gaits: tuple[str, ...], how: SteeringSettings) -> MatchingRows:
-    """The rows of recordings on the humanoid, quaternions of a bone on one half of their sphere where they can be.
+def rows_of(recordings: list[Recording], gaits: tuple[str, ...], settings: SteeringSettings) -> MatchingRows:
+    """The rows of recordings on the humanoid; quaternions of a bone lie on one half of their sphere where possible.
 
-    Jumps have no speed, as they are played neither faster nor slower: who flies falls at a rate of its own. Leaps
-    within other gaits show none: nobody is told to go where they lead.
+    Jumps have speed 0, so that they are never time-stretched: a falling body has its own rate. Rows of leaps within
+    other gaits belong to no gait, so that no search ends in them.
     """
-    parts = [_rows(one.features, how) for one in found]
+    # compute each recording on its own, and concatenate
+    parts = [_rows(recording.features, settings) for recording in recordings]
     poses, moves, speed, contacts, features = (np.concatenate(column) for column in zip(*parts, strict=True))
-    lengths = [len(one.features) for one in found]
-    shown = np.repeat([[gait in one.gaits for gait in gaits] for one in found], lengths, axis=0)
-    jumps = np.repeat([one.gaits <= {"jump"} for one in found], lengths)
-    shown[~jumps & _leaps(contacts.max(axis=1) < how.stands, found[0].features.fps)] = False
-    speed = np.where(jumps, 0.0, speed)
+    lengths = [len(recording.features) for recording in recordings]
     left = np.concatenate([np.arange(length)[::-1] for length in lengths])
+    # the gaits of each recording, for each of its rows
+    gait_table = [_shown_gaits(recording, gaits) for recording in recordings]
+    shown = np.repeat(gait_table, lengths, axis=0)
+    # jumps have no speed, and leaps no gait
+    jumps = np.repeat([recording.gaits <= {"jump"} for recording in recordings], lengths)
+    airborne = contacts.max(axis=1) < settings.stands
+    shown[~jumps & _leaps(airborne, recordings[0].features.fps)] = False
+    speed = np.where(jumps, 0.0, speed)
     return MatchingRows(_aligned(poses), moves, speed, contacts, features, shown, left)
 
 
-def _leaps(flies: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
+def _shown_gaits(recording: Recording, gaits: tuple[str, ...]) -> list[bool]:
+    return [gait in recording.gaits for gait in gaits]
+
+
+def _leaps(airborne: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
     """The rows (N,) of flights of :data:`LEAP` seconds and more, and of :data:`AROUND` seconds before and after."""
-    from scipy.ndimage import binary_dilation, binary_opening  # for this alone, as above
+    from scipy.ndimage import binary_dilation, binary_opening  # here, so that other trainings do not load scipy
 
-    shortest, around = (np.ones(2 * round(of * fps / 2) + 1, dtype=bool) for of in (LEAP, 2 * AROUND))
-    found: NDArray[np.bool_] = binary_dilation(binary_opening(flies, shortest), around)
-    return found
+    shortest = _window(LEAP, fps)
+    around = _window(2 * AROUND, fps)
+    leaps: NDArray[np.bool_] = binary_dilation(binary_opening(airborne, shortest), around)
+    return leaps
 
 
-def _rows(features: Motion, how: SteeringSettings) -> tuple[Array, Array, Array, Array, Array]:
-    turned, places = global_transforms(named("root_sixd").motion(features))
+def _window(seconds: float, fps: float) -> NDArray[np.bool_]:
+    """A window of an odd number of frames."""
+    return np.ones(2 * round(seconds * fps / 2) + 1, dtype=bool)
+
+
+def _rows(features: Motion, settings: SteeringSettings) -> tuple[Array, Array, Array, Array, Array]:
+    """Poses, moves, speed, contacts and features of one recording."""
+    fps = features.fps
+    rotations, places = global_transforms(named("root_sixd").motion(features))
     block = features.select(ROOT_SIXD).values
-    way = poses_of(block, features.fps)  # x, z, facing
-    contacts = foot_contacts(turned, places, features.fps, STANDS)
-    speed = np.hypot(block[:, 0], block[:, 1])
-    window = np.ones(min(round(0.5 * features.fps), len(speed)))  # half a second
-    speed = np.convolve(speed, window, "same") / np.convolve(np.ones(len(speed)), window, "same")
+    way = poses_of(block, fps)  # x, z, facing
+    contacts = foot_contacts(rotations, places, fps, STANDS)
+    speed = _smooth_speed(block, fps)
+    # features: the trajectory ahead, the speed at the second horizon, and the pose
+    times = horizons(settings)
+    ahead = np.minimum(np.arange(len(speed)) + round(times[1] * fps), len(speed) - 1)
+    trajectory = _trajectory(way, times, fps)
+    speed_ahead = speed_feature(speed[ahead], settings)[:, None]
+    pose = pose_features(places, way, fps)
+    matched = np.concatenate([trajectory, speed_ahead, pose], axis=1)
+    return _poses(features, block[:, 3]), block[:, :3], speed, contacts, matched
+
+
+def _poses(features: Motion, height: Array) -> Array:
+    """Quaternions of the bones' local rotations, and the hips' height: (T, 4 J + 1)."""
     local = joint_rotations(features)
     quats = np.stack([rotmat_to_quat(local[bone]) for bone in BONES], axis=1)
-    poses = np.column_stack([quats.reshape(len(features), -1), block[:, 3]])
-    times = horizons(how)
-    soon = speed[np.minimum(np.arange(len(speed)) + round(times[1] * features.fps), len(speed) - 1)]
-    now = pose_features(places, way, features.fps)
-    known = [_trajectory(way, times, features.fps), speed_feature(soon, how)[:, None], now]
-    return poses, block[:, :3], speed, contacts, np.concatenate(known, axis=1)
+    return np.column_stack([quats.reshape(len(features), -1), height])
+
+
+def _smooth_speed(block: Array, fps: float) -> Array:
+    """Speeds (T,) on the floor in m/s, averaged over half a second; fewer frames count at the ends."""
+    speed = np.hypot(block[:, 0], block[:, 1])
+    window = np.ones(min(round(0.5 * fps), len(speed)))
+    counts = np.convolve(np.ones(len(speed)), window, "same")
+    smooth: Array = np.convolve(speed, window, "same") / counts
+    return smooth
 
 
 def _trajectory(way: Array, times: list[float], fps: float) -> Array:
-    """Where rows go (T, 12), so many seconds later; after the last one straight on, as fast as at the end."""
+    """Places and facings of the root ``times`` seconds later, relative to each row (T, 12).
+
+    Beyond the last frame the root goes straight on at its final velocity.
+    """
     last = len(way) - 1
-    end = (way[last] - way[max(0, last - round(fps / 10))]) * fps / max(1, min(last, round(fps / 10)))
-    found = []
+    tenth = round(fps / 10)  # of a second, in frames
+    final_velocity = (way[last] - way[max(0, last - tenth)]) * fps / max(1, min(last, tenth))
+    offsets = []
     for time in times:
-        at = np.arange(len(way)) + round(time * fps)
-        beyond = np.maximum(at - last, 0)[:, None] / fps
-        found.append(way[np.minimum(at, last)] - way + beyond * end * (1, 1, 0))
-    places = [seen(step[:, :2], way[:, 2]) for step in found]
-    facings = [np.stack([np.sin(step[:, 2]), np.cos(step[:, 2])], axis=1) for step in found]
+        frame = np.arange(len(way)) + round(time * fps)
+        seconds_beyond = np.maximum(frame - last, 0)[:, None] / fps
+        recorded = way[np.minimum(frame, last)] - way
+        offsets.append(recorded + seconds_beyond * final_velocity * (1, 1, 0))
+    places = [seen(offset[:, :2], way[:, 2]) for offset in offsets]
+    facings = [_direction(offset[:, 2]) for offset in offsets]
     return np.concatenate(places + facings, axis=1)
 
 
+def _direction(angle: Array) -> Array:
+    """Unit vectors (T, 2) of angles (T,)."""
+    return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
 def _aligned(poses: Array) -> Array:
-    """Poses with the signs of quaternions that are nearest to their bone's mean one, also for the mirror image."""
+    """Poses with the signs of quaternions that are nearest to their bone's mean, the same in the mirror image."""
     quats = poses[:, :-1].reshape(len(poses), -1, 4)
+    # the mean depends on the signs, and the signs on the mean
     mean = quats[0]
     for _ in range(3):
         quats = np.where((quats * mean).sum(axis=-1, keepdims=True) < 0, -quats, quats)
@@ -133,7 +180,7 @@ def _aligned(poses: Array) -> Array:
 
 
 def mirrored_poses() -> tuple[NDArray[np.intp], Array]:
-    """The columns (P,) and signs (P,) that make the pose of the mirror image."""
+    """The columns (P,) and signs (P,) that turn a pose into its mirror image."""
     partners = np.array(partners_of(BONES))
     columns = (4 * partners[:, None] + np.arange(4)).ravel()
     signs = np.tile([1.0, -1.0, -1.0, 1.0], len(BONES))
@@ -141,9 +188,11 @@ def mirrored_poses() -> tuple[NDArray[np.intp], Array]:
 
 
 def scaling(features: Array) -> tuple[Array, Array]:
-    """Mean and scale (F,) that weigh groups of features, the same for a mirror image."""
+    """Mean and scale (F,) by which features are normalised and their groups weighted, the same in the mirror image."""
+    # statistics over recorded and mirrored rows
     columns, signs = mirrored_features()
     both = np.concatenate([features, features[:, columns] * signs])
+    # one scale for all features of a group
     lengths, weights = zip(*GROUPS.values(), strict=True)
     groups = np.split(both.var(axis=0), np.cumsum(lengths)[:-1])
     scale = [weight / np.sqrt(group.mean()) for weight, group in zip(weights, groups, strict=True)]

@@ -1,4 +1,4 @@
-"""What a predictor is trained on: sequences of frames, and windows of them that are drawn afresh for each batch."""
+"""Training data of predictors: sequences of frames, and windows of them drawn afresh for each batch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,12 +20,12 @@ from motet_train.data.store import Store, split
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """Sequences (T, C) float32 at ``stride`` times the contract's frame rate, and how often each is visited.
+    """Sequences (T, C) float32 at ``stride`` times the contract's frame rate.
 
-    contract: its mean and std are those of training. kept: columns that vary, of which the first ``held`` are not
-    predicted. mirrored, signs: see PredictorConfig. rates: columns that are velocities, which are faster where a motion
-    is played faster; with them it cannot be played backwards. about: what the manifest says of the data. validation:
-    sequences that were held out.
+    contract: its mean and std are those of training. chances: how often each sequence is drawn. kept: columns that
+    vary, of which the first ``held`` are not predicted. mirrored, signs: see PredictorConfig. rates: columns that are
+    velocities, which grow when a motion is played faster; with them it cannot be played backwards. about: the
+    description of the data in the manifest. validation: sequences that were held out.
     """
 
     contract: MotionContract
@@ -51,37 +51,54 @@ def store_material(store: Store, name: str, by: str = "subject") -> Material:
         raise DataError(f"{name} is a store of {store.representation}: prepare it with --for predict")
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
-    sequences, validation = (
-        [store.frames[start:stop] for record in part for start, stop in store.records[record].spans]
-        for part in (parts.train, parts.validation)
-    )
+    sequences = _sequences(store, parts.train)
     lengths = np.array([len(frames) for frames in sequences], dtype=np.float64)
-    try:
-        mirrored, signs = contract.mirror.columns.tolist(), contract.mirror.signs.tolist()
-    except MotionError:
-        mirrored, signs = [], []
-    named = {part: [store.records[record].name for record in getattr(parts, part)] for part in ("validation", "test")}
-    skipped = [item.name for item in store.skipped]
+    mirrored, signs = _mirroring(contract)
+    about = {
+        "name": name,
+        "files": len(parts.train),
+        "split": by,
+        "skipped": [item.name for item in store.skipped],
+        "validation": [store.records[record].name for record in parts.validation],
+        "test": [store.records[record].name for record in parts.test],
+    }
     return Material(
         contract,
         sequences,
-        lengths / lengths.sum(),
-        1,
-        tuple(int(column) for column in np.flatnonzero(contract.std)),
-        mirrored=tuple(mirrored),
-        signs=tuple(signs),
+        chances=lengths / lengths.sum(),
+        stride=1,
+        kept=tuple(int(column) for column in np.flatnonzero(contract.std)),
+        mirrored=mirrored,
+        signs=signs,
         rates=tuple(column for column, unit in enumerate(contract.units) if unit.endswith("/s")),
-        about={"name": name, "files": len(parts.train), "split": by, "skipped": skipped, **named},
-        validation=validation,
+        about=about,
+        validation=_sequences(store, parts.validation),
     )
+
+
+def _sequences(store: Store, records: Sequence[int]) -> list[NDArray[np.float32]]:
+    """The frames of all spans of some records."""
+    sequences = []
+    for record in records:
+        sequences += [store.frames[start:stop] for start, stop in store.records[record].spans]
+    return sequences
+
+
+def _mirroring(contract: MotionContract) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """The columns and signs that mirror frames; empty where they cannot be mirrored."""
+    try:
+        mirror = contract.mirror
+    except MotionError:
+        return (), ()
+    return tuple(mirror.columns.tolist()), tuple(mirror.signs.tolist())
 
 
 class Windows:
     """Draws windows (B, T, C) of the sequences at the contract's frame rate.
 
-    warp: a window is slower or faster by up to this much, as exp(+-warp). reverse: the share played backwards. mirror:
-    the share that is mirrored. seed: how many frames of a window are given, where exponential maps are to be
-    :func:`anchored` at their end, as they are for a predictor in use. DataError where no sequence is long enough.
+    frames: T. warp: a window is played slower or faster, by a factor of up to exp(+-warp). reverse, mirror: shares of
+    windows played backwards and mirrored. seed: number of first frames that a predictor is given; exponential maps are
+    :func:`anchored` at the last of them, as they are in use. DataError if every sequence is too short.
     """
 
     def __init__(
@@ -93,53 +110,73 @@ class Windows:
         mirror: float = 0.0,
         seed: int | None = None,
     ) -> None:
-        self.material, self.frames, self.seed = material, frames, seed
-        joints = joints_of(material.contract.channels)
-        self.maps = [material.contract.channels.index(f"{joint}.{kind}") for joint in joints for kind in VECTOR_KINDS]
-        self.warp, self.reverse, self.mirror = warp, reverse, mirror
-        lengths = np.array([len(sequence) for sequence in material.sequences])
-        usable = lengths > material.stride * (frames - 1) + 1
+        self.material = material
+        self.frames = frames
+        self.warp = warp
+        self.reverse = reverse
+        self.mirror = mirror
+        self.seed = seed
+        self.maps = _vector_columns(material.contract)
+        self.lengths = np.array([len(sequence) for sequence in material.sequences])
+        self.starts = np.cumsum(self.lengths) - self.lengths
+        # sequences too short for a window are never drawn
+        usable = self.lengths > material.stride * (frames - 1) + 1
         if not usable.any():
             raise DataError(f"all motions are shorter than a window of {frames} frames at the model's rate")
         chances = np.where(usable, material.chances, 0.0)
         self.chances = chances / chances.sum()
-        self.lengths, self.starts = lengths, np.cumsum(lengths) - lengths
         self.all = torch.from_numpy(np.concatenate(material.sequences))
-        self.columns, self.signs = torch.tensor(material.mirrored), torch.tensor(material.signs)
+        self.columns = torch.tensor(material.mirrored)
+        self.signs = torch.tensor(material.signs)
 
     def draw(self, batch: int, rng: np.random.Generator) -> Tensor:
         """A batch of windows."""
-        which = rng.choice(len(self.chances), batch, p=self.chances)
-        last = self.lengths[which] - 1.01
-        speed = self.material.stride * np.exp(rng.uniform(-self.warp, self.warp, batch))
-        speed = np.minimum(speed, last / (self.frames - 1))
-        start = rng.uniform(0, 1, batch) * (last - speed * (self.frames - 1))
-        if not self.warp:
-            speed, start = np.full(batch, float(self.material.stride)), np.floor(start)
+        sequence = rng.choice(len(self.chances), batch, p=self.chances)
+        start, speed = self._drawn(sequence, rng)
         times = start[:, None] + speed[:, None] * np.arange(self.frames)
-        before = np.floor(times + 1e-6).astype(np.int64)
-        part = torch.from_numpy(np.maximum(times - before, 0).astype(np.float32))[..., None]
-        index = torch.from_numpy(before + self.starts[which][:, None])
-        after = (index + 1).clamp_max(len(self.all) - 1)
-        windows = self.all[index] * (1 - part) + self.all[after] * part
-        faster = torch.from_numpy((speed / self.material.stride).astype(np.float32))
-        windows[..., self.material.rates] *= faster[:, None, None]
-
-        def some(share: float) -> Tensor:
-            return torch.from_numpy(rng.random(batch) < share)[:, None, None]
-
-        windows = torch.where(some(self.reverse), windows.flip(1), windows)
+        windows = self._interpolated(sequence, times)
+        # velocities change with the speed of play
+        factor = torch.from_numpy((speed / self.material.stride).astype(np.float32))
+        windows[..., self.material.rates] *= factor[:, None, None]
+        # play some backwards, and mirror some
+        windows = torch.where(_chosen(self.reverse, batch, rng), windows.flip(1), windows)
         if self.mirror:
-            windows = torch.where(some(self.mirror), windows[..., self.columns] * self.signs, windows)
+            mirrored = windows[..., self.columns] * self.signs
+            windows = torch.where(_chosen(self.mirror, batch, rng), mirrored, windows)
         return self._anchored(windows)
 
+    def _drawn(self, sequence: NDArray[np.int64], rng: np.random.Generator) -> tuple[Array, Array]:
+        """For each window a start in its sequence, and a speed in frames of the sequence per frame: (B,) each."""
+        batch = len(sequence)
+        # a slow enough play that the window fits
+        last = self.lengths[sequence] - 1.01
+        speed = self.material.stride * np.exp(rng.uniform(-self.warp, self.warp, batch))
+        speed = np.minimum(speed, last / (self.frames - 1))
+        # anywhere that leaves room for it
+        start = rng.uniform(0, 1, batch) * (last - speed * (self.frames - 1))
+        if self.warp:
+            return start, speed
+        # unwarped windows are the recorded frames themselves
+        return np.floor(start), np.full(batch, float(self.material.stride))
+
+    def _interpolated(self, sequence: NDArray[np.int64], times: Array) -> Tensor:
+        """Frames (B, T, C) of sequences (B,) at fractional times (B, T), linear between recorded ones."""
+        before = np.floor(times + 1e-6).astype(np.int64)
+        weight = torch.from_numpy(np.maximum(times - before, 0).astype(np.float32))[..., None]
+        index = torch.from_numpy(before + self.starts[sequence][:, None])
+        after = (index + 1).clamp_max(len(self.all) - 1)
+        return self.all[index] * (1 - weight) + self.all[after] * weight
+
     def along(self, sequences: Sequence[NDArray[np.float32]], apart: int) -> Tensor:
-        """Windows (W, T, C) all along sequences (T, C) at the contract's frame rate, as they are, every ``apart``
-        frames; DataError where all are too short."""
-        starts = [(one, start) for one in sequences for start in range(0, len(one) - self.frames + 1, apart)]
-        if not starts:
+        """Windows (W, T, C) of sequences (T, C) at the contract's frame rate, unchanged, starting every ``apart``
+        frames; DataError if every sequence is too short."""
+        windows = []
+        for sequence in sequences:
+            for start in range(0, len(sequence) - self.frames + 1, apart):
+                windows.append(sequence[start : start + self.frames])
+        if not windows:
             raise DataError(f"the motions held out are all shorter than a window of {self.frames} frames")
-        return self._anchored(torch.from_numpy(np.stack([one[start : start + self.frames] for one, start in starts])))
+        return self._anchored(torch.from_numpy(np.stack(windows)))
 
     def _anchored(self, windows: Tensor) -> Tensor:
         if self.seed is not None and self.maps:
@@ -148,17 +185,31 @@ class Windows:
         return windows
 
 
-def anchored(vectors: Tensor, frame: int) -> Tensor:
-    """Continuous exponential maps (B, T, J, 3) shifted by whole turns to be at most half a turn at one frame.
+def _vector_columns(contract: MotionContract) -> list[int]:
+    """The columns of exponential maps, three for each joint."""
+    columns = []
+    for joint in joints_of(contract.channels):
+        columns += [contract.channels.index(f"{joint}.{kind}") for kind in VECTOR_KINDS]
+    return columns
 
-    A seed that is given alone ends in this range, whatever its joints have turned before.
+
+def _chosen(share: float, batch: int, rng: np.random.Generator) -> Tensor:
+    """Which windows of a batch are changed, (B, 1, 1) bool."""
+    return torch.from_numpy(rng.random(batch) < share)[:, None, None]
+
+
+def anchored(vectors: Tensor, frame: int) -> Tensor:
+    """Continuous exponential maps (B, T, J, 3), shifted by whole turns to at most half a turn at one frame.
+
+    A seed on its own ends in this range, however often its joints have turned before.
     """
-    then = vectors[:, frame : frame + 1]
-    turns = torch.round(then.norm(dim=-1, keepdim=True) / (2 * torch.pi))
+    anchor = vectors[:, frame : frame + 1]
+    turns = torch.round(anchor.norm(dim=-1, keepdim=True) / (2 * torch.pi))
     if not turns.any():
         return vectors
+    # near the identity the axis is undefined: take that of the anchor
     angle = vectors.norm(dim=-1, keepdim=True)
-    axis = torch.where(angle > 1e-3, vectors / angle.clamp_min(1e-9), torch.nn.functional.normalize(then, dim=-1))
+    axis = torch.where(angle > 1e-3, vectors / angle.clamp_min(1e-9), torch.nn.functional.normalize(anchor, dim=-1))
     # an axis that points the other way belongs to a negative angle
-    axis = axis * torch.where((axis * then).sum(-1, keepdim=True) < 0, -1.0, 1.0)
+    axis = axis * torch.where((axis * anchor).sum(-1, keepdim=True) < 0, -1.0, 1.0)
     return vectors - 2 * torch.pi * turns * axis

@@ -1,8 +1,10 @@
-"""Sentences about motions: which are usable, mirrored, alike, and ask for which action."""
+"""Sentences about motions: which are usable, their mirror images, groups of equal ones, and the actions they name."""
 
 import re
+from collections import defaultdict
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from motet.text.vocabulary import MAX_WORDS, RULES
 from motet_train.data.store import Store
@@ -18,7 +20,7 @@ OTHER = {
     "clockwise": "counterclockwise",
 }
 OTHER |= {right: left for left, right in OTHER.items()} | {"anticlockwise": "clockwise"}
-"""Words that say a side, and their opposites."""
+"""Words for a side or a sense of rotation, and their opposites."""
 
 SIDED = re.compile(rf"\b(?!right (?:angles?|angled|away)\b)({'|'.join(sorted(OTHER, key=len, reverse=True))})\b")
 
@@ -29,55 +31,79 @@ def usable(sentence: str) -> bool:
 
 
 def mirror_text(sentence: str) -> str:
-    """The sentence, normalised, with left and right, clockwise and counterclockwise exchanged.
+    """The normalised sentence with left and right, clockwise and counterclockwise exchanged.
 
-    A right angle stays one. Mirroring twice gives the normalised sentence, except for "anticlockwise".
+    A right angle stays a right angle. Mirroring twice gives the normalised sentence, except for "anticlockwise".
     """
     return SIDED.sub(lambda match: OTHER[match[0]], RULES.normalise(sentence))
 
 
-def alike(said: Sequence[Iterable[Hashable]]) -> list[int]:
-    """For each of N things the number of its group: equal for things that share something, or are linked by others."""
-    group, first = list(range(len(said))), dict[Hashable, int]()
+def alike(features: Sequence[Iterable[Hashable]]) -> list[int]:
+    """Group N things by their features: the number of each thing's group.
 
-    def root(one: int) -> int:
-        while group[one] != one:
-            group[one] = one = group[group[one]]
-        return one
+    Things are in one group if they share a feature, directly or through a chain of other things.
+    """
+    parent = list(range(len(features)))
+    first_with: dict[Hashable, int] = {}
 
-    for one, things in enumerate(said):
-        for thing in things:
-            group[root(one)] = root(first.setdefault(thing, one))
-    return [root(one) for one in range(len(said))]
+    def root(thing: int) -> int:
+        while parent[thing] != thing:
+            parent[thing] = parent[parent[thing]]  # path halving
+            thing = parent[thing]
+        return thing
+
+    for thing, own_features in enumerate(features):
+        for feature in own_features:
+            parent[root(thing)] = root(first_with.setdefault(feature, thing))
+    return [root(thing) for thing in range(len(features))]
 
 
 @dataclass(frozen=True)
 class Actions:
-    """Actions that motions show. of: that of each record, as it is and mirrored. sentences: those of each action that
-    are to train on, normalised; unseen: those whose wordings are for measuring."""
+    """Actions that motions show.
+
+    of: the action of each record, by its index and whether it is mirrored. sentences: normalised sentences of each
+    action to train on. unseen: those reserved for measuring.
+    """
 
     of: Mapping[tuple[int, bool], int]
     sentences: tuple[tuple[str, ...], ...]
     unseen: tuple[tuple[str, ...], ...]
 
     def __len__(self) -> int:
-        """Their number."""
+        """Number of actions."""
         return len(self.sentences)
 
 
 def actions_of(store: Store, records: tuple[int, ...]) -> Actions:
-    """The actions of some records; the mirror image of an action is another if one of its sentences says a side."""
+    """The actions of some records; an action whose sentences name a side has a mirror image that is another action."""
+    sided = _sided(store, records)
     numbers: dict[tuple[str, bool], int] = {}
     of: dict[tuple[int, bool], int] = {}
-    said: list[tuple[dict[str, None], dict[str, None]]] = []
-    entries = {record: store.records[record] for record in records}
-    sided = {e.shows for e in entries.values() if any(mirror_text(s) != RULES.normalise(s) for s in e.sentences)}
-    for record, entry in entries.items():
-        for mirrored, worded in ((False, RULES.normalise), (True, mirror_text)):
-            number = numbers.setdefault((entry.shows, mirrored and entry.shows in sided), len(numbers))
-            of[record, mirrored] = number
-            if number == len(said):
-                said.append(({}, {}))
-            for known, sentences in zip(said[number], (entry.sentences, entry.unseen), strict=True):
-                known.update(dict.fromkeys(worded(s) for s in sentences if usable(s)))
-    return Actions(of, tuple(tuple(found) for found, _ in said), tuple(tuple(found) for _, found in said))
+    # dicts, as sets that keep their order
+    sentences = defaultdict[int, dict[str, None]](dict)
+    unseen = defaultdict[int, dict[str, None]](dict)
+    for record, mirrored in product(records, (False, True)):
+        entry = store.records[record]
+        action = (entry.shows, mirrored and entry.shows in sided)
+        number = numbers.setdefault(action, len(numbers))
+        of[record, mirrored] = number
+        sentences[number] |= _worded(entry.sentences, mirrored)
+        unseen[number] |= _worded(entry.unseen, mirrored)
+    return Actions(of, tuple(map(tuple, sentences.values())), tuple(map(tuple, unseen.values())))
+
+
+def _sided(store: Store, records: tuple[int, ...]) -> set[str]:
+    """The actions of records with a sentence that names a side."""
+    sided = set()
+    for record in records:
+        entry = store.records[record]
+        if any(mirror_text(sentence) != RULES.normalise(sentence) for sentence in entry.sentences):
+            sided.add(entry.shows)
+    return sided
+
+
+def _worded(sentences: Iterable[str], mirrored: bool) -> dict[str, None]:
+    """The usable sentences, normalised and perhaps mirrored, as the keys of a dict."""
+    worded = mirror_text if mirrored else RULES.normalise
+    return dict.fromkeys(worded(sentence) for sentence in sentences if usable(sentence))

@@ -1,6 +1,6 @@
 """Windows of motions in ``root_sixd`` to train on: for a codec, for a net that fills gaps, and as codes.
 
-A window's chance goes by the root of how long its action is shown in total, so that rare actions are drawn more often.
+The chance of an action is proportional to the square root of its total duration, so rare actions are drawn more often.
 Letters in shapes: B windows, T frames, D channels, N steps of codes, P parts of a step (the root move first).
 """
 
@@ -26,14 +26,15 @@ Codes = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Window(Rows):
-    """frames: (B, T, D) in the contract's units, the first three channels as a codec's decoder gives them.
+    """B windows for a codec.
 
-    given: (B, T, D) as the encoder takes them. moves: (B, N) int64 entries of the book. way: (B, T, 3) the poses that
-    the moves lead to, each for all frames of its step.
+    frames: (B, T, D) in the contract's units, the first three channels as a codec's decoder gives them. inputs:
+    (B, T, D) as the encoder takes them. moves: (B, N) int64 entries of the book. way: (B, T, 3) the poses that the
+    moves lead to, each repeated for the frames of its step.
     """
 
     frames: Tensor
-    given: Tensor
+    inputs: Tensor
     moves: Tensor
     way: Tensor
 
@@ -42,64 +43,80 @@ class SixdWindows:
     """Draws windows of ``frames`` frames of some records, half of them mirrored."""
 
     def __init__(self, store: Store, records: tuple[int, ...], frames: int, hop: int, mirror: FrameMirror) -> None:
-        self.store, self.frames, self.hop, self.mirror = store, frames, hop, mirror
-        found = [(span, store.records[record].shows) for record in records for span in store.records[record].spans]
-        found = [(span, action) for span, action in found if span[1] - span[0] > frames]
-        if not found:
+        """hop: frames of a step of codes. DataError if no motion is long enough."""
+        self.store = store
+        self.frames = frames
+        self.hop = hop
+        self.mirror = mirror
+        self.spans: list[tuple[int, int]] = []
+        actions = []
+        for record in records:
+            entry = store.records[record]
+            for start, stop in entry.spans:
+                if stop - start > frames:
+                    self.spans.append((start, stop))
+                    actions.append(entry.shows)
+        if not self.spans:
             raise DataError(f"all motions are shorter than {frames + 1} frames")
-        self.spans = [span for span, _ in found]
+        # by the number of windows in a span, and the rarity of its action
         lengths = np.array([stop - start - frames for start, stop in self.spans], dtype=np.float64)
-        chances = lengths / _shown([action for _, action in found], lengths)
+        chances = lengths / _root_durations(actions, lengths)
         self.chances = chances / chances.sum()
 
     def sequences(self) -> list[Array]:
         """The poses of every span, to fit the book of root moves."""
-        store = self.store
-        return [poses_of(np.array(store.frames[slice(*span)], np.float64), store.fps) for span in self.spans]
+        return [poses_of(self._frames(start, stop), self.store.fps) for start, stop in self.spans]
 
     def middles(self, book: Array) -> Iterator[Window]:
         """One window from the middle of every span, not mirrored."""
         for start, stop in self.spans:
             first = (start + stop - self.frames) // 2
-            frames = np.array(self.store.frames[first : first + self.frames + 1], np.float64)
+            frames = self._frames(first, first + self.frames + 1)
             yield window_of(frames[None], self.store.fps, book, self.hop)
 
+    def _frames(self, start: int, stop: int) -> Array:
+        return np.array(self.store.frames[start:stop], np.float64)
+
     def favour(self, times: Array) -> None:
-        """Draw windows of each span so many times as often."""
+        """Multiply the chance of each span by its entry in ``times``."""
         self.chances = self.chances * times / (self.chances * times).sum()
 
     def draw(self, batch: int, book: Array, rng: np.random.Generator) -> Window:
-        """A batch of windows, their moves by a book (K, 3)."""
+        """A batch of windows; their moves are entries of a book (K, 3)."""
         spans = [self.spans[i] for i in rng.choice(len(self.chances), batch, p=self.chances)]
         starts = [int(rng.integers(start, stop - self.frames)) for start, stop in spans]
-        found = _drawn(self.store, starts, self.frames + 1, self.mirror, rng)
-        return window_of(found, self.store.fps, book, self.hop)
+        frames = _drawn(self.store, starts, self.frames + 1, self.mirror, rng)
+        return window_of(frames, self.store.fps, book, self.hop)
 
 
-def _shown(actions: Sequence[str | int], lengths: Array) -> Array:
-    """For each of some motions the root of how long its action is shown in total."""
-    _, which = np.unique(np.array(actions), return_inverse=True)
-    return np.sqrt(np.bincount(which, weights=lengths)[which])
+def _root_durations(actions: Sequence[str | int], lengths: Array) -> Array:
+    """For each motion the square root of the total duration of its action."""
+    _, action = np.unique(np.array(actions), return_inverse=True)
+    return np.sqrt(np.bincount(action, weights=lengths)[action])
 
 
 def _drawn(store: Store, starts: Sequence[int], count: int, mirror: FrameMirror, rng: np.random.Generator) -> Array:
-    """``count`` frames from each start (B, count, D), half of them mirrored."""
-    found = np.stack([np.array(store.frames[start : start + count], np.float64) for start in starts])
+    """``count`` frames from each start (B, count, D), half of the rows mirrored."""
+    rows = np.stack([np.array(store.frames[start : start + count], np.float64) for start in starts])
     mirrored = rng.random(len(starts)) < 0.5
-    found[mirrored] = mirror(found[mirrored])
-    return found
+    rows[mirrored] = mirror(rows[mirrored])
+    return rows
 
 
 def window_of(frames: Array, fps: float, book: Array, hop: int) -> Window:
-    """Windows of frames (B, T + 1, D), of which the last says only where the root goes."""
+    """Windows of frames (B, T + 1, D); the last frame serves only to know where the root goes."""
     poses = np.stack([poses_of(row, fps) for row in frames])
-    seen, moves, along = with_way(frames[:, :-1], poses, book, hop)
-    tensors = (seen, frames[:, :-1], moves, along)
-    return Window(*(torch.from_numpy(part if part.dtype == np.int64 else part.astype(np.float32)) for part in tensors))
+    inputs = frames[:, :-1]
+    decoded, moves, along = with_way(inputs, poses, book, hop)
+    return Window(_float_tensor(decoded), _float_tensor(inputs), torch.from_numpy(moves), _float_tensor(along))
+
+
+def _float_tensor(values: Array) -> Tensor:
+    return torch.from_numpy(values.astype(np.float32))
 
 
 def poses_of(frames: Array, fps: float) -> Array:
-    """The poses (T, 3) of frames (T, D) of ``root_sixd``: x, z and facing, the first at the origin."""
+    """The root poses (T, 3) of frames (T, D) of ``root_sixd``: x, z and facing; the first is at the origin."""
     steps = frames[:, :3] / fps
     steps[:1] = 0
     facing, x, z = way(steps)
@@ -113,13 +130,18 @@ def with_way(frames: Array, poses: Array, book: Array, hop: int) -> tuple[Array,
     """
     moves, led = nearest_moves(poses[..., ::hop, :], book)
     along = np.repeat(led[..., :-1, :], hop, axis=-2)
-    return np.concatenate([seen_from(along, poses[..., :-1, :]), frames[..., 3:]], axis=-1), moves, along
+    # the decoder gives root poses relative to the way of the moves
+    relative = seen_from(along, poses[..., :-1, :])
+    return np.concatenate([relative, frames[..., 3:]], axis=-1), moves, along
 
 
 @dataclass(frozen=True, eq=False)
 class GapWindow(Rows):
-    """Placed frames of E channels, seen from the last one before the gap. past: (B, P, E). plain: (B, N, E), a plain
-    way through the gap. after: (B, A, E). truth: (B, N, E), what was there."""
+    """Placed frames of E channels, relative to the last pose before the gap.
+
+    past: (B, P, E). plain: (B, N, E), the interpolation through the gap. after: (B, A, E). truth: (B, N, E), the
+    recorded frames of the gap.
+    """
 
     past: Tensor
     plain: Tensor
@@ -128,41 +150,49 @@ class GapWindow(Rows):
 
 
 class GapWindows:
-    """Draws windows with a gap of some records, half of them mirrored."""
+    """Draws windows with a gap from some records, half of them mirrored."""
 
     def __init__(self, store: Store, records: tuple[int, ...], longest: int, mirror: FrameMirror) -> None:
-        """longest: frames of the longest window; DataError where no motion is as long."""
-        self.store, self.mirror = store, mirror
-        entries = [store.records[record] for record in records]
-        spans = np.array([span for entry in entries for span in entry.spans]).reshape(-1, 2)
-        self.starts, self.lengths = spans[:, 0], spans[:, 1] - spans[:, 0]
-        if not len(spans) or self.lengths.max() < longest:
+        """longest: frames of the longest window; DataError if every motion is shorter."""
+        self.store = store
+        self.mirror = mirror
+        spans: list[tuple[int, int]] = []
+        actions = []
+        for record in records:
+            entry = store.records[record]
+            spans += entry.spans
+            actions += [entry.shows] * len(entry.spans)
+        self.starts = np.array([start for start, _ in spans])
+        self.lengths = np.array([stop - start for start, stop in spans])
+        if not spans or self.lengths.max() < longest:
             raise DataError(f"all motions are shorter than {longest} frames")
-        self.weights = 1 / _shown([entry.shows for entry in entries for _ in entry.spans], self.lengths)
+        self.weights = 1 / _root_durations(actions, self.lengths)
 
     def draw(self, batch: int, sizes: tuple[int, int, int], rng: np.random.Generator) -> GapWindow:
-        """A batch of windows with so many frames before, in and after the gap."""
+        """A batch of windows with ``sizes`` frames before, in and after the gap."""
         frames = sum(sizes)
-        room = np.maximum(self.lengths - frames + 1, 0) * self.weights
-        which = rng.choice(len(room), batch, p=room / room.sum())
-        starts = self.starts[which] + rng.integers(self.lengths[which] - frames + 1)
-        found = _drawn(self.store, starts.tolist(), frames, self.mirror, rng)
-        return gap_window(placed.placed_by_way(found, self.store.fps), sizes[0], sizes[1])
+        # by the number of windows in a span, and the rarity of its action
+        chances = np.maximum(self.lengths - frames + 1, 0) * self.weights
+        span = rng.choice(len(chances), batch, p=chances / chances.sum())
+        starts = self.starts[span] + rng.integers(self.lengths[span] - frames + 1)
+        rows = _drawn(self.store, starts.tolist(), frames, self.mirror, rng)
+        return gap_window(placed.placed_by_way(rows, self.store.fps), sizes[0], sizes[1])
 
 
 def gap_window(frames: Array, before: int, count: int) -> GapWindow:
     """Windows of placed frames (B, T, E), ``before`` of which are before a gap of ``count`` frames."""
-    seen = placed.seen_from(frames, placed.pose_of(frames[:, before - 1]))
-    past, truth, after = np.split(seen, [before, before + count], axis=1)
-    parts = (past, placed.bridge(past, after, count), after, truth)
-    return GapWindow(*(torch.from_numpy(part.astype(np.float32)) for part in parts))
+    relative = placed.seen_from(frames, placed.pose_of(frames[:, before - 1]))
+    past, truth, after = np.split(relative, [before, before + count], axis=1)
+    plain = placed.bridge(past, after, count)
+    return GapWindow(*map(_float_tensor, (past, plain, after, truth)))
 
 
 @dataclass(frozen=True, eq=False)
 class CodedMotion:
-    """A recording in codes (N, P), the end included where it ends. action: what it shows.
+    """A recording in codes (N, P), with the end code if the recording ends.
 
-    starts: whether it begins with the first step. first: whether it is the recording's first phase.
+    action: the number of the action shown. starts: whether the recording begins with the first step, rather than being
+    cut. first: whether it is the recording's first phase.
     """
 
     codes: Codes
@@ -172,19 +202,23 @@ class CodedMotion:
 
 
 def memory_of(motions: list[CodedMotion]) -> Tensor:
-    """The steps (M, P + 2) int16 of all motions in a row, each with its action and its age; of a recording in several
-    phases only the first."""
+    """The steps (M, P + 2) int16 of all first phases in a row, each with its action and its age."""
     rows = []
     for motion in motions:
         if motion.first:
-            ages = np.arange(len(motion.codes))[:, None] + (not motion.starts)  # what is cut off does not start
+            # no step of a cut recording has age 0, which is a motion's start
+            ages = np.arange(len(motion.codes))[:, None] + (not motion.starts)
             rows.append(np.concatenate([motion.codes, np.full_like(ages, motion.action), ages], axis=1))
     return torch.from_numpy(np.concatenate(rows).astype(np.int16))
 
 
 @dataclass(frozen=True, eq=False)
 class CodeBatch(Rows):
-    """B windows of N steps. codes, before: (B, N, P). action, age: (B, N). weights: (B, N), 0 after the end."""
+    """B windows of N steps.
+
+    codes: (B, N, P). before: (B, N, P), the codes one step earlier. action, age: (B, N). weights: (B, N) of the loss, 0
+    after the end.
+    """
 
     codes: Tensor
     before: Tensor
@@ -197,30 +231,46 @@ class CodeWindows:
     """Draws windows of coded motions."""
 
     def __init__(self, motions: list[CodedMotion], steps: int, end: int, first: float) -> None:
-        """first: how many times the first step of a motion counts, which chooses how the action is done."""
-        self.motions, self.steps, self.nothing, self.first = motions, steps, end + 1, first
+        """end: the end code. first: weight of the first step of a motion, which decides how the action is done."""
+        self.motions = motions
+        self.steps = steps
+        self.nothing = end + 1
+        self.first = first
         lengths = np.array([len(motion.codes) for motion in motions], dtype=np.float64)
-        chances = lengths / _shown([motion.action for motion in motions], lengths)
+        chances = lengths / _root_durations([motion.action for motion in motions], lengths)
         self.chances = chances / chances.sum()
 
     def draw(self, batch: int, unsaid: float, nobody: int, rng: np.random.Generator) -> CodeBatch:
         """A batch; a share ``unsaid`` of it has the action ``nobody``."""
-        parts = self.motions[0].codes.shape[1]
-        codes, before = (np.zeros((batch, self.steps, parts), dtype=np.int64) for _ in range(2))
-        action, age = (np.zeros((batch, self.steps), dtype=np.int64) for _ in range(2))
-        weights = np.zeros((batch, self.steps), dtype=np.float32)
-        for row, which in enumerate(rng.choice(len(self.chances), batch, p=self.chances)):
-            motion = self.motions[which]
-            # as often from the start as from any other place where a window begins
-            start = max(0, int(rng.integers(-self.steps // 2, max(1, len(motion.codes) - self.steps // 2))))
-            part = motion.codes[start : start + self.steps]
-            codes[row, : len(part)] = part
-            before[row, 1 : len(part)] = part[:-1]
-            before[row, 0] = motion.codes[start - 1] if start else 0
-            weights[row, : len(part)] = 1.0
-            if start == 0:
-                before[row, 0, 0] = self.nothing
-                weights[row, 0] = self.first if motion.starts else 0.0
-            age[row] = start + np.arange(self.steps)
-            action[row] = nobody if rng.random() < unsaid else motion.action
-        return CodeBatch(*map(torch.from_numpy, (codes, before, action, age, weights)))
+        rows = []
+        for number in rng.choice(len(self.chances), batch, p=self.chances):
+            motion = self.motions[number]
+            codes, before, age, weights = self._window(motion, self._start(motion, rng))
+            action = nobody if rng.random() < unsaid else motion.action
+            rows.append((codes, before, np.full_like(age, action), age, weights))
+        columns = [np.stack(column) for column in zip(*rows, strict=True)]
+        return CodeBatch(*map(torch.from_numpy, columns))
+
+    def _window(self, motion: CodedMotion, start: int) -> tuple[Codes, Codes, Codes, NDArray[np.float32]]:
+        """Codes (N, P), the codes one step earlier (N, P), ages (N,) and weights (N,) from one step on."""
+        window = motion.codes[start : start + self.steps]
+        count = len(window)
+        # windows that reach beyond the end are padded, with weight 0
+        codes = np.zeros((self.steps, window.shape[1]), dtype=np.int64)
+        codes[:count] = window
+        weights = np.zeros(self.steps, dtype=np.float32)
+        weights[:count] = 1.0
+        # the first step of a motion follows nothing
+        before = np.zeros_like(codes)
+        before[1:count] = window[:-1]
+        if start:
+            before[0] = motion.codes[start - 1]
+        else:
+            before[0, 0] = self.nothing
+            weights[0] = self.first if motion.starts else 0.0
+        return codes, before, start + np.arange(self.steps), weights
+
+    def _start(self, motion: CodedMotion, rng: np.random.Generator) -> int:
+        """A random first step; half a window of draws before the motion's start fall on the start itself."""
+        half = self.steps // 2
+        return max(0, int(rng.integers(-self.steps // 2, max(1, len(motion.codes) - half))))

@@ -1,8 +1,8 @@
-"""The store: a corpus prepared once, its frames in one memory-mapped array, and divided for training.
+"""The store: a corpus prepared once, its frames in one memory-mapped array, and its division for training.
 
-A folder with ``frames.npy``, (N, D) float32 in the contract's channels, and ``store.json``, which says what they are,
-where each record's sequences lie, and what was skipped. Or a folder with such a store for each of several
-representations, by their names.
+A store is a folder with ``frames.npy``, (N, D) float32 in the contract's channels, and ``store.json``, the index: the
+channels, the span of each record's sequences, and the skipped motions. Or it is a folder of such folders, one for each
+of several representations, by their names.
 """
 
 import json
@@ -29,15 +29,17 @@ from motet_train.data.preparation import Preparation, repeated
 Floats = NDArray[np.float32]
 Item = Record | Skipped
 
-FRAMES, INDEX = "frames.npy", "store.json"
+FRAMES = "frames.npy"
+INDEX = "store.json"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A record of the store: a motion or a piece of it, for each down-sampling offset the span (start, stop) of frames.
+    """A record of the store: a motion or a piece of it.
 
-    skeleton: the index of its figure among the store's. take: what must not be divided, shared by the pieces of a
-    motion. ends, starts: whether the motion ends and begins with it. Other fields: see
+    spans: of frames (start, stop), one for each down-sampling offset. skeleton: the index of its figure among the
+    store's. take: shared by records that must not be divided between training and test, such as the pieces of a motion.
+    ends, starts: whether it is the last and the first piece of its motion. Other fields: see
     :class:`motet_train.data.corpus.Record`.
     """
 
@@ -55,15 +57,16 @@ class Entry:
 
     @property
     def shows(self) -> str:
-        """The action shown, by the name that its corpus gives, or else by the record's own."""
+        """The action shown, as named by the corpus, or else the name of the take or of the record."""
         return self.action or self.take or self.name
 
 
 @dataclass(frozen=True, eq=False)
 class Store:
-    """A prepared corpus. frames: all frames (N, D) float32, memory-mapped, read-only.
+    """A prepared corpus.
 
-    skeletons: the different ones, in metres where their unit is known; each record has the index of its own.
+    frames: all frames (N, D) float32, memory-mapped, read-only. skeletons: the different figures, in metres where their
+    unit is known; each record has the index of its own.
     """
 
     frames: Floats
@@ -77,7 +80,7 @@ class Store:
 
     @property
     def skeleton(self) -> Skeleton | None:
-        """The first record's, which shows what is generated."""
+        """The first record's figure, on which generated motions are shown; None for joint angles alone."""
         return self.skeletons[0] if self.skeletons else None
 
     def sequence(self, record: int, offset: int = 0) -> Floats:
@@ -86,55 +89,68 @@ class Store:
         return self.frames[start:stop]
 
     def motion(self, record: int, offset: int = 0) -> Motion:
-        """The features of one record at one down-sampling offset, of its own figure."""
-        own = self.records[record].skeleton
-        skeleton = None if own is None else self.skeletons[own]
+        """The features of one record at one down-sampling offset, with its own figure."""
+        index = self.records[record].skeleton
+        skeleton = None if index is None else self.skeletons[index]
         values = self.sequence(record, offset).astype(np.float64)
         return Motion(values, self.channels, self.units, self.fps, skeleton)
 
     def contract(self, indices: Sequence[int]) -> MotionContract:
         """The motion contract with mean and standard deviation over the records ``indices`` only, 0 where dead."""
-        parts = [self.frames[slice(*span)] for index in indices for span in self.records[index].spans]
-        count = sum(map(len, parts))
+        sequences = []
+        for index in indices:
+            sequences += [self.frames[start:stop] for start, stop in self.records[index].spans]
+        count = sum(map(len, sequences))
         if not count:
             raise DataError("mean and standard deviation need at least one record")
-        mean = sum((part.sum(axis=0, dtype=np.float64) for part in parts), np.zeros(len(self.channels))) / count
-        squares = sum((((part - mean) ** 2).sum(axis=0) for part in parts), np.zeros(len(self.channels)))
+        # in two passes, one sequence in memory at a time
+        zero = np.zeros(len(self.channels))
+        mean = sum((frames.sum(axis=0, dtype=np.float64) for frames in sequences), zero) / count
+        squares = sum((((frames - mean) ** 2).sum(axis=0) for frames in sequences), zero)
         std = living(np.sqrt(squares / count), self.units)
         return MotionContract(self.representation, self.channels, self.units, self.fps, mean, std, self.skeleton)
 
     @staticmethod
     def open(path: Path) -> "Store":
-        """Open what :func:`prepare` wrote; DataError where it is not a complete store."""
+        """Open a store that :func:`prepare` wrote; DataError if it is incomplete."""
         try:
-            data = json.loads((path / INDEX).read_text(encoding="utf-8"))
+            index = json.loads((path / INDEX).read_text(encoding="utf-8"))
             frames = np.load(path / FRAMES, mmap_mode="r")
-            skeletons = tuple(Skeleton.from_json(skeleton) for skeleton in data["skeletons"])
-            entries = tuple(_entry(entry) for entry in data["records"])
-            skipped = tuple(Skipped(**item) for item in data["skipped"])
-            channels, units, fps = tuple(data["channels"]), tuple(data["units"]), float(data["fps"])
-            representation = str(data["representation"])
+            store = Store(
+                frames,
+                str(index["representation"]),
+                tuple(index["channels"]),
+                tuple(index["units"]),
+                float(index["fps"]),
+                tuple(map(Skeleton.from_json, index["skeletons"])),
+                tuple(map(_entry, index["records"])),
+                tuple(Skipped(**item) for item in index["skipped"]),
+            )
         except (OSError, KeyError, TypeError, ValueError, RecursionError, MotetError) as error:
             raise DataError(f"{path} is not a prepared store: {error}") from error
-        stop = max((stop for entry in entries for _, stop in entry.spans), default=0)
-        if frames.shape != (stop, len(channels)) or frames.dtype != np.float32:
+        # the last span ends where the frames end
+        stops = [0]
+        for entry in store.records:
+            stops += [stop for _, stop in entry.spans]
+        if frames.shape != (max(stops), len(store.channels)) or frames.dtype != np.float32:
             raise DataError(f"{path / FRAMES} does not match {INDEX}: prepare the corpus again")
-        return Store(frames, representation, channels, units, fps, skeletons, entries, skipped)
+        return store
 
 
 def _entry(data: dict[str, Any]) -> Entry:
+    """An entry from JSON, whose lists become tuples."""
     spans = tuple((int(start), int(stop)) for start, stop in data["spans"])
-    said = {key: tuple(data.get(key, ())) for key in ("sentences", "unseen", "gaits")}
-    return Entry(**{**data, **said, "spans": spans})
+    texts = {key: tuple(data.get(key, ())) for key in ("sentences", "unseen", "gaits")}
+    return Entry(**{**data, **texts, "spans": spans})
 
 
 def is_store(path: Path) -> bool:
-    """Whether a store is at a place, of one representation or several."""
+    """Whether there is a store at a path, of one representation or several."""
     return (path / INDEX).is_file() or any(path.glob(f"*/{INDEX}"))
 
 
 def part(path: Path, representation: str) -> Path:
-    """The store in a representation at a place: the part of that name, or else the place itself."""
+    """The path of the store in a representation: the part of that name if there is one, else the path itself."""
     return path / representation if (path / representation / INDEX).is_file() else path
 
 
@@ -144,7 +160,7 @@ def prepare(
     preparation: Preparation,
     progress: Callable[[Item], object] = lambda item: None,
 ) -> Store:
-    """Write the store of a corpus, see :func:`prepare_parts`."""
+    """Write the store of a corpus in one representation, see :func:`prepare_parts`."""
     prepare_parts(items, path, {".": preparation}, progress)
     return Store.open(path)
 
@@ -158,32 +174,37 @@ def prepare_parts(
 ) -> None:
     """Write stores of a corpus into the new folder ``path``, whole or not at all, one motion in memory at a time.
 
-    parts: the preparation of each, by its folder inside. progress: called with each item when it is done; what some
-    part could not use comes as Skipped. shard: which of the corpus the items are; the index says so for
+    parts: the preparation of each, by its folder inside ``path``. progress: called with each item when it is done, as
+    Skipped if some part could not use it. shard: the shard of the corpus that the items are, noted in the index for
     :func:`motet_train.data.merging.merge_stores`.
 
-    The first usable motion sets channels and the joints' axes; others are converted to these, and one that lacks
-    channels, or whose bones point elsewhere at rest, is skipped, as is any that the representation refuses.
-    OutputError if there is something at ``path``, DataError if no motion can be used.
+    The first usable motion determines the channels and the joints' axes, to which the others are converted. A motion
+    that lacks channels, has bones that point elsewhere at rest, or is refused by the representation, is skipped.
+    OutputError if ``path`` exists, DataError if no motion can be used.
     """
     with new_folder(path) as folder, ExitStack() as files:
+        # a writer for each representation
         writers = []
         for name, preparation in parts.items():
             (folder / name).mkdir(exist_ok=True)
             writers.append(_Preparing(files.enter_context((folder / name / FRAMES).open("wb")), preparation))
+        # each item is read once, and goes to all of them
         for item in items:
-            added = [writer.add(item) for writer in writers]
-            progress(next((one for one in added if isinstance(one, Skipped)), item))
+            results = [writer.add(item) for writer in writers]
+            progress(next((result for result in results if isinstance(result, Skipped)), item))
         for name, writer in zip(parts, writers, strict=True):
-            index = writer.finish() | ({} if shard is None else {"shard": str(shard)})
+            index = writer.finish()
+            if shard is not None:
+                index["shard"] = str(shard)
             (folder / name / INDEX).write_text(json.dumps(index), encoding="utf-8")
 
 
 class StoreWriter:
-    """Writes ``frames.npy``, one sequence after the other, and gathers what ``store.json`` says."""
+    """Writes ``frames.npy``, one sequence after the other, and collects the content of ``store.json``."""
 
     def __init__(self, file: BinaryIO, representation: str) -> None:
-        self.file, self.representation = file, representation
+        self.file = file
+        self.representation = representation
         self.first: Motion | None = None
         self.skeletons: dict[Skeleton, int] = {}
         self.entries: list[Entry] = []
@@ -191,7 +212,7 @@ class StoreWriter:
         self.frames = 0
 
     def put(self, features: Motion) -> tuple[int, int]:
-        """Write a sequence; its span of frames."""
+        """Write a sequence and return its span of frames."""
         if self.first is None:
             self.first = features
             self._header()
@@ -200,17 +221,17 @@ class StoreWriter:
         return self.frames - len(features), self.frames
 
     def skeleton(self, skeleton: Skeleton) -> int:
-        """The number of a figure."""
+        """The index of a figure, which is added if it is new."""
         return self.skeletons.setdefault(skeleton, len(self.skeletons))
 
     def _header(self) -> None:
-        """Write the header of an NPY file, whose length does not depend on the number of frames."""
+        """Write the header of an NPY file; its length does not depend on the number of frames."""
         assert self.first is not None
         header = {"descr": "<f4", "fortran_order": False, "shape": (self.frames, len(self.first.channels))}
         np.lib.format.write_array_header_1_0(self.file, header)
 
     def finish(self) -> dict[str, Any]:
-        """Write the header, now that the number of frames is known; the content of ``store.json``."""
+        """Write the header, now that the number of frames is known, and return the content of ``store.json``."""
         if self.first is None:
             reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.skipped[:3])
             raise DataError(f"no motion can be used, {len(self.skipped)} were skipped: {reasons}")
@@ -228,7 +249,7 @@ class StoreWriter:
 
 
 class _Preparing(StoreWriter):
-    """Prepares one item after the other."""
+    """Prepares and writes one item after the other."""
 
     def __init__(self, file: BinaryIO, preparation: Preparation) -> None:
         super().__init__(file, preparation.representation)
@@ -245,23 +266,36 @@ class _Preparing(StoreWriter):
         return item
 
     def _write(self, record: Record) -> None:
-        how = self.preparation
-        pieces = how.pieces(record.motion)
-        found = [list(sequences(how.representation, piece, how.fps, self.first)) for piece in pieces]
-        if record.loops:
-            found = [list(map(repeated, phases)) for phases in found]
-        for number, phases in enumerate(found, start=1):
-            spans = tuple(map(self.put, phases))
-            own, skeleton = None, phases[-1].skeleton
-            if skeleton is not None:
-                own = self.skeleton(skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0))
-            name = record.name if len(found) == 1 else f"{record.name}.{number}"
-            place = record.take or record.name, number == len(found), number == 1
-            said = record.sentences, spans, own, record.unseen, *place, record.action, record.gaits
-            self.entries.append(Entry(name, record.subject, *said))
+        preparation = self.preparation
+        pieces: list[list[Motion]] = []
+        for piece in preparation.pieces(record.motion):
+            # one sequence for each down-sampling offset
+            features = sequences(preparation.representation, piece, preparation.fps, self.first)
+            pieces.append([repeated(phase) if record.loops else phase for phase in features])
+        for number, phases in enumerate(pieces, start=1):
+            entry = Entry(
+                record.name if len(pieces) == 1 else f"{record.name}.{number}",
+                record.subject,
+                record.sentences,
+                spans=tuple(map(self.put, phases)),
+                skeleton=self._figure(phases[-1].skeleton),
+                unseen=record.unseen,
+                take=record.take or record.name,
+                ends=number == len(pieces),
+                starts=number == 1,
+                action=record.action,
+                gaits=record.gaits,
+            )
+            self.entries.append(entry)
+
+    def _figure(self, skeleton: Skeleton | None) -> int | None:
+        """The index of a figure, in metres if its unit is known."""
+        if skeleton is None:
+            return None
+        return self.skeleton(skeleton if skeleton.metres_per_unit is None else skeleton.scaled(1.0))
 
     def finish(self) -> dict[str, Any]:
-        """As of any writer, with a hint where no figure is human."""
+        """As in any writer, with a hint for figures that are not human."""
         try:
             return super().finish()
         except DataError as error:
@@ -270,7 +304,7 @@ class _Preparing(StoreWriter):
 
 
 SPLITS = ("trial", "subject", "none")
-"""How motions are divided, see :func:`split`."""
+"""The ways to divide motions, see :func:`split`."""
 
 
 @dataclass(frozen=True)
@@ -283,12 +317,12 @@ class Split:
 
 
 def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
-    """Divide motions .8/.1/.1 by chance (Plappert et al. 2017, section 5.1), the same for the same seed.
+    """Divide motions .8/.1/.1 at random (Plappert et al. 2017, section 5.1); a seed always gives the same parts.
 
-    by: "trial", which keeps the pieces of a take together, or "subject" to keep all motions of a person together, so
-    that validation and test show people never seen in training; these parts then have at most .1 each. "none" trains on
-    everything, the validation and test motions of "trial" as well. Patterns with a "*", such as "ACCAD_*,CC0_*", name
-    the clips of the test part; of the others people are for validation. DataError where a part would be empty.
+    by: "trial" keeps the pieces of a take together. "subject" keeps all motions of a person together, so that
+    validation and test show people never seen in training; these parts then have at most .1 each. "none" trains on
+    everything, including the validation and test motions of "trial". Patterns with a "*", such as "ACCAD_*,CC0_*",
+    select the clips of the test part; the rest is divided by subject. DataError if a part would be empty.
     """
     if "*" in by:
         return _without(entries, seed, by)
@@ -296,35 +330,57 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
         raise DataError(f"motions are split by trial, by subject, by none or by a pattern with a *, not by {by!r}")
     if by == "none":
         return replace(split(entries, seed), train=tuple(range(len(entries))))
-    groups: dict[str, list[int]] = {}
-    for index, entry in enumerate(entries):
-        groups.setdefault(entry.subject if by == "subject" else entry.take or entry.name, []).append(index)
+    groups = _groups(entries, by)
     wanted = max(1, round(0.1 * len(entries)))
-    parts: list[list[int]] = [[], [], []]
-    for key in np.random.default_rng(seed).permutation(sorted(groups)).tolist():
-        room = [2, 1, 0] if len(parts[1]) >= len(parts[2]) else [1, 2, 0]
-        fits = (part for part in room if part == 0 or len(parts[part]) + len(groups[key]) <= wanted)
-        parts[next(fits)].extend(groups[key])
+    parts = _divided(groups, wanted, np.random.default_rng(seed))
     if not all(parts):
-        who = " (who moved: the column subject of the table, or else the name up to its first _)"
+        hint = " (who moved: the column subject of the table, or else the name up to its first _)"
         raise DataError(
             f"{len(entries)} motions of {len(groups)} {by}s are too few for training, validation and test"
-            + who * (by == "subject")
+            + (hint if by == "subject" else "")
         )
-    return Split(*(tuple(sorted(part)) for part in parts))
+    train, validation, test = (tuple(sorted(part)) for part in parts)
+    return Split(train, validation, test)
+
+
+def _groups(entries: Sequence[Entry], by: str) -> dict[str, list[int]]:
+    """The motions of each person or take."""
+    groups: dict[str, list[int]] = {}
+    for index, entry in enumerate(entries):
+        key = entry.subject if by == "subject" else entry.take or entry.name
+        groups.setdefault(key, []).append(index)
+    return groups
+
+
+def _divided(groups: Mapping[str, list[int]], wanted: int, rng: np.random.Generator) -> list[list[int]]:
+    """Training, validation and test part of groups of motions that stay together.
+
+    Groups come in random order; each goes into the smaller one of validation and test that has room for it, of
+    ``wanted`` motions, or else into training.
+    """
+    train: list[int] = []
+    validation: list[int] = []
+    test: list[int] = []
+    for key in rng.permutation(sorted(groups)).tolist():
+        group = groups[key]
+        held_out = (test, validation) if len(validation) >= len(test) else (validation, test)
+        part = next((part for part in held_out if len(part) + len(group) <= wanted), train)
+        part.extend(group)
+    return [train, validation, test]
 
 
 def matches(name: str, patterns: str) -> bool:
-    """Whether a clip's name matches one of several patterns, separated by commas."""
-    return any(fnmatchcase(name, one) for one in patterns.split(","))
+    """Whether the name of a clip matches one of several patterns, separated by commas."""
+    return any(fnmatchcase(name, pattern) for pattern in patterns.split(","))
 
 
-def _without(entries: Sequence[Entry], seed: int, pattern: str) -> Split:
-    """What matches a pattern is the test part; of the rest the test part is for training, too."""
-    test = tuple(i for i, entry in enumerate(entries) if matches(entry.name, pattern))
-    rest = [index for index in range(len(entries)) if index not in set(test)]
+def _without(entries: Sequence[Entry], seed: int, patterns: str) -> Split:
+    """The split whose test part are the clips that match; validation are other people, and training is the rest."""
+    test = [index for index, entry in enumerate(entries) if matches(entry.name, patterns)]
+    rest = [index for index, entry in enumerate(entries) if not matches(entry.name, patterns)]
     if not test or not rest:
-        raise DataError(f"{len(test)} of {len(entries)} motions match {pattern}: some must, and some must not")
+        raise DataError(f"{len(test)} of {len(entries)} motions match {patterns}: some must, and some must not")
     parts = split([entries[index] for index in rest], seed, "subject")
     train = sorted(rest[place] for place in (*parts.train, *parts.test))
-    return Split(tuple(train), tuple(rest[place] for place in parts.validation), test)
+    validation = [rest[place] for place in parts.validation]
+    return Split(tuple(train), tuple(validation), tuple(test))

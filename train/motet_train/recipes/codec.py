@@ -114,7 +114,7 @@ def badly_shown(net: MotionCodec, windows: SixdWindows) -> Array:
     net.eval()
     errors = []
     for window in windows.middles(book):
-        decoded = net.decode(window.moves, net.encode(window.given))
+        decoded = net.decode(window.moves, net.encode(window.inputs))
         found, true = (places_in_world(net, one, window.way) for one in (decoded, window.frames))
         off = (found - found[:, :, :1]) - (true - true[:, :, :1])
         errors.append(float(off.norm(dim=-1).mean()))
@@ -137,7 +137,7 @@ def fit_book(poses: list[Array], hop: int, size: int, seed: int) -> Array:
 
 def _loss(net: MotionCodec, window: Window, weights: Tensor, sharp: float) -> Terms:
     """Errors of decoder frames in standard deviations, of places (m), speeds (m/s) and the logarithm of the jerk."""
-    frames = net.decode(window.moves, net.encode(window.given)).float()
+    frames = net.decode(window.moves, net.encode(window.inputs)).float()
     scale = torch.where(net.scale > 0, net.scale, torch.inf)
     scale = torch.cat([net.path_scale, scale[3:]])
     off = functional.smooth_l1_loss(frames / scale, window.frames / scale, beta=0.2, reduction="none")
@@ -161,7 +161,7 @@ def _measured(net: MotionCodec, seen: Window) -> dict[str, float]:
     """On the validation windows: the mean error of joints in cm, the sharpness of movement over the true one, and the
     share of codes in use."""
     window = seen.to(net.mean.device)
-    values = net.encode(window.given)
+    values = net.encode(window.inputs)
     found, true = (places_in_world(net, one, window.way) for one in (net.decode(window.moves, values), window.frames))
     codes = net.to_codes(values).cpu().numpy()
     used = [len(np.unique(codes[..., group])) / net.config.codes for group in range(net.config.groups)]

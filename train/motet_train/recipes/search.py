@@ -74,7 +74,7 @@ def config_for(store: Store, found: Divided, recipe: Recipe) -> JointEmbeddingCo
 def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed: int, whole: bool = False) -> Views:
     """The views of examples that a net is trained on. whole: and of each motion as it is."""
     windows, store = (visits.windows[0], visits.windows[1]), examples.store
-    cut = partial(seen_as, how=visits.disguise, windows=windows, channels=store.channels, fps=store.fps)
+    cut = partial(seen_as, disguise=visits.disguise, windows=windows, channels=store.channels, fps=store.fps)
     return views(examples, net.statistics, visits.views, cut, seed, whole)
 
 
