@@ -1,4 +1,4 @@
-"""Learning by gradient descent: the settings, a step, and the learner of all nets that autograd can train."""
+"""Gradient descent: its settings, a single step, and the learner of all nets that autograd trains."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,19 +23,19 @@ from motet_train.trainer import Part
 
 @dataclass(frozen=True)
 class Training:
-    """How a net is trained.
+    """Settings of gradient descent.
 
-    epochs or steps: how long; one of the two. every: of these from one line of the log, validation and checkpoint to
-    the next. accumulate: a batch is computed in so many parts, whose gradients are added up: that takes less memory and
-    gives the same step, but for what rows of a batch have in common: terms beside the loss, as of describe's summary,
-    weigh as much in each part as in the whole. warm_up: over this many the learning rate rises, by equal steps, to the
-    whole; falling: the share, at the end, over which it falls linearly to zero; cosine: it falls to a hundredth along
-    half a cosine; decay: a factor for every so many.
-    l2: the weight of the squared weights, not biases, in the loss. weight_decay: of "adamw" and "muon", apart from
-    the loss. clip: the greatest norm of the gradient. adversary: the weight of a discriminator's opinion in the loss.
-    average: of the running mean of weights, which is then what is kept. keep: the weights of the "best" validation or
-    the "last". patience: training ends when so many validations in a row brought nothing better. precision: of the
-    products of matrices in training; what is trained is float32.
+    epochs or steps: the length; one of the two. every: number of these between two log lines, validations and
+    checkpoints. accumulate: compute a batch in this many parts and add up their gradients, which takes less memory and
+    gives the same step; only terms beside the loss, such as describe's summary, weigh as much in each part as in the
+    whole. warm_up: number over which the learning rate rises in equal steps. falling: final share of the training over
+    which it falls linearly to zero. cosine: it falls to a hundredth along half a cosine. decay: a factor, and after how
+    many it is applied again.
+    l2: weight in the loss of the squared weights, without biases. weight_decay: of "adamw" and "muon", apart from the
+    loss. clip: largest norm of the gradient. adversary: weight of a discriminator in the loss. average: decay of a
+    running mean of the weights, which is then what is kept. keep: the weights of the "best" validation or the "last".
+    patience: early stopping after this many validations without improvement. precision: of matrix products in
+    training; parameters are float32.
     """
 
     epochs: int = 0
@@ -60,17 +60,17 @@ class Training:
 
     @property
     def unit(self) -> Literal["epoch", "step"]:
-        """What the length is counted in."""
+        """The unit of the length."""
         return "epoch" if self.epochs else "step"
 
     @property
     def length(self) -> int:
-        """Of the whole training."""
+        """The number of epochs or steps of the training."""
         return self.epochs or self.steps
 
 
 def rate(training: Training, done: int) -> float:
-    """The learning rate of the epoch or step that begins after ``done`` of them."""
+    """The learning rate of the epoch or step after ``done`` of them."""
     factor = min(1.0, (done + 1) / training.warm_up) if training.warm_up else 1.0
     if training.falling:
         factor *= min(1.0, (training.length - done) / (training.falling * training.length))
@@ -91,21 +91,21 @@ OPTIMISERS: Mapping[str, Callable[..., torch.optim.Optimizer | Muon]] = {
 
 
 class Term(NamedTuple):
-    """Losses of any shape, whose mean is made small, and how many things that is the mean of."""
+    """Losses of any shape, whose mean is minimised, and the number of things of which it is the mean."""
 
     losses: Tensor
     things: int
 
 
 Terms = tuple[Term, ...]
-"""The losses of a batch, and means that are added to each of them."""
+"""The losses of a batch, followed by terms whose means are added to each of them."""
 
 
 class Batch(Protocol):
-    """Rows to train on; a tensor is one."""
+    """Rows to train on; a tensor is a batch."""
 
     def to(self, device: Any, /) -> Any:
-        """The same on a device."""
+        """The same batch on a device."""
 
     def __len__(self) -> int: ...
 
@@ -113,11 +113,12 @@ class Batch(Protocol):
 
 
 class _Called(nn.Module):
-    """A net with its loss as what it computes, which is what several processes have to agree on."""
+    """A net whose forward computes the loss, so that DistributedDataParallel can average its gradients."""
 
     def __init__(self, net: nn.Module, loss: Callable[[Any], Terms]) -> None:
         super().__init__()
-        self.net, self.loss = net, loss
+        self.net = net
+        self.loss = loss
 
     def forward(self, batch: Any) -> Terms:
         return self.loss(batch)
@@ -127,38 +128,32 @@ class Descent:
     """Steps of gradient descent of one net on one loss."""
 
     def __init__(self, net: nn.Module, loss: Callable[[Any], Terms], training: Training) -> None:
-        self.net, self.training = net, training
-        # added to the loss, l2 times the squared weights is a decay of twice as much
-        decay = training.weight_decay if training.optimiser in ("adamw", "muon") else 2 * training.l2
-        trained = [parameter for parameter in net.parameters() if parameter.requires_grad]
-        matrices = set(net.matrices()) if isinstance(net, Net) and training.optimiser == "muon" else set()
-        groups = [
-            {"params": [one for one in trained if one in matrices], "weight_decay": decay, "muon": True},
-            {"params": [one for one in trained if one.ndim > 1 and one not in matrices], "weight_decay": decay},
-            {"params": [one for one in trained if one.ndim <= 1], "weight_decay": 0.0},
-        ]
-        made = OPTIMISERS[training.optimiser]
-        self.optimiser = made([group for group in groups if group["params"]], lr=training.learning_rate)
+        self.net = net
+        self.training = training
+        make_optimiser = OPTIMISERS[training.optimiser]
+        self.optimiser = make_optimiser(_parameter_groups(net, training), lr=training.learning_rate)
         self._called: nn.Module = _Called(net, loss)
         if distributed.count() > 1:
             self._called = DistributedDataParallel(self._called)
 
     def step(self, parts: Sequence[tuple[Any, bool]], clip: float | None = None) -> tuple[float, float]:
-        """One step on this process' rows of a batch, in parts whose gradients are added up; its share of the mean loss,
-        and how many things that is of.
+        """One step on this process' rows of a batch, in parts whose gradients are added up.
 
-        Of each part it is said whether its rows are real, or there only because a process needs some. One part is in
-        memory at a time.
+        Each part comes with a flag: False for rows that only fill up a process without any of its own. One part is in
+        memory at a time. Returns this process' share of the mean loss, and the number of things that it is of.
         """
         self.optimiser.zero_grad(set_to_none=True)
-        losses, counts = list[float](), list[float]()
+        losses = list[float]()
+        counts = list[float]()
         for number, (rows, real) in enumerate(parts, start=1):
-            with nullcontext() if number == len(parts) else self._apart():
+            # processes exchange gradients once, after the last part
+            with nullcontext() if number == len(parts) else self._without_exchange():
                 loss, things = self._share(rows, real)
                 counts.append(things)
                 torch.autograd.backward(loss * (things / counts[0] * distributed.count()))
             losses.append(loss.item())
         if len(parts) > 1:
+            # the sum over parts, in units of the first, becomes a mean
             for parameter in self.net.parameters():
                 if parameter.grad is not None:
                     parameter.grad *= counts[0] / sum(counts)
@@ -168,15 +163,17 @@ class Descent:
         return float(np.average(losses, weights=counts)), sum(counts)
 
     def _share(self, rows: Any, real: bool) -> tuple[Tensor, float]:
-        """This process' share of the mean loss of a part, and how many things that is of.
+        """This process' share of the mean loss of a part, and the number of things that it is of.
 
-        Of several processes each weighs what it has so that their mean is the loss of the whole part.
+        Shares are weighted so that their sum over all processes is the loss of the whole part.
         """
         device = next(self.net.parameters()).device
         with torch.autocast(device.type, torch.bfloat16, enabled=self.training.precision == "bfloat16"):
             terms: Terms = self._called(rows.to(device))
+        # the weight of this process in each term
         counts = distributed.summed([term.things * real for term in terms], device)
         shares = [term.things * real / count for term, count in zip(terms, counts, strict=True)]
+        # the other terms are added in units of the first one's share
         losses = terms[0].losses
         for term, share in zip(terms[1:], shares[1:], strict=True):
             losses = losses + term.losses * (share / shares[0] if real else 0.0)
@@ -185,17 +182,42 @@ class Descent:
             raise RunError("the loss is no longer finite: start again with a lower learning rate or another seed")
         return loss, counts[0]
 
-    def _apart(self) -> AbstractContextManager[None]:
-        """Processes do not tell each other the gradients of what is computed in this."""
+    def _without_exchange(self) -> AbstractContextManager[None]:
+        """A context in which gradients are not exchanged between processes."""
         several = isinstance(self._called, DistributedDataParallel)
         return self._called.no_sync() if several else nullcontext()  # type: ignore[operator]
+
+
+def _parameter_groups(net: nn.Module, training: Training) -> list[dict[str, Any]]:
+    """The trained parameters of a net: those for Muon, other matrices, and vectors, which do not decay."""
+    # added to the loss, l2 times the squared weights is a decay of twice as much
+    decay = training.weight_decay if training.optimiser in ("adamw", "muon") else 2 * training.l2
+    for_muon = set(net.matrices()) if isinstance(net, Net) and training.optimiser == "muon" else set()
+    muon = []
+    matrices = []
+    vectors = []
+    for parameter in net.parameters():
+        if not parameter.requires_grad:
+            continue
+        if parameter in for_muon:
+            muon.append(parameter)
+        elif parameter.ndim > 1:
+            matrices.append(parameter)
+        else:
+            vectors.append(parameter)
+    groups = [
+        {"params": muon, "weight_decay": decay, "muon": True},
+        {"params": matrices, "weight_decay": decay},
+        {"params": vectors, "weight_decay": 0.0},
+    ]
+    return [group for group in groups if group["params"]]
 
 
 class GradientLearner:
     """A net that learns by gradient descent, see :class:`motet_train.trainer.Learner`.
 
-    loss: of some rows. batches: those of an epoch, or the one of a step. validate: of the net that is kept. told: told
-    before each step which share of the training is done. others: what else has a state.
+    loss: of some rows. batches: those of an epoch, or the batch of a step. validate: of the net that is kept. on_share:
+    called before each step with the share of the training that is done. others: further parts with a state.
     """
 
     target = -math.inf
@@ -207,23 +229,27 @@ class GradientLearner:
         loss: Callable[[Any], Terms],
         batches: Callable[[np.random.Generator], Iterable[Batch]],
         validate: Callable[[], Mapping[str, Any]] = dict,
-        told: Callable[[float], object] = lambda share: None,
+        on_share: Callable[[float], object] = lambda share: None,
         others: Mapping[str, Part] = MappingProxyType({}),
     ) -> None:
         if training.batch < distributed.count():
             raise RunError(f"{distributed.count()} processes need batches of at least as many: use a larger --batch")
-        self.training, self.net, self.batches = training, net, batches
-        self.validate, self.told = validate, told
+        self.training = training
+        self.net = net
+        self.batches = batches
+        self.validate = validate
+        self.on_share = on_share
         self.descent = Descent(net, loss, training)
         self.parts: dict[str, Part] = {"net": net, "optimiser": self.descent.optimiser, **others}
-        self.kept, self.average = net, None
+        self.kept = net
+        self.average = None
         if training.average:
-            self.average = self.parts["average"] = AveragedModel(
-                net,
-                multi_avg_fn=get_ema_multi_avg_fn(training.average),  # type: ignore[no-untyped-call]
-            )
+            multi_avg_fn = get_ema_multi_avg_fn(training.average)  # type: ignore[no-untyped-call]
+            self.average = self.parts["average"] = AveragedModel(net, multi_avg_fn=multi_avg_fn)
             self.kept = self.average.module
-        self.unit, self.keep, self.patience = training.unit, training.keep, training.patience
+        self.unit = training.unit
+        self.keep = training.keep
+        self.patience = training.patience
         self.ends = [*range(training.every, training.length, training.every), training.length]
         self.first = 1 if training.epochs else 0
 
@@ -233,7 +259,7 @@ class GradientLearner:
         for done in range(start, stop):
             for group in self.descent.optimiser.param_groups:
                 group["lr"] = rate(self.training, done)
-            self.told(done / self.training.length)
+            self.on_share(done / self.training.length)
             for batch in self.batches(rng):
                 loss, weight = self.descent.step(list(self._parts(batch)), self.training.clip)
                 if self.average is not None:
@@ -242,7 +268,7 @@ class GradientLearner:
         self.net.eval()
 
     def _parts(self, batch: Batch) -> Iterator[tuple[Any, bool]]:
-        """This process' rows of each part of a batch, and whether there are any; otherwise one of another's."""
+        """This process' rows of each part of a batch, or False with a row of another process if it has none."""
         count = min(self.training.accumulate, len(batch))
         for part in range(count):
             rows = batch[part::count]

@@ -1,7 +1,7 @@
-"""Training on several processes, which ``torchrun`` starts: who this one is, and what all of them agree on.
+"""Training on several processes started by ``torchrun``: the rank of this one, and values shared by all.
 
-Every process makes the same global batches, which costs little beside a step, and takes its own rows of them.
-Outside of ``torchrun`` there is one process, and nothing here does anything.
+Every process makes the same global batches, which costs little compared to a step, and takes its own rows of them.
+Without ``torchrun`` there is one process, and nothing here has an effect.
 """
 
 import os
@@ -18,7 +18,7 @@ Value = TypeVar("Value")
 
 @contextmanager
 def processes(device: str) -> Iterator[str]:
-    """Join the processes that ``torchrun`` started, where it did; gives the device of this one."""
+    """Join the processes of ``torchrun``, if it is used; yields the device of this process."""
     if not launched():
         yield device
         return
@@ -38,17 +38,17 @@ def launched() -> bool:
 
 
 def rank() -> int:
-    """The number of this process; only 0 writes."""
+    """The rank of this process; only rank 0 writes files."""
     return dist.get_rank() if dist.is_available() and dist.is_initialized() else 0
 
 
 def count() -> int:
-    """How many processes there are."""
+    """The number of processes."""
     return dist.get_world_size() if dist.is_available() and dist.is_initialized() else 1
 
 
 def summed(values: Sequence[float], device: torch.device) -> list[float]:
-    """The sums over all processes."""
+    """The sum of each value over all processes."""
     if count() == 1:
         return list(values)
     total: Tensor = torch.tensor(values, dtype=torch.float64, device=device)
@@ -57,9 +57,9 @@ def summed(values: Sequence[float], device: torch.device) -> list[float]:
 
 
 def from_first(make: Callable[[], Value]) -> Value:
-    """What the first process makes, in all of them."""
+    """Call ``make`` in the first process, and return its result in all."""
     if count() == 1:
         return make()
-    found = [make() if rank() == 0 else None]
-    dist.broadcast_object_list(found)
-    return found[0]  # type: ignore[return-value]
+    values = [make() if rank() == 0 else None]
+    dist.broadcast_object_list(values)
+    return values[0]  # type: ignore[return-value]

@@ -1,4 +1,4 @@
-"""The optimiser Muon (Jordan et al. 2024) in float32, and what trains a net by it and AdamW."""
+"""The optimiser Muon (Jordan et al. 2024) in float32, and its combination with AdamW."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -9,21 +9,23 @@ import torch
 from torch import Tensor
 
 NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)
-"""Jordan's polynomial a x + b x^3 + c x^5: five times over it brings singular values of 0.001 to 1 near 1."""
+"""Coefficients of Jordan's polynomial a x + b x^3 + c x^5; five iterations bring values from 0.001 to 1 close to 1."""
 
 MOMENTUM = 0.95
 
 
 class Muon:
-    """Groups marked "muon" go by Muon, with steps as large as AdamW's; all others by AdamW.
+    """Muon for parameter groups marked "muon", with steps as large as AdamW's, and AdamW for the others.
 
-    Muon's steps are orthogonal matrices: each direction of a matrix is learned at the same rate, also the rare ones.
+    Muon's steps are orthogonal matrices: every direction of a matrix, also a rare one, is learned at the same rate.
     """
 
     def __init__(self, groups: Iterable[Mapping[str, Any]], lr: float) -> None:
-        given = [dict(group) for group in groups]
-        matrices = [group for group in given if "muon" in group]
-        others = [group for group in given if "muon" not in group]
+        matrices = []
+        others = []
+        for group in groups:
+            part = matrices if "muon" in group else others
+            part.append(dict(group))
         self.parts: list[torch.optim.Optimizer] = []
         if matrices:
             self.parts.append(Orthogonal(matrices, lr))
@@ -32,7 +34,7 @@ class Muon:
 
     @property
     def param_groups(self) -> list[dict[str, Any]]:
-        """Those of both, as torch's optimisers have them."""
+        """The parameter groups of both, as in torch's optimisers."""
         return list(chain.from_iterable(part.param_groups for part in self.parts))
 
     def step(self) -> None:
@@ -50,16 +52,16 @@ class Muon:
         return {"parts": [part.state_dict() for part in self.parts]}
 
     def load_state_dict(self, state_dict: Mapping[str, Any], /) -> None:
-        """Take up what :meth:`state_dict` gave."""
+        """Restore a state from :meth:`state_dict`."""
         for part, state in zip(self.parts, state_dict["parts"], strict=True):
             part.load_state_dict(state)
 
 
 class Orthogonal(torch.optim.Optimizer):
-    """Muon of matrices: ``torch.optim.Muon`` with ``adjust_lr_fn="match_rms_adamw"``, in float32 throughout.
+    """Muon for matrices: ``torch.optim.Muon`` with ``adjust_lr_fn="match_rms_adamw"``, but all in float32.
 
-    torch's own computes in bfloat16, which takes ten times as long on processors without it, and trains otherwise on
-    one that has it.
+    torch's Muon computes in bfloat16, which takes ten times as long on processors without it, and gives other results
+    on those with it.
     """
 
     def __init__(self, groups: list[dict[str, Any]], lr: float) -> None:
@@ -67,26 +69,31 @@ class Orthogonal(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: None = None) -> None:  # type: ignore[override]
-        """Move each matrix by the orthogonal matrix nearest to its gradient's running mean, one step ahead of it."""
+        """Move each matrix by the orthogonalised running mean of its gradient, with Nesterov momentum."""
         for group in self.param_groups:
             rate = group["lr"]
-            for one in group["params"]:
-                if one.grad is None:
+            for matrix in group["params"]:
+                if matrix.grad is None:
                     continue
-                mean = self.state[one].setdefault("momentum_buffer", torch.zeros_like(one.grad))
-                mean.lerp_(one.grad, 1 - MOMENTUM)
-                one.mul_(1 - rate * group["weight_decay"])
-                turned = orthogonal(one.grad.lerp(mean, MOMENTUM))
-                one.add_(turned, alpha=-0.2 * rate * math.sqrt(max(one.shape)))
+                # running mean of the gradient
+                mean = self.state[matrix].setdefault("momentum_buffer", torch.zeros_like(matrix.grad))
+                mean.lerp_(matrix.grad, 1 - MOMENTUM)
+                # weight decay, apart from the gradient
+                matrix.mul_(1 - rate * group["weight_decay"])
+                # a step of the root mean square that AdamW's steps have
+                direction = orthogonal(matrix.grad.lerp(mean, MOMENTUM))
+                matrix.add_(direction, alpha=-0.2 * rate * math.sqrt(max(matrix.shape)))
 
 
 def orthogonal(matrix: Tensor) -> Tensor:
-    """A matrix (N, M) with all its singular values brought near 1, by five steps of Newton and Schulz."""
+    """A matrix (N, M) with all its singular values brought close to 1, by five Newton-Schulz iterations."""
     a, b, c = NEWTON_SCHULZ
+    # the smaller Gram matrix is cheaper
     wide = matrix.shape[0] <= matrix.shape[1]
-    found: Tensor = matrix if wide else matrix.T
-    found = found / found.norm().clamp(min=1e-7)
+    x: Tensor = matrix if wide else matrix.T
+    # singular values of at most 1
+    x = x / x.norm().clamp(min=1e-7)
     for _ in range(5):
-        gram = found @ found.T
-        found = a * found + (b * gram + c * gram @ gram) @ found
-    return found if wide else found.T
+        gram = x @ x.T
+        x = a * x + (b * gram + c * gram @ gram) @ x
+    return x if wide else x.T

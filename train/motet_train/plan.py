@@ -1,4 +1,4 @@
-"""The plan by which all that ships is trained on one's own recordings: one store, and stage after stage a run."""
+"""Train all shipped kinds of models on your own recordings: one store, and a run for each stage."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -21,21 +21,24 @@ from motet_train.trainer import LOG
 
 
 def kind_for(recipe: Recipe) -> str:
-    """What a store is prepared for that a recipe trains on, see :func:`motet_train.data.preparation.preparation`."""
+    """The kind of store that a recipe trains on, see :func:`motet_train.data.preparation.preparation`."""
     if recipe.loop == "codes" or recipe.verb in ("control", "fill"):
         return "codes"
     return "predict" if recipe.verb == "predict" else "describe"
 
 
 def store_for(place: Path, recipe: Recipe) -> Path:
-    """Where the store that a recipe trains on is, if one is there: the place, or its part in the representation."""
+    """The path of the store that a recipe trains on: ``place``, or its part in the representation."""
     return part(place, preparation(kind_for(recipe), kit=False).representation)
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One training. verb: what it is for. train: its recipe's function of a store, a job, the store's name, how it is
-    divided, and the runs that it needs. needs: the stage that each of these comes from, by the argument's name."""
+    """One training.
+
+    verb: the verb of the model that it contributes to. train: trains on a store, with a job, the store's name, the way
+    to divide it, and the runs that it needs. needs: the stages of these runs, by the name of the argument.
+    """
 
     verb: str
     recipe: Recipe
@@ -62,19 +65,19 @@ STAGES: Mapping[str, Stage] = {
     "describe": Stage("describe", language.DEFAULT, language.train_language),
     "known": Stage("describe", known.DEFAULT, known.train_known, {"writer": "describe"}),
 }
-"""By their names, those that take least time first, each after those that it needs."""
+"""The stages by name: each after those that it needs, short ones first."""
 
 PLANNED_VERBS = tuple(dict.fromkeys(stage.verb for stage in STAGES.values()))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is trained on, and where to.
+    """The trainings of some verbs.
 
-    data: a corpus (:func:`motet_train.data.corpus.read_corpus`), or where its store is. out: the folder of the runs,
-    and of the corpus' store. verbs: which. by: how motions are divided, see :func:`motet_train.data.store.split`.
-    vectors: of words, from which the net of actions starts. changes: of stages' recipes, by name
-    (:func:`motet_train.settings.read_stages`). about: of the runs but for their names.
+    data: a corpus (:func:`motet_train.data.corpus.read_corpus`), or the path of its store. out: the folder of the runs,
+    and of the corpus' store. by: how motions are divided, see :func:`motet_train.data.store.split`. vectors: word
+    vectors from which the action net starts. changes: settings of stages by name
+    (:func:`motet_train.settings.read_stages`). about: of the runs, but for their names.
     """
 
     data: Corpus | Path
@@ -87,17 +90,14 @@ class Plan:
     about: About = field(default_factory=lambda: About("", "motet_train.plan"))
 
     def train(self) -> None:
-        """Train all that is not trained yet, each from its checkpoint if it has one; one that fails stops no other.
+        """Train all stages that are not finished, each from its checkpoint if it has one; a failure stops no other.
 
-        RunError names the stages that failed.
+        RunError says how many stages failed.
         """
-        stages = {
-            name: replace(stage, recipe=changed(stage.recipe, self.changes.get(name, {}), {}))
-            for name, stage in STAGES.items()
-            if stage.verb in self.verbs
-        }
+        stages = self._stages()
         log.info("%d trainings into %s: %s", len(stages), self.out, ", ".join(stages))
-        place, failed = self.store(), set[str]()
+        place = self.store()
+        failed = set[str]()
         for name, stage in stages.items():
             if is_finished(self.out / name):
                 log.info("%s is trained already", name)
@@ -109,18 +109,26 @@ class Plan:
                 self._train(name, stage, place)
             except MotetError as error:
                 failed.add(name)
-                seen = f"; see {self.out / name / LOG}" if (self.out / name / LOG).is_file() else ""
-                log.error("%s failed: %s%s", name, error, seen)
+                hint = f"; see {self.out / name / LOG}" if (self.out / name / LOG).is_file() else ""
+                log.error("%s failed: %s%s", name, error, hint)
         if failed:
             raise RunError(f"of {len(stages)} trainings {len(failed)} failed; the same command tries them again")
 
+    def _stages(self) -> dict[str, Stage]:
+        """The stages of the verbs, with changed recipes."""
+        stages = {}
+        for name, stage in STAGES.items():
+            if stage.verb in self.verbs:
+                stages[name] = replace(stage, recipe=changed(stage.recipe, self.changes.get(name, {}), {}))
+        return stages
+
     def store(self) -> Path:
-        """Where the store is; of a corpus, prepared for every verb if it is not there."""
+        """The path of the store; that of a corpus is prepared for all verbs if it does not exist."""
         if isinstance(self.data, Path):
             return self.data
         place = self.out / "store"
         if place.exists():
-            log.info("the store %s is there already: remove it to have recordings prepared anew", place)
+            log.info("the store %s exists: remove it to prepare the recordings anew", place)
         else:
             log.info("preparing %d motion files into %s", len(self.data), place)
             with preparing(len(self.data)) as done:
@@ -130,12 +138,13 @@ class Plan:
     def _train(self, name: str, stage: Stage, place: Path) -> None:
         store = Store.open(store_for(place, stage.recipe))
         needs = {key: self.out / need for key, need in stage.needs.items()}
-        given: dict[str, Any] = {key: Run.load(folder) for key, folder in needs.items()}
+        inputs: dict[str, Any] = {key: Run.load(folder) for key, folder in needs.items()}
         vectors = self.vectors if name == "actions" else None
         if name == "actions":
-            given["vectors"] = vectors
+            inputs["vectors"] = vectors
         about = replace(self.about, name=name)
-        options = {  # of the command of this stage alone
+        # the options of the command that trains this stage alone
+        options = {
             "data": place,
             "split": None if name == "control" else self.by,
             **needs,
@@ -147,4 +156,4 @@ class Plan:
             "data-licence": about.data_licence,
         }
         job = Job(stage.recipe, about, self.out / name, self.device)
-        trained(job, lambda job: stage.train(store, job, place.name, self.by, **given), options, resume=True)
+        trained(job, lambda job: stage.train(store, job, place.name, self.by, **inputs), options, resume=True)

@@ -1,4 +1,4 @@
-"""The progress of a training: a bar on a terminal, elsewhere a line for each chunk; and TensorBoard."""
+"""The progress of a training: a bar on a terminal, else a line for each chunk; and TensorBoard."""
 
 import logging
 import math
@@ -18,11 +18,11 @@ from motet_train.runs import RunError
 log = logging.getLogger("motet.train")
 
 SOON = 10.0
-"""Seconds after which a line is said, as a chunk, or preparing motions, may take many minutes."""
+"""Seconds between lines, where a chunk or the preparation of motions takes many minutes."""
 
 
 class Watcher:
-    """Is told about a training as it runs, and says nothing; ``done`` of ``total`` epochs or steps are done."""
+    """Receives the progress of a training, and ignores it. ``done`` of ``total`` epochs or steps are done."""
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
         """After each step."""
@@ -35,17 +35,18 @@ SILENT = Watcher()
 
 
 class Shown(Watcher):
-    """A bar with loss, speed and remaining time; where nobody watches, a line soon and one for each chunk.
+    """A bar with loss, speed and remaining time; without a terminal, an early line and one for each chunk.
 
-    The lines are logged by "motet.train"; with ``motet --quiet`` there are neither.
-    boards: the folder for TensorBoard; RunError where that is not installed.
+    The lines are logged by "motet.train"; with ``motet --quiet`` there is neither bar nor line.
+    boards: the folder for TensorBoard; RunError if that is not installed.
     """
 
     def __init__(self, boards: Path | None = None) -> None:
         self.watched = sys.stderr.isatty() and distributed.rank() == 0 and log.isEnabledFor(logging.INFO)
         self.writer: Any = None
         self.bar: tqdm[Any] | None = None
-        self.done, self.due = 0, time.monotonic() + SOON
+        self.done = 0
+        self.due = time.monotonic() + SOON
         if boards is not None and distributed.rank() == 0:
             try:
                 from torch.utils.tensorboard import SummaryWriter
@@ -56,7 +57,7 @@ class Shown(Watcher):
             self.writer = SummaryWriter(boards)
 
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
-        """Move the bar; say the first line."""
+        """Move the bar, or log the first line."""
         if self.bar is None:
             self.done = done - 1
             self.bar = tqdm(total=total, initial=self.done, unit=f" {unit}s", disable=not self.watched)
@@ -67,25 +68,27 @@ class Shown(Watcher):
         self.bar.update(done - (unit == "epoch") - self.bar.n)  # an epoch is done after its last step
 
     def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
-        """Write the line where it is wanted."""
-        figures = {key: value for key, value in line.items() if isinstance(value, int | float) and key != unit}
+        """Log the line of a chunk, or move the bar, and add its numbers to TensorBoard."""
+        figures = {key: value for key, value in line.items() if isinstance(value, int | float)}
+        done = figures.pop(unit)
         if self.writer is not None:
             for key, value in figures.items():
-                self.writer.add_scalar(key, value, line[unit])
+                self.writer.add_scalar(key, value, done)
         if not self.watched:
-            left = figures["seconds"] / (line[unit] - self.done) * (total - line[unit])
-            said = ", ".join(f"{key.replace('_', ' ')} {value:.5g}" for key, value in figures.items())
-            self._say("%s %d of %d: %s, %.0f s left", unit, line[unit], total, said, left)
+            seconds_left = figures["seconds"] / (done - self.done) * (total - done)
+            text = ", ".join(f"{key.replace('_', ' ')} {value:.5g}" for key, value in figures.items())
+            self._say("%s %d of %d: %s, %.0f s left", unit, done, total, text, seconds_left)
         if self.bar is not None:
-            self.bar.update(line[unit] - self.bar.n)
-        self.done, self.due = line[unit], math.inf
+            self.bar.update(done - self.bar.n)
+        self.done = done
+        self.due = math.inf
 
     def _say(self, line: str, *values: object) -> None:
         if distributed.rank() == 0 and not self.watched:
             log.info(line, *values)
 
     def close(self) -> None:
-        """Leave the terminal and the files in order."""
+        """Close the bar and the TensorBoard log."""
         if self.bar is not None:
             self.bar.close()
         if self.writer is not None:
@@ -94,8 +97,9 @@ class Shown(Watcher):
 
 @contextmanager
 def preparing(total: int) -> Iterator[Callable[[Record | Skipped], None]]:
-    """A bar of motions that are prepared, and the names of those skipped; where nobody watches, a line now and then."""
-    count, due = 0, time.monotonic() + SOON
+    """A bar of prepared motions, with the names of those skipped; without a terminal, a line now and then."""
+    count = 0
+    due = time.monotonic() + SOON
     with tqdm(total=total, unit=" motions", disable=None) as bar:
 
         def done(item: Record | Skipped) -> None:

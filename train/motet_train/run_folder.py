@@ -1,4 +1,4 @@
-"""A training in its folder: whether one can start, resume or is finished there, on which device, and how precisely."""
+"""A training in its folder: whether it can start or resume there, or is finished; its device and precision."""
 
 import json
 import shutil
@@ -22,12 +22,11 @@ from motet_train.trainer import CHECKPOINT, LOG
 def trained(
     job: Job, train: Callable[[Job], Run], options: Mapping[str, Any], resume: bool = False, boards: bool = False
 ) -> Run:
-    """Train in the job's folder, by all processes that there are; the run is left there.
+    """Train in the job's folder, with all processes, and leave the run there.
 
-    train: is given the job, in a precision that the device has, and with what shows its progress. options: what
-    repeats the run, beside the recipe. resume: from the folder's checkpoint, if it has one. boards: log for
-    TensorBoard.
-    OutputError if a run can neither start nor resume in that folder.
+    train: called with the job, whose precision is adapted to the device and whose progress is shown. options: those
+    that repeat the run, besides the recipe. resume: continue from the folder's checkpoint, if it has one. boards: log
+    for TensorBoard. OutputError if a run can neither start nor resume in that folder.
     """
     if job.device == "cuda" and not torch.cuda.is_available():
         raise RunError("torch finds no CUDA device: use --device cpu")
@@ -42,7 +41,7 @@ def trained(
 
 
 def _for_device(recipe: Recipe, device: str) -> Recipe:
-    """The recipe, in float32 where it says bfloat16 and the device does not have that, which is logged."""
+    """The recipe, in float32 if it asks for bfloat16 and the device lacks it, which is logged."""
     if recipe.training is None or recipe.training.precision == "float32" or has_bfloat16(device):
         return recipe
     if distributed.rank() == 0:
@@ -51,13 +50,14 @@ def _for_device(recipe: Recipe, device: str) -> Recipe:
 
 
 def has_bfloat16(device: str) -> bool:
-    """Whether a device multiplies in bfloat16 itself.
+    """Whether a device has products in bfloat16.
 
-    Where it does not, torch's layers take 4 to 30 times as long as in float32, and its LSTM refuses to run.
+    Without them, torch's layers take 4 to 30 times as long as in float32, and its LSTM refuses to run.
     """
     if device.startswith("cuda"):
         return bool(torch.cuda.is_bf16_supported(including_emulation=False))
-    try:  # what torch no longer answers is a no; oneDNN's answer heeds ONEDNN_MAX_CPU_ISA
+    # these functions are private, so may disappear from torch; oneDNN's answer respects ONEDNN_MAX_CPU_ISA
+    try:
         return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported() and torch.cpu._is_avx512_bf16_supported())
     except (AttributeError, RuntimeError):
         return False
@@ -65,9 +65,10 @@ def has_bfloat16(device: str) -> bool:
 
 @contextmanager
 def run_folder(out: Path, resume: bool) -> Iterator[None]:
-    """The folder to train in. Where training ends early: say how it continues, and leave nothing where it cannot.
+    """Make the folder to train in.
 
-    OutputError if a run can neither start nor resume in that folder.
+    When training is interrupted, log how to continue; a folder without a checkpoint is removed. OutputError if a run
+    can neither start nor resume in that folder.
     """
     if distributed.rank() != 0:
         yield
@@ -85,22 +86,22 @@ def run_folder(out: Path, resume: bool) -> Iterator[None]:
         if _unborn(out):
             shutil.rmtree(out)
         elif isinstance(error, KeyboardInterrupt):
-            how = "" if resume else " with --resume"
-            log.warning("stopped: the same command%s continues from %s", how, out / CHECKPOINT)
+            option = "" if resume else " with --resume"
+            log.warning("stopped: the same command%s continues from %s", option, out / CHECKPOINT)
         raise
 
 
 def is_finished(out: Path) -> bool:
-    """Whether a folder holds a run that was trained to its end."""
+    """Whether a folder holds a finished run."""
     try:
-        # a run that ended says how long it took
+        # only a finished run states how long it took
         return "seconds" in json.loads((out / MANIFEST).read_text(encoding="utf-8"))["training"]
     except (OSError, ValueError, KeyError, TypeError):
         return False
 
 
 def _unborn(out: Path) -> bool:
-    """Whether a folder is empty, or a run's that was killed before its first checkpoint: it may start over."""
+    """Whether a folder is empty, or has a run killed before its first checkpoint, so that training can start over."""
     if not out.is_dir() or (out / CHECKPOINT).exists():
         return False
     ours = (MANIFEST, SETTINGS, LOG, WEIGHTS, "tensorboard")

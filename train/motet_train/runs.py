@@ -1,4 +1,4 @@
-"""A training run on disk: ``run.json``, which will be the bundle's manifest, and ``weights.pt``."""
+"""A training run on disk: ``run.json``, the later manifest of the bundle, and ``weights.pt``."""
 
 import io
 import json
@@ -35,7 +35,8 @@ from motet_train.papers import li2018
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion
 from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM
 
-MANIFEST, WEIGHTS = "run.json", "weights.pt"
+MANIFEST = "run.json"
+WEIGHTS = "weights.pt"
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "tdbn": TDBN.from_config,
@@ -52,19 +53,19 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "trajectory": Predictor.from_config,
     **{name: partial(li2018.from_config, name) for name in li2018.SYSTEMS},
 }
-"""Name of a model -> how it is built from the configuration in its manifest."""
+"""Name of a model -> its constructor from the configuration in the manifest."""
 
 DAMAGE = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, AssertionError)
-"""What torch raises besides for a file that is damaged."""
+"""Errors, besides UnpicklingError, that torch raises for a damaged file."""
 
 
 class RunError(MotetError, ValueError):
-    """A training run that cannot be read, or not be resumed."""
+    """A training run that cannot be read or resumed."""
 
 
 @dataclass(frozen=True)
 class About:
-    """What a manifest says that no computation finds out; a licence that nobody stated is None."""
+    """The entries of a manifest that the user states; a licence that is not stated is None."""
 
     name: str
     command: str
@@ -74,18 +75,20 @@ class About:
 
 
 class TorchGraph:
-    """A torch module behind the same face as an ONNX graph, so that one decoding loop serves both.
+    """A torch module with the interface of an ONNX graph, so that one decoding loop serves both.
 
-    Its forward takes the inputs by name and gives the outputs in order.
+    Its forward takes the inputs by name and returns the outputs in order.
     """
 
     def __init__(self, module: nn.Module, spec: GraphSpec) -> None:
-        self.module, self.spec = module.eval(), spec
+        self.module = module.eval()
+        self.spec = spec
 
     @torch.inference_mode()
     def __call__(self, feeds: Arrays) -> dict[str, NDArray[Any]]:
         """Run eagerly on the CPU."""
-        outputs = self.module(**{tensor.name: torch.tensor(feeds[tensor.name]) for tensor in self.spec.inputs})
+        inputs = {tensor.name: torch.tensor(feeds[tensor.name]) for tensor in self.spec.inputs}
+        outputs = self.module(**inputs)
         outputs = outputs if isinstance(outputs, tuple) else (outputs,)
         return {tensor.name: output.numpy() for tensor, output in zip(self.spec.outputs, outputs, strict=True)}
 
@@ -98,11 +101,11 @@ class Run:
     model: Net
 
     def torch_graphs(self) -> dict[str, Graph]:
-        """The graphs, run by torch."""
+        """The model's graphs by role, run by torch."""
         return {role: TorchGraph(module, spec) for role, (module, spec) in self.model.graphs().items()}
 
     def bundle_model(self) -> BundleModel:
-        """The model as it will be in its bundle, run by torch."""
+        """The model as in its bundle, run by torch."""
         return build(Manifest.from_json(self.manifest), self.torch_graphs(), self.model.tables())
 
     def save(self, folder: Path) -> None:
@@ -112,7 +115,7 @@ class Run:
 
     @staticmethod
     def load(folder: Path) -> "Run":
-        """Read what :meth:`save` wrote, onto the CPU; RunError where that is not possible."""
+        """Read a run that :meth:`save` wrote, onto the CPU; RunError if that fails."""
         for name in (MANIFEST, WEIGHTS):
             if not (folder / name).is_file():
                 raise RunError(f"{folder} is not a training run: it has no {name}")
@@ -126,11 +129,14 @@ class Run:
 
 
 def torch_model(like: BundleModel, threads: int, compiled: bool = False) -> BundleModel:
-    """A bundle's model with the same sizes and tables in torch, its weights untrained, eager or by ``torch.compile``,
-    which fails at the first call where there is no C++ compiler: the baselines of ``motet bench``."""
+    """A model of a bundle's sizes and tables in torch, with untrained weights: the baseline of ``motet bench``.
+
+    compiled: use ``torch.compile``, which fails at the first call if there is no C++ compiler.
+    """
     torch.set_num_threads(threads)
     manifest = like.manifest
-    model = build(manifest, Run(manifest.source, MODELS[manifest.model](manifest.config)).torch_graphs(), like.tables)
+    net = MODELS[manifest.model](manifest.config)
+    model = build(manifest, Run(manifest.source, net).torch_graphs(), like.tables)
     if compiled:
         for graph in model.graphs.values():
             if isinstance(graph, TorchGraph):
@@ -146,13 +152,13 @@ def to_bytes(state: Any) -> bytes:
 
 
 def read_state(path: Path) -> Any:
-    """What was written by :func:`to_bytes`, on the CPU wherever it was; RunError where that is not possible.
+    """Read what :func:`to_bytes` wrote, from any device onto the CPU; RunError if that fails.
 
     Nothing in it is executed: a file with other objects than tensors and plain values is refused.
     """
     try:
         return torch.load(path, map_location="cpu", weights_only=True)
-    except pickle.UnpicklingError as error:  # whose text is torch's, of eight lines, on how to execute it nevertheless
+    except pickle.UnpicklingError as error:  # its text, from torch, explains in eight lines how to execute it anyway
         reason = "it is damaged, or holds objects other than tensors and plain values, which could execute anything"
         raise RunError(f"{path} cannot be read: {reason}") from error
     except DAMAGE as error:
@@ -160,32 +166,35 @@ def read_state(path: Path) -> Any:
 
 
 def surroundings(device: str) -> dict[str, Any]:
-    """Where a training ran, for its manifest."""
-    processes = {"processes": distributed.count()} if distributed.count() > 1 else {}
-    return {
-        "threads": torch.get_num_threads(),
-        **processes,
-        "machine": f"{platform.system()} {platform.machine()}, {device.partition(':')[0].upper()}",
-        "torch": torch.__version__,
-    }
+    """The machine and software of a training, for its manifest."""
+    kind = device.partition(":")[0].upper()
+    about: dict[str, Any] = {"threads": torch.get_num_threads()}
+    if distributed.count() > 1:
+        about["processes"] = distributed.count()
+    about["machine"] = f"{platform.system()} {platform.machine()}, {kind}"
+    about["torch"] = torch.__version__
+    return about
 
 
 def refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
     """RunError if the run.json at ``path`` is of a run that was started with other data or settings."""
     if not path.exists():
         return
-
-    def essence(manifest: Mapping[str, Any]) -> dict[str, Any]:
-        """What has to be as it was for a run to continue: not the length of its training."""
-        training = manifest.get("training", {})
-        recipe = {key: value for key, value in training.get("recipe", {}).items() if key not in ("epochs", "steps")}
-        same = {key: manifest.get(key) for key in ("model", "config", "motion", "vocabulary", "control")}
-        return {**same, **{key: training.get(key) for key in ("seed", "data", "split")}, **recipe}
-
     try:
-        before = essence(json.loads(path.read_text()))
+        before = _essence(json.loads(path.read_text()))
     except (AttributeError, TypeError, ValueError, RecursionError) as error:
         raise RunError(f"{path} is not a run that can be resumed: {error}") from error
-    different = [key for key, value in essence(manifest).items() if before.get(key) != value]
+    different = [key for key, value in _essence(manifest).items() if before.get(key) != value]
     if different:
         raise RunError(f"{path.parent} was started with other settings, so cannot be resumed: {', '.join(different)}")
+
+
+def _essence(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries that must be equal for a run to continue; the length of training may differ."""
+    training = manifest.get("training", {})
+    essence = {key: manifest.get(key) for key in ("model", "config", "motion", "vocabulary", "control")}
+    essence |= {key: training.get(key) for key in ("seed", "data", "split")}
+    for key, value in training.get("recipe", {}).items():
+        if key not in ("epochs", "steps"):
+            essence[key] = value
+    return essence

@@ -1,6 +1,6 @@
-"""The training loop of all models: chunk after chunk, each written down whole, so that a run can stop and resume.
+"""The training loop of all models: chunk after chunk, each saved whole, so that a run can stop and resume.
 
-What is trained is a :class:`Learner`. The random numbers of a chunk depend on the seed and the chunk's number alone.
+It trains a :class:`Learner`. The random numbers of a chunk depend on the seed and the chunk's number alone.
 """
 
 import json
@@ -19,10 +19,11 @@ from motet_train import distributed
 from motet_train.progress import SILENT, Watcher
 from motet_train.runs import WEIGHTS, RunError, read_state, to_bytes
 
-CHECKPOINT, LOG = "checkpoint.pt", "log.jsonl"
+CHECKPOINT = "checkpoint.pt"
+LOG = "log.jsonl"
 
 Line = dict[str, Any]
-"""What ``log.jsonl`` says of a chunk: how many units are done, the loss, what validation found, seconds, speed."""
+"""A line of ``log.jsonl`` for a chunk: the units done, the loss, the results of validation, seconds and speed."""
 
 
 class Part(Protocol):
@@ -32,16 +33,16 @@ class Part(Protocol):
         """The state, of tensors and plain values."""
 
     def load_state_dict(self, state_dict: Any, /) -> Any:
-        """Take up a state."""
+        """Restore a state."""
 
 
 class Learner(Protocol):
-    """What the loop trains.
+    """An object that the loop trains.
 
-    kept: the net whose weights are kept. parts: all that has a state, by the names it is saved and restored by.
-    unit: what the length of a training is counted in. ends: how many units are done after each chunk. first: the
-    number of the first chunk. keep: the weights of the "best" validation, or the "last". patience: training ends when
-    so many validations in a row brought nothing better. target: it ends when validation reaches it.
+    kept: the net whose weights are kept. parts: everything with a state, by the name under which it is saved. unit:
+    of the length of a training. ends: units done after each chunk. first: number of the first chunk. keep: the weights
+    of the "best" validation, or the "last". patience: early stopping after this many validations without improvement.
+    target: training ends when validation reaches it.
     """
 
     kept: nn.Module
@@ -57,25 +58,27 @@ class Learner(Protocol):
         """Train from one unit to another; after each step the units done, the loss and how much it weighs."""
 
     def validate(self) -> Mapping[str, Any]:
-        """What the log says of the chunk: under "validation" what has to become small, if there is such a thing."""
+        """Entries of the log for the chunk: under "validation" the number to minimise, if there is one."""
 
 
 def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT) -> list[Line]:
-    """Train to the end; ``learner.kept`` comes back with the weights to keep. Returns the log.
+    """Train to the end, leaving the weights to keep in ``learner.kept``, and return the log.
 
     After each chunk the existing ``folder`` holds ``log.jsonl``, the weights to keep and a checkpoint, each written
-    whole. Where there is a checkpoint, training resumes after it, on the CPU to the same bits as if it had never
-    stopped. RunError where the checkpoint cannot be read or is another training's, or the loss is no longer finite.
+    whole. If there is a checkpoint, training resumes after it, on the CPU to the same bits as if it had never stopped.
+    RunError if the checkpoint cannot be read or belongs to another training, or the loss is no longer finite.
     """
     log = _resume(folder / CHECKPOINT, learner)
     while not _done(log, learner):
-        start, number = log[-1][learner.unit] if log else 0, learner.first + len(log)
+        start = log[-1][learner.unit] if log else 0
+        number = learner.first + len(log)
         stop = min(end for end in learner.ends if end > start)
         # torch's random numbers depend on the seed, the number of the chunk and the process alone
         entropy = (seed, number, distributed.rank()) if distributed.rank() else (seed, number)
         torch.manual_seed(int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]))
         rng = np.random.default_rng((seed, number))
-        began, losses = time.perf_counter(), []
+        began = time.perf_counter()
+        losses = []
         for done, loss, weight in learner.chunk(start, stop, rng):
             losses.append((loss, weight))
             progress.step(done, learner.ends[-1], learner.unit, loss)
@@ -83,9 +86,9 @@ def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT)
         mean = np.average([loss for loss, _ in losses], weights=[weight for _, weight in losses])
         # each process has its share of every loss
         (total,) = distributed.summed([float(mean)], next(learner.kept.parameters()).device)
-        found = {"loss": round(total, 6), **distributed.from_first(learner.validate)}
+        results = {"loss": round(total, 6), **distributed.from_first(learner.validate)}
         speed = {"seconds": round(seconds, 3), "steps_per_second": round(len(losses) / seconds, 3)}
-        log.append({learner.unit: stop, **found, **speed})
+        log.append({learner.unit: stop, **results, **speed})
         if distributed.rank() == 0:
             _write(folder, learner, log)
         progress.chunk(log[-1], learner.ends[-1], learner.unit)
@@ -96,7 +99,7 @@ def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT)
 
 
 def kept(log: Sequence[Line], keep: Literal["best", "last"]) -> Line:
-    """The line of the chunk whose weights are kept: of the best validation, the first of equals."""
+    """The log line of the kept weights: the best validation, the first of equals, or the last."""
     validated = [line for line in log if "validation" in line and keep == "best"]
     return min(validated, key=lambda line: float(line["validation"]), default=log[-1])
 
@@ -104,11 +107,12 @@ def kept(log: Sequence[Line], keep: Literal["best", "last"]) -> Line:
 def _done(log: Sequence[Line], learner: Learner) -> bool:
     if not log or log[-1][learner.unit] >= learner.ends[-1]:
         return bool(log)
-    found = [line["validation"] for line in log if "validation" in line]
-    if not found:
+    validations = [line["validation"] for line in log if "validation" in line]
+    if not validations:
         return False
-    waited = len(found) - 1 - found.index(min(found))
-    return bool(min(found) <= learner.target) or (learner.patience is not None and waited >= learner.patience)
+    best = min(validations)
+    waited = len(validations) - 1 - validations.index(best)
+    return bool(best <= learner.target) or (learner.patience is not None and waited >= learner.patience)
 
 
 def _write(folder: Path, learner: Learner, log: Sequence[Line]) -> None:
