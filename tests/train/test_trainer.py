@@ -280,7 +280,7 @@ def test_else_the_candidate_that_misses_least_and_counting_stops_early(tmp_path:
 
 def test_it_learns_and_is_told_how_far_it_is(tmp_path: Path) -> None:
     learner, shares = regression(replace(STEPS, steps=300, every=100, l2=0.0)), []
-    learner.told = shares.append
+    learner.on_share = shares.append
     trained(learner, tmp_path)
     log = lines(tmp_path)
     assert log[-1]["validation"] < 0.4 * log[0]["validation"]

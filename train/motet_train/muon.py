@@ -21,8 +21,8 @@ class Muon:
     """
 
     def __init__(self, groups: Iterable[Mapping[str, Any]], lr: float) -> None:
-        matrices = []
-        others = []
+        matrices: list[dict[str, Any]] = []
+        others: list[dict[str, Any]] = []
         for group in groups:
             part = matrices if "muon" in group else others
             part.append(dict(group))

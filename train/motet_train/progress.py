@@ -69,8 +69,8 @@ class Shown(Watcher):
 
     def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
         """Log the line of a chunk, or move the bar, and add its numbers to TensorBoard."""
-        figures = {key: value for key, value in line.items() if isinstance(value, int | float)}
-        done = figures.pop(unit)
+        figures = {key: value for key, value in line.items() if isinstance(value, int | float) and key != unit}
+        done = line[unit]
         if self.writer is not None:
             for key, value in figures.items():
                 self.writer.add_scalar(key, value, done)
