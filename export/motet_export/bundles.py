@@ -1,4 +1,4 @@
-"""From a training run to a bundle: graphs exported, parity checked, golden vectors, figures and licences."""
+"""From a training run to a bundle: export the graphs, check parity, add golden vectors and the manifest."""
 
 import logging
 import platform
@@ -26,37 +26,44 @@ log = logging.getLogger("motet.export")
 def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False) -> dict[str, Any]:
     """Export a training run as the bundle ``out`` (a .zip or a new folder) and return the parity report.
 
-    Nothing is written where a graph does not export or a rung of the parity ladder fails (ExportError).
-    int8: keep weights in 8 bits after that; the report then has "int8", the difference that it makes.
-    half: round the run's weights to 16 bits before that, and keep them so. ExportError for both.
+    Nothing is written if a graph does not export or a rung of the parity ladder fails (ExportError). int8: then store
+    weights in 8 bits; "int8" in the report is the difference that this makes. half: before export, round the run's
+    weights to 16 bits, and store them so. ExportError for both.
     """
     check_place(out)
     if int8 and half:
         raise ExportError("weights are kept in 8 bits or in 16: export with --int8 or with --half")
     if half:
         round_weights(run.model)
-    modules, torch = run.model.graphs(), run.bundle_model()
-    manifest = torch.manifest
-    files = {}
-    for role, (module, spec) in modules.items():
-        log.info("exporting the graph %s", role)
-        graph = export_graph(module, spec, label(manifest, role, spec))
-        files[f"{role}.onnx"] = halved(graph) if half else graph
+    torch = run.bundle_model()
+    files = _exported(run, torch.manifest, half)
     log.info("comparing it with torch")
-    onnx = _served(torch, files)
+    onnx = _loaded(torch, files)
     report = parity(onnx, torch)
     if half:
         report["weights"] = "float16"
     if int8:
-        files, exact = {name: quantised(data) for name, data in files.items()}, onnx
-        onnx = _served(torch, files)
+        # parity is that of the exact weights; the effect of rounding is only reported
+        exact = onnx
+        files = {name: quantised(data) for name, data in files.items()}
+        onnx = _loaded(torch, files)
         report["int8"] = differences(onnx, exact)
-    _write(out, onnx, files, {**run.manifest, "parity": report}, examples(manifest, torch.graphs))
+    _write(out, onnx, files, {**run.manifest, "parity": report}, examples(torch.manifest, torch.graphs))
     return report
 
 
+def _exported(run: Run, manifest: Manifest, half: bool) -> dict[str, bytes]:
+    """The graphs of a run as ONNX, by file name."""
+    files = {}
+    for role, (module, spec) in run.model.graphs().items():
+        log.info("exporting the graph %s", role)
+        graph = export_graph(module, spec, label(manifest, role, spec))
+        files[f"{role}.onnx"] = halved(graph) if half else graph
+    return files
+
+
 def label(manifest: Manifest, role: str, spec: GraphSpec) -> dict[str, str]:
-    """The metadata of a graph, by which it can be told without its bundle; "state=next_state" under "feedback"."""
+    """The metadata by which a graph is recognised without its bundle; "state=next_state" under "feedback"."""
     contract = manifest.motion
     return {
         "motet": version("motet"),
@@ -74,22 +81,25 @@ def label(manifest: Manifest, role: str, spec: GraphSpec) -> dict[str, str]:
 
 
 def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
-    """Write a bundle anew as ``out``, its weights rounded to 16 bits, and return what that changes in whole runs.
+    """Write a copy of a bundle with weights rounded to 16 bits, and return the differences of whole runs.
 
-    For bundles whose run is gone. Nothing else changes but the golden vectors, which are those of the new graphs; the
-    parity report says what the rounding makes of the runs, under "half".
+    For bundles whose run is gone. The golden vectors are those of the new graphs; nothing else changes. "half" in the
+    parity report is the effect of the rounding on whole runs.
     """
     check_place(out)
     exact = kind_of(bundle.manifest).load(bundle)
-    files = {f"{role}.onnx": halved(bundle.read(g.file), rounded=True) for role, g in bundle.manifest.graphs.items()}
-    onnx = _served(exact, files)
+    files = {}
+    for role, graph in bundle.manifest.graphs.items():
+        files[f"{role}.onnx"] = halved(bundle.read(graph.file), rounded=True)
+    onnx = _loaded(exact, files)
     changes = differences(onnx, exact)
     report = {**bundle.manifest.parity, "weights": "float16", "half": changes}
     _write(out, onnx, files, {**bundle.manifest.source, "parity": report}, examples(bundle.manifest, exact.graphs))
     return changes
 
 
-def _served(model: BundleModel, files: Mapping[str, bytes]) -> BundleModel:
+def _loaded(model: BundleModel, files: Mapping[str, bytes]) -> BundleModel:
+    """The model with graphs from files, run by ONNX Runtime."""
     graphs = {role: OnnxGraph(files[f"{role}.onnx"], graph.spec) for role, graph in model.graphs.items()}
     return build(model.manifest, graphs, model.tables)
 
@@ -101,23 +111,23 @@ def _write(
     about: Mapping[str, Any],
     draws: Mapping[str, Examples],
 ) -> None:
-    """Write the bundle of a model, with golden vectors and plain arrays."""
+    """Write the bundle of a model, with golden vectors and tables."""
     vectors, golden = golden_vectors(model, draws)
     specs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in model.graphs.items()}
-    tables = {
-        name: {"file": f"{name}.npy", "dtype": array.dtype.name, "shape": array.shape}
-        for name, array in model.tables.items()
-    }
-    arrays = {f"{name}.npy": array_bytes(array) for name, array in model.tables.items()}
+    tables = {}
+    arrays = {}
+    for name, array in model.tables.items():
+        tables[name] = {"file": f"{name}.npy", "dtype": array.dtype.name, "shape": array.shape}
+        arrays[f"{name}.npy"] = array_bytes(array)
     settings = {kind.FEATURE: asdict(model.settings(kind)) for kind in model.SETTINGS}
     manifest = {**about, "settings": settings, "graphs": specs, "tables": tables, "golden": golden}
     write_bundle(out, manifest, {**graphs, **arrays, golden["file"]: vectors})
 
 
 def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:
-    """The parity report of an existing bundle, its graphs run as ``options`` say, against a run.
+    """The parity report of an existing bundle against its run; ExportError at the first rung that fails.
 
-    ExportError at the first rung that fails.
+    options: of the ONNX Runtime sessions.
     """
     if "int8" in bundle.manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which torch cannot check; export without --int8")
@@ -128,12 +138,12 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
 
 
 def parity(onnx: BundleModel, torch: BundleModel) -> dict[str, Any]:
-    """Climb the parity ladder; the report that goes into the manifest. ExportError at the first rung that fails."""
+    """Climb the parity ladder and return the report for the manifest; ExportError at the first rung that fails."""
     draws = examples(onnx.manifest, torch.graphs)
-    report: dict[str, Any] = {
-        f"{role}.one_step": check_one_step(role, onnx.graphs[role], graph, draws[role])
-        for role, graph in torch.graphs.items()
-    }
+    report: dict[str, Any] = {}
+    for role, graph in torch.graphs.items():
+        report[f"{role}.one_step"] = check_one_step(role, onnx.graphs[role], graph, draws[role])
+    # a predictor's encoder is called again after its horizon
     horizon = int(onnx.defaults["horizon"]) if onnx.VERB == "predict" else None
     if "step" in torch.graphs:
         report["step.carried"] = check_carried(onnx.graphs["step"], torch.graphs["step"], draws["step"], horizon)

@@ -25,34 +25,43 @@ from motet_train.runs import MANIFEST, Run
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
 @click.option("--back", is_flag=True, help="RUN is a bundle: write a training run with its weights, to train on from.")
 def export(run: Path, out: Path, int8: bool, half: bool, back: bool) -> None:
-    """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes what torch does.
+    """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes the same as torch.
 
     RUN may be the folder that `motet train all` wrote: then OUT gets a bundle of each run that is a model by itself.
-    With --half, RUN may be a bundle, too: it is written anew with its weights rounded.
+    With --half, RUN may also be a bundle: it is copied with rounded weights.
     """
     if back:
         with new_folder(out) as folder:
             restored(Bundle.open(run)).save(folder)
         click.echo(str(out))
-        return
-    if half and run.suffix == ".zip":
-        for name, value in halve_bundle(Bundle.open(run), out).items():
-            click.echo(f"half {name:<20} {value:.3g}")
+    elif half and run.suffix == ".zip":
+        _show("half", halve_bundle(Bundle.open(run), out))
         click.echo(str(out))
-        return
-    found = {one.parent.name: Run.load(one.parent) for one in sorted(run.glob(f"*/{MANIFEST}"))}
-    verbs = {kind.VERB for kind in KINDS}
-    runs = {out / f"{name}.zip": one for name, one in found.items() if one.manifest["verb"] in verbs}
-    if (run / MANIFEST).is_file() or not runs:
-        runs = {out: Run.load(run)}
     else:
-        out.mkdir(parents=True, exist_ok=True)
-    for path, one in runs.items():
-        report = export_run(one, path, int8, half)
-        click.echo(_lines(report))
-        for name, value in report.get("int8", {}).items():
-            click.echo(f"int8 {name:<20} {value:.3g}")
-        click.echo(str(path))
+        for path, trained in _runs(run, out).items():
+            report = export_run(trained, path, int8, half)
+            click.echo(_lines(report))
+            _show("int8", report.get("int8", {}))
+            click.echo(str(path))
+
+
+def _runs(folder: Path, out: Path) -> dict[Path, Run]:
+    """The runs to export, by the path of the bundle: a single run, or those in the subfolders that are models."""
+    verbs = {kind.VERB for kind in KINDS}
+    runs = {}
+    for manifest in sorted(folder.glob(f"*/{MANIFEST}")):
+        run = Run.load(manifest.parent)
+        if run.manifest["verb"] in verbs:
+            runs[out / f"{manifest.parent.name}.zip"] = run
+    if (folder / MANIFEST).is_file() or not runs:
+        return {out: Run.load(folder)}
+    out.mkdir(parents=True, exist_ok=True)
+    return runs
+
+
+def _show(weights: str, changes: dict[str, float]) -> None:
+    for name, value in changes.items():
+        click.echo(f"{weights} {name:<20} {value:.3g}")
 
 
 @click.command()
@@ -61,13 +70,14 @@ def export(run: Path, out: Path, int8: bool, half: bool, back: bool) -> None:
 @session_options
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 def parity(run: Path, bundle: str, session: SessionOptions, as_json: bool) -> None:
-    """Check that BUNDLE computes what the training run RUN computes in torch."""
+    """Check that BUNDLE computes the same as the training run RUN in torch."""
     report = parity_of(Run.load(run), Bundle.open(bundle), session)
     click.echo(json.dumps(report) if as_json else _lines(report))
 
 
 def _lines(report: dict[str, Any]) -> str:
-    rungs = {name: rung for name, rung in report.items() if isinstance(rung, dict) and "bound" in rung}
-    return "\n".join(
-        f"parity {name:<18} {rung['error']:.1e} (bound {rung['bound']:.0e})" for name, rung in rungs.items()
-    )
+    lines = []
+    for name, rung in report.items():
+        if isinstance(rung, dict) and "bound" in rung:
+            lines.append(f"parity {name:<18} {rung['error']:.1e} (bound {rung['bound']:.0e})")
+    return "\n".join(lines)

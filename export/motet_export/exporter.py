@@ -1,4 +1,4 @@
-"""From a torch module to the bytes of an ONNX graph that keeps a contract, its weights in 32 bits, 16 or 8."""
+"""Export a torch module to an ONNX graph that keeps a contract, with weights in 32, 16 or 8 bits."""
 
 import logging
 import warnings
@@ -18,27 +18,25 @@ from motet.bundle.graph_safety import check_graph
 from motet.errors import BundleError, MotetError
 
 LEAST = 256
-"""Numbers of a tensor that is worth it."""
+"""Smallest number of elements of a tensor that is stored in fewer bits."""
 
 Small = tuple[NDArray[Any], Floats | None]
-"""A tensor in a smaller type, and what its numbers are to be multiplied by."""
+"""A tensor in a smaller type, and the factors by which its numbers are multiplied when it is loaded."""
 
 
 class ExportError(MotetError, RuntimeError):
-    """A model that does not export, or whose graph does not compute what torch computes."""
+    """A model that does not export, or whose graph does not compute the same as torch."""
 
 
 def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]) -> bytes:
-    """Export ``module``, whose forward takes and gives the tensors of ``spec`` in order, as ONNX bytes.
+    """Export ``module``, whose forward takes and returns the tensors of ``spec`` in order, as ONNX bytes.
 
     Dynamic axes are those that the contract names. ``metadata`` goes into the graph so that a single file is
-    identifiable. Raises ExportError where the result is not a self-contained, valid ONNX model.
+    identifiable. ExportError if the result is not a self-contained, valid ONNX model.
     """
     rng = np.random.default_rng(0)
     # a batch of 2: torch would take an axis of size 1 for a constant
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
-    dims = {name: torch.export.Dim(name) for one in spec.inputs for name in one.shape if isinstance(name, str)}
-    shapes = {one.name: {n: dims[name] for n, name in enumerate(one.shape) if name in dims} for one in spec.inputs}
     # gradients off: torch does not export a scan over weights that ask for them
     with warnings.catch_warnings(), _log_silenced(), torch.no_grad():
         warnings.simplefilter("ignore")
@@ -48,7 +46,7 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
             kwargs=example,
             input_names=[tensor.name for tensor in spec.inputs],
             output_names=[tensor.name for tensor in spec.outputs],
-            dynamic_shapes=shapes,
+            dynamic_shapes=_dynamic_axes(spec),
             dynamo=True,
             external_data=False,
             opset_version=18,
@@ -59,9 +57,23 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     return self_contained(program.model_proto, metadata)
 
 
+def _dynamic_axes(spec: GraphSpec) -> dict[str, dict[int, Any]]:
+    """The dynamic axes of each input; axes of one name have the same size."""
+    dims: dict[str, Any] = {}
+    shapes: dict[str, dict[int, Any]] = {}
+    for tensor in spec.inputs:
+        shapes[tensor.name] = {}
+        for axis, name in enumerate(tensor.shape):
+            if isinstance(name, str):
+                if name not in dims:
+                    dims[name] = torch.export.Dim(name)
+                shapes[tensor.name][axis] = dims[name]
+    return shapes
+
+
 @contextmanager
 def _log_silenced() -> Iterator[None]:
-    """Only errors of the exporter are logged."""
+    """Silence the exporter's log but for errors."""
     loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
@@ -74,7 +86,7 @@ def _log_silenced() -> Iterator[None]:
 
 
 def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
-    """Strip what names the building machine, annotate, check; the bytes of a model that needs no other file."""
+    """Strip paths of the building machine, add metadata, check, and serialise a model that needs no other file."""
     graph = model.graph
     model.doc_string = graph.doc_string = ""
     # doc strings and metadata of nodes hold source paths
@@ -85,7 +97,7 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
     del graph.metadata_props[:], model.metadata_props[:]
     for key, value in metadata.items():
         model.metadata_props.add(key=key, value=value)
-    # the first IR version that has the opset, which every ONNX Runtime from 1.14 on reads
+    # the first IR version with this opset, which every ONNX Runtime from 1.14 on reads
     model.ir_version = min(model.ir_version, 8)
     try:
         onnx.checker.check_model(model, full_check=True)
@@ -101,16 +113,16 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
 
 @torch.no_grad()
 def round_weights(net: nn.Module) -> None:
-    """Round a net's weights to half precision, so that what is exported of it can be kept in 16 bits without loss."""
+    """Round a net's weights to half precision, so that its graphs can be stored in 16 bits without loss."""
     for parameter in net.parameters():
         if parameter.numel() >= LEAST:
             parameter.copy_(parameter.half().float())
 
 
 def halved(model: bytes, rounded: bool = False) -> bytes:
-    """A graph whose weights are kept in 16 bits where that loses nothing; they are cast to 32 when it is loaded.
+    """A graph that stores those weights in 16 bits that lose nothing by it; they are cast to 32 when it is loaded.
 
-    rounded: keep them all so, where 16 bits reach as far as they do.
+    rounded: store all weights in 16 bits that are in their range.
     """
 
     def smaller(values: Floats) -> Small | None:
@@ -123,10 +135,10 @@ def halved(model: bytes, rounded: bool = False) -> bytes:
 
 
 def quantised(model: bytes) -> bytes:
-    """An exported graph whose matrices are kept in int8, each row with a scale of its own; vectors stay as they are.
+    """An exported graph that stores its matrices in int8, each row with a scale of its own; vectors stay in float32.
 
-    Products stay in float32: those of 8 bits saturate on processors without VNNI, so a bundle would say other things
-    on other machines, and what a row of a batch gives would depend on the others.
+    Products stay in float32, too: products of 8 bits saturate on processors without VNNI, so that results would differ
+    between machines, and a row's result would depend on the other rows of its batch.
     """
 
     def smaller(values: Floats) -> Small | None:
@@ -140,25 +152,36 @@ def quantised(model: bytes) -> bytes:
 
 
 def _stored(model: bytes, smaller: Callable[[Floats], Small | None], **label: str) -> bytes:
-    """A graph whose large tensors of float32 are kept as ``smaller`` says, or as they are where it gives None.
+    """A graph whose large float32 tensors are stored as ``smaller`` makes them, or unchanged where that is None.
 
     ONNX Runtime casts and scales them once, when it loads the graph. label: more metadata.
     """
     proto = onnx.load_from_string(model)
-    graph, nodes = proto.graph, []
-    for tensor in list(graph.initializer):
+    nodes = []
+    # the new nodes come first: a graph's nodes are sorted by dependence
+    for tensor in list(proto.graph.initializer):
         if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < LEAST:
             continue
-        if (found := smaller(numpy_helper.to_array(tensor))) is None:
-            continue
-        name, (small, scale) = tensor.name, found
-        tensor.CopyFrom(numpy_helper.from_array(small, f"{name}.small"))
-        cast = name if scale is None else f"{name}.cast"
-        nodes.append(helper.make_node("Cast", [f"{name}.small"], [cast], to=TensorProto.FLOAT))
-        if scale is not None:
-            graph.initializer.append(numpy_helper.from_array(scale, f"{name}.scale"))
-            nodes.append(helper.make_node("Mul", [cast, f"{name}.scale"], [name]))
-    nodes += graph.node
-    del graph.node[:]
-    graph.node.extend(nodes)
-    return self_contained(proto, {**{prop.key: prop.value for prop in proto.metadata_props}, **label})
+        stored = smaller(numpy_helper.to_array(tensor))
+        if stored is not None:
+            nodes += _replace_tensor(proto.graph, tensor, *stored)
+    nodes += proto.graph.node
+    del proto.graph.node[:]
+    proto.graph.node.extend(nodes)
+    metadata = {prop.key: prop.value for prop in proto.metadata_props}
+    return self_contained(proto, {**metadata, **label})
+
+
+def _replace_tensor(
+    graph: onnx.GraphProto, tensor: onnx.TensorProto, small: NDArray[Any], scale: Floats | None
+) -> list[onnx.NodeProto]:
+    """Store a tensor in a smaller type; the nodes that compute the original one from it."""
+    name = tensor.name
+    tensor.CopyFrom(numpy_helper.from_array(small, f"{name}.small"))
+    if scale is None:
+        return [helper.make_node("Cast", [f"{name}.small"], [name], to=TensorProto.FLOAT)]
+    graph.initializer.append(numpy_helper.from_array(scale, f"{name}.scale"))
+    return [
+        helper.make_node("Cast", [f"{name}.small"], [f"{name}.cast"], to=TensorProto.FLOAT),
+        helper.make_node("Mul", [f"{name}.cast", f"{name}.scale"], [name]),
+    ]

@@ -1,4 +1,4 @@
-"""From a bundle back to a training run: the weights that its graphs hold, to train on from them."""
+"""From a bundle back to a training run with the weights of its graphs, to continue training."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -21,75 +21,142 @@ Tensors = dict[str, NDArray[Any]]
 
 @torch.no_grad()
 def restored(bundle: Bundle) -> Run:
-    """The run of a bundle, its weights as the graphs hold them; what only training uses is new.
+    """The run of a bundle, with the weights of its graphs; parameters used only in training are new.
 
-    The exporter turns some weights around and gives them names of its own. So a net of the same sizes with random
-    weights is exported, too: where a weight is found there, the bundle's is in the tensor of the same name, or, where
-    nets of another version were exported, in the same place among those of its shape. ExportError for 8-bit weights,
-    where a graph lacks a weight, and where the run does not compute the bundle's golden vectors.
+    The exporter transposes some weights and renames some. To know which, a net of the same sizes with random weights is
+    exported, too: a tensor of that graph with the numbers of a weight tells where the weight is. The bundle's graph has
+    it in the tensor of the same name, or, if another version exported it, at the same place among tensors of its shape.
+    ExportError for 8-bit weights, if a graph lacks a weight, and if the run does not compute the bundle's golden
+    vectors.
     """
     manifest = bundle.manifest
     if "int8" in manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which are not those that were trained")
-    net, other = (MODELS[manifest.model](manifest.config) for _ in range(2))
-    state, known = net.state_dict(), _drawn(other)
+    net = MODELS[manifest.model](manifest.config)
+    other = MODELS[manifest.model](manifest.config)
+    state = net.state_dict()
+    # normalisation
     for name, values in (("mean", manifest.motion.mean), ("scale", manifest.motion.std)):
         if len(state[name]) == len(values):
             state[name].copy_(torch.from_numpy(values))
+    # weights
+    weight_names = _randomised(other)
     for role, (module, spec) in other.graphs().items():
-        held, drawn = _tensors(bundle.read(manifest.graphs[role].file)), _tensors(export_graph(module, spec, {}))
-        found = {name: known[value.tobytes()] for name, value in drawn.items() if value.tobytes() in known}
-        for name, value in _paired({name: drawn[name] for name in found}, held, [*state]).items():
-            weight, like = torch.tensor(value), other.state_dict()[found[name]]
-            if weight.numel() > like.numel():
-                weight = weight[:, None, : like.shape[-1]]
-            elif not np.array_equal(drawn[name], like.numpy()):
-                weight = weight.mT
-            state[found[name]].copy_(torch.where(weight.isinf(), 0, weight))  # what a scale of 0 is divided by
+        stored = _tensors(bundle.read(manifest.graphs[role].file))
+        random = _tensors(export_graph(module, spec, {}))
+        _restore(state, other.state_dict(), stored, random, weight_names)
+    # tables
     for name in manifest.tables.keys() & state.keys():
         state[name].copy_(torch.from_numpy(bundle.table(name).copy()))
     run = Run(manifest.source, net.eval())
-    assert manifest.golden is not None
-    try:
-        replay(run.bundle_model(), bundle.read(manifest.golden.file), manifest.golden)
-    except BundleError as error:
-        raise ExportError(f"bundle {bundle.path}: the weights found are not all: {error}") from error
+    _check(run, bundle)
     return run
 
 
-def _drawn(net: Net) -> dict[bytes, str]:
-    """The weights of a net, set at random, those turned around, and those of biases followed by zeros (a GRU has two
-    biases), with their names."""
-    known = dict[bytes, str]()
+def _copy_arrays(state: dict[str, torch.Tensor], bundle: Bundle) -> None:
+    """Copy the normalisation and the tables, which are not in graphs."""
+    motion = bundle.manifest.motion
+    for name, values in (("mean", motion.mean), ("scale", motion.std)):
+        if len(state[name]) == len(values):
+            state[name].copy_(torch.from_numpy(values))
+    for name in bundle.manifest.tables.keys() & state.keys():
+        state[name].copy_(torch.from_numpy(bundle.table(name).copy()))
+
+
+def _restore(
+    state: dict[str, torch.Tensor],
+    random_state: dict[str, torch.Tensor],
+    stored: Tensors,
+    random: Tensors,
+    weight_names: dict[bytes, str],
+) -> None:
+    """Copy the weights in the stored tensors of a graph into ``state``.
+
+    random: the tensors of the same graph exported with the weights ``random_state``.
+    """
+    names = {}
+    for tensor, value in random.items():
+        if value.tobytes() in weight_names:
+            names[tensor] = weight_names[value.tobytes()]
+    pairs = _paired({tensor: random[tensor] for tensor in names}, stored, [*state])
+    for tensor, value in pairs.items():
+        name = names[tensor]
+        weight = torch.tensor(value)
+        like = random_state[name]
+        if weight.numel() > like.numel():
+            # a bias followed by zeros
+            weight = weight[:, None, : like.shape[-1]]
+        elif not np.array_equal(random[tensor], like.numpy()):
+            weight = weight.mT
+        # a scale of 0 is stored as the infinity by which the exporter divides
+        state[name].copy_(torch.where(weight.isinf(), 0, weight))
+
+
+def _check(run: Run, bundle: Bundle) -> None:
+    """ExportError if a run does not compute the golden vectors of its bundle."""
+    golden = bundle.manifest.golden
+    assert golden is not None
+    try:
+        replay(run.bundle_model(), bundle.read(golden.file), golden)
+    except BundleError as error:
+        raise ExportError(f"bundle {bundle.path} does not contain all weights: {error}") from error
+
+
+def _randomised(net: Net) -> dict[bytes, str]:
+    """Randomise the weights of a net; their names by their bytes, in each form in which they may be exported.
+
+    These are as they are, transposed, and, for biases, followed by zeros, because a GRU has two biases.
+    """
+    names: dict[bytes, str] = {}
     for name, value in net.state_dict().items():
         if value.is_floating_point():
             value.uniform_(0.5, 1.5)
         elif value.dtype == torch.int8:
             value.random_(-127, 127)
-        if value.is_floating_point() or value.dtype == torch.int8:
-            forms = (value, value.mT, torch.cat([value, 0 * value], dim=-1)) if value.dim() > 1 else (value,)
-            known |= {form.numpy().tobytes(): name for form in forms}
-    return known
+        else:
+            continue
+        forms = [value]
+        if value.dim() > 1:
+            forms += [value.mT, torch.cat([value, 0 * value], dim=-1)]
+        for form in forms:
+            names[form.numpy().tobytes()] = name
+    return names
 
 
-def _paired(drawn: Tensors, held: Tensors, weights: Iterable[str]) -> Tensors:
-    """For each of the weights drawn in a new graph the tensor of a bundle's graph; ExportError where one lacks it."""
-    if all(name in held and held[name].shape == value.shape for name, value in drawn.items()):
-        return {name: held[name] for name in drawn}
-    own = {name for name in drawn if any(weight.endswith(name.removeprefix("net.")) for weight in weights)}
-    others, found = [name for name in held if name not in own], {}
-    for name, value in drawn.items():
-        match = name if name in own else next((one for one in others if held[one].shape == value.shape), name)
-        if match not in held:
+def _paired(random: Tensors, stored: Tensors, weights: Iterable[str]) -> Tensors:
+    """For each weight in a new graph the tensor of a bundle's graph; ExportError if the bundle lacks it."""
+    if all(name in stored and stored[name].shape == value.shape for name, value in random.items()):
+        return {name: stored[name] for name in random}
+    # names that the exporter made up are numbered, and differ between versions: pair these in order, by shape
+    suffixes = tuple(weights)
+    kept_names = set()
+    for name in random:
+        if any(weight.endswith(name.removeprefix("net.")) for weight in suffixes):
+            kept_names.add(name)
+    others = [name for name in stored if name not in kept_names]
+    pairs = {}
+    for name, value in random.items():
+        match = name
+        if name not in kept_names:
+            match = next((other for other in others if stored[other].shape == value.shape), name)
+        if match not in stored:
             raise ExportError(f"the bundle's graph has no tensor {name}")
-        found[name], others = held[match], [one for one in others if one != match]
-    return found
+        pairs[name] = stored[match]
+        others = [other for other in others if other != match]
+    return pairs
 
 
 def _tensors(data: bytes) -> Tensors:
-    """The tensors of real numbers and bytes in a graph by name, those kept in 16 bits by that of their cast to 32."""
+    """The float and int8 tensors of a graph by name; a tensor stored in 16 bits by the name of its cast to 32."""
     graph = onnx.load_from_string(data).graph
-    cast = {node.input[0]: node.output[0] for node in graph.node if node.op_type == "Cast"}
-    found = {cast.get(one.name, one.name): numpy_helper.to_array(one) for one in graph.initializer}
-    real = {name: value.astype(np.float32) for name, value in found.items() if value.dtype.kind == "f"}
-    return real | {name: value for name, value in found.items() if value.dtype == np.int8}
+    cast_names = {node.input[0]: node.output[0] for node in graph.node if node.op_type == "Cast"}
+    floats: Tensors = {}
+    bytes_: Tensors = {}
+    for tensor in graph.initializer:
+        name = cast_names.get(tensor.name, tensor.name)
+        value = numpy_helper.to_array(tensor)
+        if value.dtype.kind == "f":
+            floats[name] = value.astype(np.float32)
+        elif value.dtype == np.int8:
+            bytes_[name] = value
+    return floats | bytes_
