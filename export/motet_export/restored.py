@@ -35,19 +35,12 @@ def restored(bundle: Bundle) -> Run:
     net = MODELS[manifest.model](manifest.config)
     other = MODELS[manifest.model](manifest.config)
     state = net.state_dict()
-    # normalisation
-    for name, values in (("mean", manifest.motion.mean), ("scale", manifest.motion.std)):
-        if len(state[name]) == len(values):
-            state[name].copy_(torch.from_numpy(values))
-    # weights
+    _copy_arrays(state, bundle)
     weight_names = _randomised(other)
     for role, (module, spec) in other.graphs().items():
         stored = _tensors(bundle.read(manifest.graphs[role].file))
         random = _tensors(export_graph(module, spec, {}))
         _restore(state, other.state_dict(), stored, random, weight_names)
-    # tables
-    for name in manifest.tables.keys() & state.keys():
-        state[name].copy_(torch.from_numpy(bundle.table(name).copy()))
     run = Run(manifest.source, net.eval())
     _check(run, bundle)
     return run
