@@ -15,7 +15,7 @@ from motet.models.base import BundleModel
 from motet.models.load import load, load_as
 from motet.search.model import SearchModel
 from motet_train.cli.prepare import store_beside
-from motet_train.cli.suites import Given, Results, Suite, suite_of
+from motet_train.cli.suites import Inputs, Results, Suite, suite_of
 from motet_train.cli.train_options import unit_in
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, part
@@ -82,21 +82,23 @@ def evaluate(
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
     loaded = {name: runs[name].bundle_model() if name in runs else load(name, session) for name in models}
     suite = suite_of(loaded, says, actions, composed)
-    if keep and (bundles := [name for name in models if name not in runs]):
+    bundles = [name for name in models if name not in runs]
+    if keep and bundles:
         raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
-    found = dict.fromkeys(loaded, data) if says or composed else data_of(loaded, suite, data)
-    if plots is not None:  # before hours of measuring
+    data_paths = dict.fromkeys(loaded, data) if says or composed else data_of(loaded, suite, data)
+    if plots is not None:  # fail before hours of measuring
         if not suite.draws:
             raise click.UsageError(f"--plots is not available for {suite.what}")
         make_folder(plots)
-    results = suite.measure(loaded, Given(found, unit_in, load_as(SearchModel, search, session) if says else None))
-    _finish(results, {name: runs[name] for name in runs if keep}, plots)
+    search_model = load_as(SearchModel, search, session) if says else None
+    results = suite.measure(loaded, Inputs(data_paths, unit_in, search_model))
+    _finish(results, runs if keep else {}, plots)
     figures = results.figures[models[0]] if len(models) == 1 else results.figures
     click.echo(json.dumps(figures) if as_json else results.text)
 
 
 def _finish(results: Results, runs: Mapping[str, Run], plots: Path | None) -> None:
-    """Draw pictures of one model into the folder, of several into one of its folders each; save figures in runs."""
+    """Draw pictures of one model into the folder, those of several into a subfolder each; save figures in runs."""
     if plots is not None and results.drawings is not None:
         drawings = results.drawings()
         for name, drawn in drawings.items():
@@ -106,35 +108,41 @@ def _finish(results: Results, runs: Mapping[str, Run], plots: Path | None) -> No
 
 
 def data_of(models: Mapping[str, BundleModel], suite: Suite, data: Path | None) -> dict[str, Path | None]:
-    """The data to measure each model on: given its training corpus or nothing, the store prepared from that corpus;
-    else the given data; else its training data, if it still exists."""
-    told = {name: _told(name, model) for name, model in models.items()}
-    found = {name: _found(Path(name), told[name], data, not suite.data) for name in models}
-    missing = [name for name in models if told[name] and not found[name]]
-    lost = f"{missing[0]} was trained on {told[missing[0]]}, which is missing" if missing else ""
-    if suite.data and not any(found.values()):
+    """The path of the data to measure each model on.
+
+    Without --data, or if it is a model's training corpus, the store prepared from that corpus; otherwise --data;
+    otherwise the model's training data, if it still exists.
+    """
+    trained_on = {name: _training_data(name, model) for name, model in models.items()}
+    paths = {name: _data_path(Path(name), trained_on[name], data, not suite.data) for name in models}
+    missing = [name for name in models if trained_on[name] and not paths[name]]
+    lost = f"{missing[0]} was trained on {trained_on[missing[0]]}, which is missing" if missing else ""
+    if suite.data and not any(paths.values()):
         raise click.UsageError(f"{suite.what} need --data: {suite.data}" + (f" ({lost})" if lost else ""))
     if lost and not suite.data:
         raise DataError(f"{lost}: give --data")
-    return {name: at and part(at, models[name].manifest.motion.representation) for name, at in found.items()}
+    for name, path in paths.items():
+        if path is not None:
+            paths[name] = part(path, models[name].manifest.motion.representation)
+    return paths
 
 
-def _found(run: Path, told: Path | None, data: Path | None, bundled: bool) -> Path | None:
-    """The data of one model. bundled: whether to look for a bundle's training data too."""
-    asked = data is None or (told is not None and data.resolve() == told.resolve())
-    if asked and (store_beside(run) / INDEX).is_file():
+def _data_path(run: Path, trained_on: Path | None, data: Path | None, bundled: bool) -> Path | None:
+    """The data of one model. bundled: also look for the training data of a bundle."""
+    is_corpus = trained_on is not None and data is not None and data.resolve() == trained_on.resolve()
+    if (data is None or is_corpus) and (store_beside(run) / INDEX).is_file():
         return store_beside(run)
-    if data is None and told is not None and told.exists() and (bundled or (run / SETTINGS).is_file()):
-        return told
+    if data is None and trained_on is not None and trained_on.exists() and (bundled or (run / SETTINGS).is_file()):
+        return trained_on
     return data
 
 
-def _told(name: str, model: BundleModel) -> Path | None:
-    """The --data of its training: from the settings of a run, or the command of a bundle."""
+def _training_data(name: str, model: BundleModel) -> Path | None:
+    """The --data of a model's training: from the settings of a run, or the command of a bundle."""
     if (Path(name) / SETTINGS).is_file():
-        given = [value for key, value in read_settings(Path(name) / SETTINGS)[0].items() if key == "data"]
-    else:
-        words = shlex.split(str(model.manifest.training.get("command", "")))
-        given = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
-        given += [after for word, after in pairwise(words) if word == "--data"]
-    return Path(str(given[-1])) if given else None
+        options, _ = read_settings(Path(name) / SETTINGS)
+        return Path(str(options["data"])) if "data" in options else None
+    words = shlex.split(str(model.manifest.training.get("command", "")))
+    values = [word.removeprefix("--data=") for word in words if word.startswith("--data=")]
+    values += [after for word, after in pairwise(words) if word == "--data"]
+    return Path(values[-1]) if values else None

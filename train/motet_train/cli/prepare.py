@@ -1,4 +1,4 @@
-"""``motet prepare``: turns a corpus into a store for training; and the store of a training command."""
+"""``motet prepare``, which turns a corpus into a store for training; and the store of a training command."""
 
 from pathlib import Path
 from typing import Any
@@ -44,8 +44,9 @@ def corpus_of(
     described: bool = True,
 ) -> Corpus:
     """The corpus read with the options of a source, see :func:`motet_train.data.corpus.read_corpus`."""
-    who = () if people is None else read_people(people)
-    return read_corpus(data, sentences, who, unit_in, described, () if gaits is None else read_gaits(gaits))
+    performers = () if people is None else read_people(people)
+    gait_patterns = () if gaits is None else read_gaits(gaits)
+    return read_corpus(data, sentences, performers, unit_in, described, gait_patterns)
 
 
 @click.command()
@@ -79,56 +80,60 @@ def prepare(
     retargeted to the humanoid. Unusable motions are named and skipped; those over 30 s are cut into pieces that share
     their sentences.
 
-    Where DATA are the stores of all shards of a corpus, they are merged.
+    If DATA are the stores of all shards of a corpus, they are merged.
     """
     if all(map(is_store, data)):
         merge_stores(data, out)
-        _say(out)
+        _summarise(out)
         return
     corpus = corpus_of(data, **source, described=verb != "predict")
     if verb == "all" and (figure or fps):
         raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
     parts = ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}
-    for one in parts.values():
-        _check_unit(corpus, one)
+    for settings in parts.values():
+        _check_unit(corpus, settings)
     part = None if shard is None else Shard.parse(shard)
     corpus = corpus if part is None else corpus.shard(part)
     with preparing(len(corpus)) as done:
         prepare_parts(corpus, out, parts, done, part)
-    _say(out)
+    _summarise(out)
 
 
-def _say(out: Path) -> None:
-    """What a store has, of each representation."""
+def _summarise(out: Path) -> None:
+    """Print the contents of a store in each representation."""
     for index in sorted(out.rglob(INDEX)):
         store = Store.open(index.parent)
-        seconds = sum(stop - start for entry in store.records for start, stop in entry.spans[:1]) / store.fps
+        # a record's offsets show the same motion
+        seconds = sum(len(store.sequence(record)) for record in range(len(store.records))) / store.fps
         texts = sum(len(entry.sentences) for entry in store.records)
         click.echo(
             f"{index.parent}: {len(store.records)} motions of {seconds:.0f} s with {texts} sentences, "
             f"{len(store.channels)} channels at {store.fps:g} fps; {len(store.skipped)} skipped"
         )
         if len(store.skipped) > len(store.records):
-            said = "most motions were skipped; channels and axes are taken from the first"
-            click.echo(f"motet: {said}, {store.records[0].name}", err=True)
+            hint = "most motions were skipped; channels and axes are taken from the first"
+            click.echo(f"motet: {hint}, {store.records[0].name}", err=True)
 
 
 def _check_unit(corpus: Corpus, preparation: Preparation) -> None:
-    """DataError if neither the first motion nor an option states the unit: the others will not either."""
+    """DataError if neither the first motion nor an option states the length unit; the other motions will not either."""
     if preparation.humanoid or not named(preparation.representation).required:
         return  # the humanoid's unit is inferred from its height; joint angles alone have no lengths
     first = next((item for item in corpus if isinstance(item, Record)), None)
-    if first is not None and first.motion.skeleton is not None and first.motion.skeleton.metres_per_unit is None:
+    if first is None or first.motion.skeleton is None:
+        return
+    if first.motion.skeleton.metres_per_unit is None:
         raise DataError(f"{first.name} does not state its length unit: give --unit-in for such files")
 
 
 def prepared(data: Path, job: Job, **corpus: Any) -> Store:
-    """The store at ``data``, or one prepared next to the run from the corpus there; a resumed run has its own.
+    """The store at ``data``, or one prepared beside the run from the corpus there; a resumed run has such a store.
 
     corpus: options of ``motet prepare``.
     """
-    if ((found := store_for(data, job.recipe)) / INDEX).is_file():
-        return Store.open(found)
+    path = store_for(data, job.recipe)
+    if (path / INDEX).is_file():
+        return Store.open(path)
     place = store_beside(job.folder)
     if not (job.folder / CHECKPOINT).is_file():
         verb = kind_for(job.recipe)
@@ -139,5 +144,5 @@ def prepared(data: Path, job: Job, **corpus: Any) -> Store:
 
 
 def store_beside(run: Path) -> Path:
-    """The path of the store of a run that was given a corpus."""
+    """The path of the store that is prepared for a run from its corpus."""
     return run.with_name(f"{run.name}-store")

@@ -56,35 +56,35 @@ of_plan = with_options(
 @click.argument("data", type=Path, nargs=-1, required=True)
 @click.option("--only", "verbs", type=click.Choice(PLANNED_VERBS), multiple=True, help="Only these. [default: all]")
 @of_plan
-def everything(verbs: tuple[str, ...], **given: Any) -> None:
+def everything(verbs: tuple[str, ...], **options: Any) -> None:
     """Train all shipped kinds on DATA: folders or zips of motion files with a table of sentences, or their store.
 
     Motions are prepared once, into OUT/store; then one run per verb is trained, of the kind that ships with motet.
     Repeat the command to continue: finished runs are skipped, interrupted ones resume.
     """
-    _train_plan(verbs or PLANNED_VERBS, **given)
+    _train_plan(verbs or PLANNED_VERBS, **options)
 
 
 @train.command(short_help="Train the shipped kind of generate, in five stages.")
 @click.option("--data", type=Path, multiple=True, required=True, help="A store, or a corpus: folder or zip.")
 @of_plan
-def generate(**given: Any) -> None:
+def generate(**options: Any) -> None:
     """Train sentence to motion, the shipped kind: codec, decoder (twice), actions, and the writer of codes.
 
     Like `motet train all --only generate`: the runs go into the folder OUT, the last is OUT/generate.
     """
-    _train_plan(("generate",), **given)
+    _train_plan(("generate",), **options)
 
 
-def _train_plan(verbs: tuple[str, ...], data: tuple[Path, ...], out: Path, **given: Any) -> None:
+def _train_plan(verbs: tuple[str, ...], data: tuple[Path, ...], out: Path, **options: Any) -> None:
     if distributed.launched():
         raise DataError("torchrun trains one stage at a time: use the command of the stage, such as motet train codec")
-    about = begun("", given)
-    vectors = given["word_vectors"] and WordVectors(given["word_vectors"], given["vectors_from"])
-    changes = read_stages(given["config"], STAGES) if given["config"] else {}
-    source = {key: given[key] for key in ("sentences", "people", "gaits", "unit_in")}
+    about = begun("", options)
+    vectors = options["word_vectors"] and WordVectors(options["word_vectors"], options["vectors_from"])
+    changes = read_stages(options["config"], STAGES) if options["config"] else {}
+    source = {key: options[key] for key in ("sentences", "people", "gaits", "unit_in")}
     place = data[0] if len(data) == 1 and is_store(data[0]) else corpus_of(data, **source)
-    Plan(place, out, verbs, given["by"], given["device"], vectors, changes, about).train()
+    Plan(place, out, verbs, options["by"], options["device"], vectors, changes, about).train()
     click.echo(f"next: motet export {out} -o bundles, then motet bundle verify bundles/NAME.zip")
     for verb in verbs:
         click.echo(f"      motet evaluate {out / verb}")
@@ -135,7 +135,7 @@ def train_predictor(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
 
 
 def read_expmap_files(data: Path) -> ExpmapCorpus:
-    """The corpus of text files in a folder or zip; those that are missing are named."""
+    """The corpus of text files in a folder or zip; missing files are named on stderr."""
     corpus = read_expmap(data)
     if corpus.missing and distributed.rank() == 0:
         click.echo(f"motet: {data} lacks {len(corpus.missing)} files: {', '.join(corpus.missing)}", err=True)
@@ -194,19 +194,23 @@ NETS = {
     "matching": "a steerable figure: motion matching on recordings of gaits.",
     "steered-tdbn": "a steerable figure: the thesis' nets on recordings of walking and running.",
 }
-"""Command that trains a net on a store -> what it trains."""
+"""Command that trains a net on a store -> its one-line help."""
 
 
 def _on_store(name: str, recipes: Mapping[str, Recipe], train_net: Callable[..., Run], *options: Option) -> None:
     """Add a command that calls a recipe's function with a store, the job, the store's name and its own options."""
 
-    def run(job: Job, data: Path, **given: Any) -> Run:
-        corpus = {key: given.pop(key) for key in ("sentences", "people", "gaits", "unit_in", "figure")}
-        runs = {key: Run.load(given[key]) for key in ("start", "codec", "actions", "writer") if given.get(key)}
-        if "word_vectors" in given:
-            file, origin = given.pop("word_vectors"), given.pop("vectors_from")
-            given["vectors"] = file and WordVectors(file, origin)
-        return train_net(prepared(data, job, **corpus), job, data.name, **{**given, **runs})
+    def run(job: Job, data: Path, **options: Any) -> Run:
+        corpus = {key: options.pop(key) for key in ("sentences", "people", "gaits", "unit_in", "figure")}
+        # options that name a run become that run
+        for key in ("start", "codec", "actions", "writer"):
+            if options.get(key):
+                options[key] = Run.load(options[key])
+        if "word_vectors" in options:
+            file = options.pop("word_vectors")
+            origin = options.pop("vectors_from")
+            options["vectors"] = file and WordVectors(file, origin)
+        return train_net(prepared(data, job, **corpus), job, data.name, **options)
 
     run.__doc__ = f"Train {NETS[name]}"
     store = click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip.")

@@ -3,7 +3,7 @@
 import logging
 import shlex
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +20,11 @@ from motet_train.runs import About, Run
 from motet_train.settings import SettingsError, changed, read_settings
 
 Option = Callable[[Any], Any]
-"""What ``click.option`` gives."""
+"""The type of ``click.option(...)``."""
 
 
 def with_options(*options: Option) -> Option:
-    """All of some options as one, in their order in the help."""
+    """Several options as one, in their order in the help."""
 
     def decorate(function: Any) -> Any:
         for option in reversed(options):
@@ -39,10 +39,11 @@ def _configure(context: click.Context, option: click.Parameter, path: Path | Non
     if path is None:
         return
     options, context.meta["motet.tables"] = read_settings(path)
-    names = {_long(option).replace("-", "_"): option.name for option in context.command.params}
+    names = {_long(option).replace("-", "_"): str(option.name) for option in context.command.params}
     if unknown := sorted(options.keys() - names.keys()):
         raise SettingsError(f"{path}: unknown setting {unknown[0]}: expected one of {', '.join(sorted(names))}")
-    context.default_map = {**(context.default_map or {}), **{str(names[key]): options[key] for key in options}}
+    defaults = {names[key]: value for key, value in options.items()}
+    context.default_map = {**(context.default_map or {}), **defaults}
 
 
 def _long(option: click.Parameter) -> str:
@@ -88,75 +89,91 @@ unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Lengt
 def train_command(
     name: str, recipes: Mapping[str, Recipe], *options: Option, defaults: Mapping[str, Any] | None = None
 ) -> Callable[[Callable[..., Run]], click.Command]:
-    """A command that trains one of the recipes: the function receives the job and the command's own options.
+    """A command that trains one of the recipes; the function receives the job and the command's own options.
 
     An option named like a field of the recipe sets that field and is not passed on. defaults: of shared options.
     """
 
     def decorate(function: Callable[..., Run]) -> click.Command:
         @click.pass_context
-        def command(context: click.Context, /, **given: Any) -> None:
-            _train(context, recipes, function, given)
+        def command(context: click.Context, /, **values: Any) -> None:
+            _train(context, recipes, function, values)
 
-        text = command.__doc__ = function.__doc__ or ""
+        text = function.__doc__ or ""
+        command.__doc__ = text
         preset = click.option("--preset", type=click.Choice(list(recipes)), default="default", show_default=True)
         settings = {"default_map": dict(defaults or {})}
-        made = click.command(name, short_help=text.partition("\n")[0], context_settings=settings)
-        return made(with_options(every_training, preset, *options)(command))
+        as_command = click.command(name, short_help=text.partition("\n")[0], context_settings=settings)
+        return as_command(with_options(every_training, preset, *options)(command))
 
     return decorate
 
 
+SHARED = ("out", "seed", "device", "precision", "threads", "resume", "tensorboard", "name", "licence", "data_licence")
+"""Options of all commands that train."""
+
+
 def _train(
-    context: click.Context, recipes: Mapping[str, Recipe], function: Callable[..., Run], given: dict[str, Any]
+    context: click.Context, recipes: Mapping[str, Recipe], function: Callable[..., Run], values: dict[str, Any]
 ) -> None:
-    shared = ("out", "seed", "device", "precision", "threads", "resume", "tensorboard", "name", "licence")
-    common = {name: given.pop(name) for name in (*shared, "data_licence", "preset")}
-    precision, out = common.pop("precision"), common.pop("out")
+    """Train with the values of a command's options."""
+    shared = {name: values.pop(name) for name in (*SHARED, "preset")}
+    precision = shared.pop("precision")
+    out = shared.pop("out")
     tables = context.meta.get("motet.tables", {})
-    recipe = changed(recipes[common["preset"]], tables, {**given, "precision": precision})
+    recipe = changed(recipes[shared["preset"]], tables, {**values, "precision": precision})
     if precision == "bfloat16" and recipe.training is None:
         raise SettingsError(f"{recipe.model} trains in float32 only")
-    # an option changes the recipe where that has its name; values found in the data cannot be set
-    parts = [part for part in (recipe.training, recipe.config, recipe.visits) if part is not None]
-    fields = {name for name in given if any(hasattr(part, name) for part in parts)} - set(recipe.derived)
-    own = {name: value for name, value in given.items() if name not in fields}
-    about = begun(common["name"] or out.name, common)
+    unused = {name: value for name, value in values.items() if name not in _fields(recipe, values)}
+    about = begun(shared["name"] or out.name, shared)
 
     def train(job: Job) -> Run:
-        run = function(job, **own)
+        run = function(job, **unused)
         if distributed.rank() == 0:
             click.echo(_summary(out, run.manifest["training"]))
             click.echo(f"next: {_next(out, run.manifest)}")
         return run
 
-    resume, boards = common.pop("resume"), common.pop("tensorboard")
+    resume = shared.pop("resume")
+    boards = shared.pop("tensorboard")
+    # the settings that are saved with the run, by the options' long names
     names = {option.name: _long(option) for option in context.command.params}
-    options = {names[name]: value for name, value in {**common, **own}.items()}
-    trained(Job(recipe, about, out, common["device"]), train, options, resume, boards)
+    options = {names[name]: value for name, value in {**shared, **unused}.items()}
+    trained(Job(recipe, about, out, shared["device"]), train, options, resume, boards)
 
 
-def begun(name: str, given: Mapping[str, Any]) -> About:
-    """Set torch's threads and show a line for each chunk, unless --quiet; what the command line says of the run."""
-    torch.set_num_threads(given["threads"])
+def _fields(recipe: Recipe, names: Collection[str]) -> set[str]:
+    """Those of some options that are fields of the recipe; fields computed from the data cannot be set."""
+    parts = [part for part in (recipe.training, recipe.config, recipe.visits) if part is not None]
+    fields = set()
+    for name in names:
+        if name not in recipe.derived and any(hasattr(part, name) for part in parts):
+            fields.add(name)
+    return fields
+
+
+def begun(name: str, options: Mapping[str, Any]) -> About:
+    """Set torch's threads, and log a line for each chunk unless --quiet; the entries of the manifest about the run."""
+    torch.set_num_threads(options["threads"])
     log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
     command = shlex.join(["motet", *sys.argv[1:]])
-    return About(name, command, given["seed"], given["licence"], given["data_licence"])
+    return About(name, command, options["seed"], options["licence"], options["data_licence"])
 
 
 def _next(out: Path, manifest: Mapping[str, Any]) -> str:
     """The next command for a run."""
-    parts = {"codec": f"--codec {out} --actions RUN", "actions": f"--codec RUN --actions {out}"}
-    if (verb := manifest["verb"]) in parts:
-        return f"motet train codes {parts[verb]}"
+    if manifest["verb"] == "codec":
+        return f"motet train codes --codec {out} --actions RUN"
+    if manifest["verb"] == "actions":
+        return f"motet train codes --codec RUN --actions {out}"
     return f"motet evaluate {out}; motet export {out} -o {out.name}.zip"
 
 
 def _summary(out: Path, training: Mapping[str, Any]) -> str:
     unit = "step" if "steps" in training else "epoch"
-    said = [f"{training['parameters']:,} parameters", f"{training[f'{unit}s']} {unit}s in {training['seconds']:g} s"]
-    said += [f"{key} {training[key]:.4f}" for key in ("loss", "validation", "reconstruction") if key in training]
-    summary = f"{out}: {', '.join(said)}, after {unit} {training[f'kept_{unit}']}"
+    entries = [f"{training['parameters']:,} parameters", f"{training[f'{unit}s']} {unit}s in {training['seconds']:g} s"]
+    entries += [f"{key} {training[key]:.4f}" for key in ("loss", "validation", "reconstruction") if key in training]
+    summary = f"{out}: {', '.join(entries)}, after {unit} {training[f'kept_{unit}']}"
     if "missed" not in training:
         return summary
     missed = f"misses {', '.join(training['missed'])}" if training["missed"] else "reaches all goals"
