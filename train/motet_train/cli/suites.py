@@ -15,11 +15,12 @@ from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.language import LanguageModel
 from motet.models.load import load_as
-from motet.models.predict import PredictModel
-from motet.models.search import SearchModel
-from motet.models.steer import SteerModel
-from motet.models.tdbn_control import TdbnModel
 from motet.motion.motion import Motion
+from motet.papers.tdbn_control import TdbnModel
+from motet.predict.fill import FillModel
+from motet.predict.model import PredictModel
+from motet.search.model import SearchModel
+from motet.steering.model import SteerModel
 from motet_train.cli.train import read_expmap_files
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store

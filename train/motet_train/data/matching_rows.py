@@ -1,4 +1,4 @@
-"""The rows of motion matching: all that its loop (:mod:`motet.decode.matching`) needs to know of each recorded frame.
+"""The rows of motion matching: all that its loop (:mod:`motet.steering.matching`) needs to know of each recorded frame.
 
 Letters in shapes: T frames, N rows, J bones, F features, G gaits.
 """

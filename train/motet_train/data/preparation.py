@@ -25,8 +25,8 @@ class Preparation:
 
     representation: its name. humanoid: retarget every figure to the humanoid, instead of keeping one figure. trim: cut
     off idle frames and T-poses at both ends (:func:`trim`). floor: lift motions out of the floor
-    (:func:`motet.motion.floor.above_floor`). fps: frames per second. longest: motions of this many seconds and more are
-    cut into pieces if ``cut`` is set, else refused (Plappert et al. 2017, section 5.1).
+    (:func:`motet.figures.floor.above_floor`). fps: frames per second. longest: motions of this many seconds and more
+    are cut into pieces if ``cut`` is set, else refused (Plappert et al. 2017, section 5.1).
     """
 
     representation: str
