@@ -44,9 +44,11 @@ def warn(text: str, category: type[Warning]) -> None:
         if issubclass(category, categories):
             notes.append(category(text))
             return
-    level, frame = 1, sys._getframe(0)
+    level = 1
+    frame = sys._getframe(0)
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(Path(__file__).parent):
-        level, frame = level + 1, frame.f_back
+        level = level + 1
+        frame = frame.f_back
     warnings.warn(text, category, stacklevel=level)
 
 
@@ -86,7 +88,9 @@ class FormatError(MotionError):
     """A file that breaks its format's rules: names the file, the line (from 1) and the reason."""
 
     def __init__(self, path: str | Path, reason: str, line: int | None = None) -> None:
-        self.path, self.reason, self.line = Path(path), reason, line
+        self.path = Path(path)
+        self.reason = reason
+        self.line = line
         super().__init__(path, reason, line)  # what unpickling calls the class with
 
     def __str__(self) -> str:
@@ -126,7 +130,9 @@ class ScriptError(MotetError, ValueError):
     """A control script that does not parse: shows the script and marks the place."""
 
     def __init__(self, script: str, position: int, reason: str) -> None:
-        self.script, self.position, self.reason = script, position, reason
+        self.script = script
+        self.position = position
+        self.reason = reason
         super().__init__(script, position, reason)  # what unpickling calls the class with
 
     def __str__(self) -> str:

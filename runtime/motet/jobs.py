@@ -33,7 +33,8 @@ def in_order(function: Callable[[T], R], given: Iterable[T], jobs: int | None, f
     most four results for each process wait, so memory does not grow. What the function raises ends all; what is
     interrupted starts no more. MotetError where a process was killed.
     """
-    first, jobs = list(islice(rest := iter(given), few)), cores() if jobs is None else jobs
+    first = list(islice(rest := iter(given), few))
+    jobs = cores() if jobs is None else jobs
     if jobs < 2 or len(first) < few:
         yield from map(function, chain(first, rest))
         return

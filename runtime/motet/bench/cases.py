@@ -28,7 +28,9 @@ from motet.search.model import SearchModel
 from motet.steering.model import SteerModel
 from motet.text.vocabulary import EOS, SPECIALS
 
-BEAMS, WORDS, SECONDS = 5, 10, 7.0
+BEAMS = 5
+WORDS = 10
+SECONDS = 7.0
 """Lengths of all descriptions and motions, so that the speed does not depend on what a model produces."""
 
 
@@ -89,7 +91,8 @@ def _(model: DescribeModel, file: Path | None = None) -> list[Case]:
 def describe_cases(model: DescribeModel) -> list[Case]:
     """Descriptions of :data:`WORDS` words a second that the net writes, many at once and one alone; encoder and step of
     one alone. By beam search; and one by consensus of 100 draws."""
-    end, motion = model.vocabulary.ids[EOS], _noise(model.contract, model.fps)
+    end = model.vocabulary.ids[EOS]
+    motion = _noise(model.contract, model.fps)
     never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
     manifest = replace(model.manifest, defaults={"beams": BEAMS, "max_words": WORDS}, loop="beam")
     graphs = {name: graph for name, graph in model.graphs.items() if name != "space"}  # it writes nothing
@@ -106,7 +109,8 @@ def describe_cases(model: DescribeModel) -> list[Case]:
 @cases.register
 def mixture_cases(model: MixtureModel, _: Path | None = None) -> list[Case]:
     """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
-    text, step = _text(model), _Steady(model.graphs["step"], {"active": np.ones_like})
+    text = _text(model)
+    step = _Steady(model.graphs["step"], {"active": np.ones_like})
     manifest = replace(model.manifest, defaults={**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS})
     steady = MixtureModel(manifest, {**model.graphs, "step": step})
     return [
@@ -166,7 +170,8 @@ def fill_cases(model: FillModel, _: Path | None = None) -> list[Case]:
     count = round(model.fps)
     motion = _wandering(model.contract, 5 * count)
     frames = placed(motion)
-    past, after = frames[: 2 * count], frames[3 * count :]
+    past = frames[: 2 * count]
+    after = frames[3 * count :]
     return [
         Case("fill.second", lambda: model.frames_between(past, after, count)),
         Case("fill.motion", lambda: model.fill(motion, [(2.0, 3.0)])),
@@ -176,7 +181,8 @@ def fill_cases(model: FillModel, _: Path | None = None) -> list[Case]:
 @cases.register
 def search_cases(model: SearchModel, _: Path | None = None) -> list[Case]:
     """A sentence of :data:`WORDS` words, a motion of :data:`SECONDS`, and a question to 100,000 vectors."""
-    text, motion = _text(model), _noise(model.contract, model.fps)
+    text = _text(model)
+    motion = _noise(model.contract, model.fps)
     vectors = np.random.default_rng(0).normal(size=(100_000, model.sizes["E"])).astype(np.float32)
     return [
         Case("search.text", lambda: model.embed_text(text)),
@@ -230,7 +236,9 @@ class _Steady:
     """A graph some of whose outputs are changed: so that sentences and motions are all of one length."""
 
     def __init__(self, graph: Graph, changes: dict[str, Callable[..., Any]]) -> None:
-        self.spec, self._graph, self._changes = graph.spec, graph, changes
+        self.spec = graph.spec
+        self._graph = graph
+        self._changes = changes
 
     def __call__(self, feeds: Arrays) -> dict[str, Any]:
         outputs = self._graph(feeds)

@@ -72,8 +72,10 @@ def processor() -> str:
 
 def ceilings(seconds: float = 0.3) -> dict[str, float]:
     """GFLOP/s of a float32 product and GB/s of a copy by numpy here: the best of calls over ``seconds``."""
-    one, much = np.ones((768, 768), np.float32), np.ones(16_000_000, np.float32)
-    product, copy = taken(lambda: one @ one, seconds).wall.min(), taken(much.copy, seconds).wall.min()
+    one = np.ones((768, 768), np.float32)
+    much = np.ones(16_000_000, np.float32)
+    product = taken(lambda: one @ one, seconds).wall.min()
+    copy = taken(much.copy, seconds).wall.min()
     return {"gflops": 2 * 768**3 / float(product) / 1e9, "gigabytes": 2 * much.nbytes / float(copy) / 1e9}
 
 

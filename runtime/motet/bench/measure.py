@@ -97,7 +97,9 @@ class Taken:
 def taken(call: Call, seconds: float, least: int = 2) -> Taken:
     """What calls take, over about ``seconds`` (at least ``least`` calls) after a warm-up of a tenth of that."""
     for limit, count in ((seconds / 10, 1), (seconds, least)):
-        wall, end, before = list[float](), time.perf_counter() + limit, time.process_time()
+        wall = list[float]()
+        end = time.perf_counter() + limit
+        before = time.process_time()
         while len(wall) < count or time.perf_counter() < end:
             start = time.perf_counter()
             call()

@@ -56,7 +56,8 @@ def profiled(options: SessionOptions, call_of: Callable[[SessionOptions], Call],
         call = call_of(replace(options, configure=configure))
         call()
         time.sleep(PAUSE)
-        start, count = time.perf_counter(), 0
+        start = time.perf_counter()
+        count = 0
         while not count or time.perf_counter() < start + seconds:
             call()
             count += 1
@@ -96,7 +97,9 @@ def with_profiles(
 
 
 def _summed(events: list[dict[str, Any]], taken: float, count: int) -> Profile:
-    kernels, operations, sessions = Counter[str](), 0.0, 0.0
+    kernels = Counter[str]()
+    operations = 0.0
+    sessions = 0.0
     for event in events:
         if event["name"] == "model_run":
             sessions += event["dur"]

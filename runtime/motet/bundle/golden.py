@@ -47,7 +47,8 @@ def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
 
     BundleError where one is above the tolerance, or the vectors do not fit the model.
     """
-    arrays, found = read(data), {}
+    arrays = read(data)
+    found = {}
     for role, graph in model.graphs.items():
         found[role] = difference(graph(_part(arrays, f"{role}.in.")), _part(arrays, f"{role}.out."))
     try:
@@ -83,7 +84,10 @@ def difference(found: Arrays, expected: Arrays) -> float:
 
 def read(data: bytes) -> dict[str, NDArray[Any]]:
     """The arrays of an .npz by name; BundleError where it is damaged, too large, or holds anything but numbers."""
-    archive, left, found, dtypes = Archive(data), 16 << 20, {}, ("float32", "float64", "int64")
+    archive = Archive(data)
+    left = 16 << 20
+    found = {}
+    dtypes = ("float32", "float64", "int64")
     for member in sorted(archive.names):
         content = archive.read(member, left)
         left -= len(content)

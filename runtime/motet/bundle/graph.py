@@ -170,7 +170,8 @@ class GraphSpec:
             if len({spec.name for spec in tensors}) != len(tensors):
                 raise BundleError(f"manifest, {data.path}: two tensors have the same name")
         for name, source in feedback.items():
-            given, taken = found.output(source), found.input(name)
+            given = found.output(source)
+            taken = found.input(name)
             pairs = zip(given.shape, taken.shape, strict=False)
             alike = all(b in {a, given.shape[0]} or isinstance(b, str) for a, b in pairs)
             if given.dtype != taken.dtype or len(given.shape) != len(taken.shape) or not alike:

@@ -15,7 +15,9 @@ from motet.errors import BundleError
 Value = int | memoryview
 """A number, or the bytes of a string or of a message within the message."""
 
-MAX_FIELDS, MAX_TEXT, MAX_DEPTH = 100_000, 1 << 20, 64
+MAX_FIELDS = 100_000
+MAX_TEXT = 1 << 20
+MAX_DEPTH = 64
 """Fields of a whole graph, bytes of a field that is no tensor's data, and messages within each other."""
 
 
@@ -49,7 +51,8 @@ def check_graph(model: bytes) -> None:
     """BundleError where an ONNX model is damaged or could reach outside its bytes: what was found, and where."""
     if model[4:8] == b"ORTM":
         raise BundleError("the graph is in ONNX Runtime's own format, which cannot be checked")
-    waiting, count = [("model", memoryview(model), "the graph", 0)], 0
+    waiting = [("model", memoryview(model), "the graph", 0)]
+    count = 0
     while waiting:
         kind, data, outer, depth = waiting.pop()
         if depth > MAX_DEPTH:
@@ -77,7 +80,8 @@ def fields(message: memoryview) -> Iterator[tuple[int, Value]]:
     place = 0
     while place < len(message):
         tag, place = _varint(message, place)
-        number, wire = tag >> 3, tag & 7
+        number = tag >> 3
+        wire = tag & 7
         if tag >> 32 or not number:
             raise BundleError("the graph is not valid ONNX: a field has an invalid number")
         if wire not in (0, 1, 2, 5):
@@ -107,7 +111,8 @@ def _varint(message: memoryview, place: int) -> tuple[int, int]:
 
 def _fault(kind: str, number: int, value: Value) -> str | None:
     """What is wrong with a field that holds no message to look into."""
-    place, fault = (kind, number), None
+    place = (kind, number)
+    fault = None
     data = kind == "tensor" and number in (4, 5, 6, 7, 9, 10, 11)
     if place == ("tensor", 13) or (place == ("tensor", 14) and value != 0):
         fault = "has its data in another file"

@@ -163,14 +163,17 @@ class Manifest:
 
 def read_contract(data: Fields) -> MotionContract:
     """The motion contract that :meth:`MotionContract.to_json` wrote; BundleError names the key that is wrong."""
-    name, channels, units = data.one_of("representation", REPRESENTATIONS), data.texts("channels"), data.items("units")
+    name = data.one_of("representation", REPRESENTATIONS)
+    channels = data.texts("channels")
+    units = data.items("units")
     if not 1 <= len(channels) <= MAX_CHANNELS:
         raise data.fault(f"1 to {MAX_CHANNELS} names", len(channels), "channels")
     if lacking := [channel for channel in REPRESENTATIONS[name].required if channel not in channels]:
         raise BundleError(f"manifest, {data.at('channels')}: {name} needs {', '.join(lacking)}")
     if len(units) != len(channels) or any(unit not in UNITS for unit in units):
         raise data.fault(f"one of {', '.join(UNITS)} for each of {len(channels)} channels", units, "units")
-    fps, mean = data.number("fps", 1, 1000), data.numbers("mean", len(channels))
+    fps = data.number("fps", 1, 1000)
+    mean = data.numbers("mean", len(channels))
     std = data.numbers("std", len(channels), low=0.0)
     skeleton = _skeleton(data.fields("skeleton"), channels) if "skeleton" in data else None
     return MotionContract(name, channels, tuple(units), fps, mean, std, skeleton)
@@ -198,7 +201,8 @@ def _skeleton(data: Fields, channels: tuple[str, ...]) -> Skeleton:
 
 
 def _control(data: Fields, channels: int) -> Control:
-    labels, starts = data.texts("labels"), data.fields("starts")
+    labels = data.texts("labels")
+    starts = data.fields("starts")
     if not labels or set(starts.data) != set(labels):
         raise data.fault(f"frames for each of {', '.join(labels)}", list(starts.data), "starts")
     return Control(labels, {label: starts.table(label, channels) for label in labels})

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from motet.errors import BundleError
 
-MAX_FILES, MAX_SIZE = 64, 256 << 20
+MAX_FILES = 64
+MAX_SIZE = 256 << 20
 """Files of a bundle, and bytes of all of them together."""
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,127}")

@@ -44,7 +44,8 @@ def bench(
     **how: Any,
 ) -> None:
     """Measure a bundle's speed, and torch's where it is installed, in turn; and the machine's own ceilings."""
-    old, machine = {} if compare is None else _earlier(compare), Machine.here()
+    old = {} if compare is None else _earlier(compare)
+    machine = Machine.here()
     busy = f"the machine is busy (load {machine.load} on {machine.cores} cores)"
     if machine.overloaded and not force:
         raise click.UsageError(f"{busy}: wait until other programs are done, or measure with --force")

@@ -23,14 +23,16 @@ def list_(as_json: bool) -> None:
     """List the installed bundles."""
     found: list[dict[str, Any]] = []
     for one in map(Bundle.open, list_bundles().values()):
-        manifest, size = one.manifest, sum(entry.size for entry in one.manifest.files.values())
+        manifest = one.manifest
+        size = sum(entry.size for entry in one.manifest.files.values())
         about = {"name": one.name, "version": manifest.version, "verb": manifest.verb, "model": manifest.model}
         found.append({**about, "size": size, "licence": manifest.licence.get("weights")})
     if as_json:
         click.echo(json.dumps(found))
         return
     for row in found:
-        megabytes, licence = row["size"] / 1e6, row["licence"] or "not stated"
+        megabytes = row["size"] / 1e6
+        licence = row["licence"] or "not stated"
         click.echo(f"{row['name']:<16} {row['version']:<6} {row['verb']:<10} {megabytes:6.2f} MB  {licence}")
 
 

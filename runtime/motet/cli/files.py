@@ -46,7 +46,8 @@ class Row:
     @staticmethod
     def of(answer: Answer) -> "Row":
         """What an answer of :class:`Look` says."""
-        source, found = answer.source, next(iter(answer.rows), None)
+        source = answer.source
+        found = next(iter(answer.rows), None)
         unread = answer.error.removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, ")
         return Row(source, found, found.refused if found else unread)
 
@@ -284,7 +285,8 @@ class Convert(Verb):
 
     def rows(self, answer: Answer) -> list[Any]:
         """The one row."""
-        how, place = self.how, answer.source.place
+        how = self.how
+        place = answer.source.place
         assert place is not None
         motion = self.read(answer)
         motion = motion.cut(how.start, how.stop) if how.start or how.stop is not None else motion
@@ -310,7 +312,8 @@ def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:
 @read_options
 def view(sources: tuple[Path, ...], out: Path | None, read: Read) -> None:
     """Write a self-contained page that plays each motion file, and print its path."""
-    tries, given = Tries(), read.sources(sources)
+    tries = Tries()
+    given = read.sources(sources)
     new = ((source, source.label if source.part else source.name) for source in given)
     pages = places(out, given) if out else [Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html" for _, name in new]
     for source, page in zip(given, pages, strict=True):

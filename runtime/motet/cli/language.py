@@ -158,7 +158,8 @@ def generate(
     output.check(out)
     told = story or after is not None or settings["stand"] is not None
     settings = {key: value for key, value in settings.items() if value is not None}
-    tries, model = Tries(), load_as(CodesModel if told else GenerateModel, bundle, session)
+    tries = Tries()
+    model = load_as(CodesModel if told else GenerateModel, bundle, session)
     asked = _usable(tries, model, texts, settings["numbers"])
     if told:
         found = _stories(tries, cast(CodesModel, model), asked, story, after, **settings)
@@ -166,7 +167,8 @@ def generate(
         found = _motions(tries, model, asked, **settings)
     count = max((len(results) for *_, results in found), default=1) if every else 1
     numbers = range(1, 1 + count * (1 if story else len(texts)))
-    outs, rows = places(out, list(map(str, numbers)), output=output), []
+    outs = places(out, list(map(str, numbers)), output=output)
+    rows = []
     for index, text, results in found:
         with tries.of(text):
             own = zip(results[:count], outs[count * index :], strict=False)
@@ -306,7 +308,8 @@ def compose(
     motion = output.write(out, found.motion, told, _captions(found.passages))
     output.finish()
     facts = {"output": str(out), "frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
-    passages, met = [asdict(one) for one in found.passages], [one._asdict() for one in found.met]
+    passages = [asdict(one) for one in found.passages]
+    met = [one._asdict() for one in found.met]
     if as_json:
         click.echo(json.dumps({**facts, "passages": passages, "met": met}))
         return

@@ -73,8 +73,10 @@ def predict(
     """
     given = read.sources(sources)
     outs = iter(places(out, given, samples or 1, output))
-    model, tries = load_as(PredictModel, bundle, session), Tries()
-    count, rows = model.count(seconds, frames), []
+    model = load_as(PredictModel, bundle, session)
+    tries = Tries()
+    count = model.count(seconds, frames)
+    rows = []
     writer = _writer(beyond, session, samples, count > model.horizon)
     for source in given:
         own = [next(outs) for _ in range(samples or 1)]
@@ -145,7 +147,8 @@ def _lines(row: dict[str, Any], append: bool) -> Iterator[str]:
 
 def _gaps(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> tuple[Gap, ...]:
     """What ``--gap`` gives, as two numbers each."""
-    number, gaps = r"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*", []
+    number = r"\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*"
+    gaps = []
     for text in texts:
         if (parts := re.fullmatch(f"{number}:{number}", text)) is None:
             raise click.BadParameter(f"{quoted(text)} is no gap: give its start and stop in seconds, such as 1.0:2.0")
@@ -198,7 +201,8 @@ def fill(
         raise click.UsageError("give --gap START:STOP, once or several times, or --loop, with --seconds if you like")
     given = read.sources(sources)
     outs = places(out, given, output=output)
-    model, tries = load_as(FillModel, bundle, session), Tries()
+    model = load_as(FillModel, bundle, session)
+    tries = Tries()
     for source, place in zip(given, outs, strict=True):
         with tries.of(source):
             motion = read(source)
@@ -206,7 +210,8 @@ def fill(
                 found = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
                 filled: Sequence[Gap] = [(motion.duration, found.duration)]
             else:
-                found, filled = model.fill(motion, gaps), gaps
+                found = model.fill(motion, gaps)
+                filled = gaps
             found = output.write(place, found, source.title, _filled(filled))
             click.echo(f"{place}: {size(len(found), found.fps)}")
     output.finish()
@@ -238,7 +243,8 @@ def join(
     """
     spare(out, first, second)
     model = load_as(FillModel, bundle, session)
-    one, other = read(first), read(second)
+    one = read(first)
+    other = read(second)
     with naming(f"{first} and {second}"), warned(f"{first} and {second}"):
         found = model.join(one, other, seconds=seconds)
     captions = [(0.0, first.stem), (one.duration, "filled"), (found.duration - other.duration, second.stem)]

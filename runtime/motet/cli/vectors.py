@@ -57,7 +57,8 @@ def embed(
     if out is None or out.suffix.lower() != ".npy":
         raise click.UsageError("context vectors are written as .npy: give -o VECTORS.npy")
     check_place(out)
-    tries, rows = many.tries, list[dict[str, Any]]()
+    tries = many.tries
+    rows = list[dict[str, Any]]()
     if motions:
         for answer in many.answers(verb, many.sources(motions), "embedding"):
             rows += answer.rows

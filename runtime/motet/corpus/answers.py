@@ -168,7 +168,8 @@ class Describe(OfModel[DescribeModel]):
 
     def __call__(self, sources: Sequence[Source]) -> list[Answer]:
         """The answers, in order; a row for each window, with input, in_place, start, stop and hypotheses."""
-        answers, windows = list(map(Answer, sources)), list[_Window]()
+        answers = list(map(Answer, sources))
+        windows = list[_Window]()
         for answer in answers:
             with answer.tried():
                 cut = self.model.windows(self.read(answer))
@@ -224,7 +225,8 @@ class Embed(OfModel[DescribeModel]):
 
     def __call__(self, sources: Sequence[Source]) -> list[Answer]:
         """The answers, in order."""
-        answers, motions = list(map(Answer, sources)), []
+        answers = list(map(Answer, sources))
+        motions = []
         for answer in answers:
             with answer.tried():
                 motions.append((answer, self.model.prepared(self.read(answer))))

@@ -20,7 +20,8 @@ MAX_TABLE = 16 << 20
 MAX_FILE = 512 << 20
 """Bytes of a file, unpacked."""
 
-MAX_RATIO, SMALL = 100, 16 << 20
+MAX_RATIO = 100
+SMALL = 16 << 20
 """How many times its packed size a file may be, unpacked, if it is not small; motions as text shrink to a tenth."""
 
 DAMAGE = (

@@ -132,7 +132,8 @@ def _facing(motion: Motion) -> float | None:
 
 def _heights(motion: Motion, found: Humanoid) -> tuple[float, float]:
     """The ground under the soles and the lowest point of soles and joints, in metres over the file's y = 0."""
-    fitted, turn = found.figure.fitted, found.figure.turn
+    fitted = found.figure.fitted
+    turn = found.figure.turn
     rotations = global_transforms(found.motion)[0]
     places = positions(with_figure(motion) if is_mmm(motion) else motion) @ turn.T
     soles = fitted.soles({bone: rotations[:, HUMANOID.index(bone)] for bone in fitted.heights}, places)

@@ -224,7 +224,8 @@ def _checked_head(line: bytes, path: Path) -> dict[str, Any]:
 def _checked_answer(line: bytes, path: Path, number: int) -> dict[str, Any]:
     """The answer of a line; FormatError for one that is cut or no answer."""
     answer = _parsed(line, path, number)
-    rows, error = answer.get("rows"), answer.get("error")
+    rows = answer.get("rows")
+    error = answer.get("error")
     if (
         type(answer.get("file")) is not int
         or not isinstance(answer.get("input"), str)
@@ -265,7 +266,8 @@ class _Order:
     def take(self, answer: Mapping[str, Any]) -> None:
         """The next answer: of another clip of the same file, or of the next file. FormatError for any other."""
         self.line += 1
-        file, name = answer["file"], answer["input"]
+        file = answer["file"]
+        name = answer["input"]
         if self.begun and file == self.files[self.begun - 1]:
             if name in self.inputs:
                 raise FormatError(self.path, f"the answer of {name} is there twice", self.line)
@@ -321,7 +323,8 @@ def _write_parquet(parts: Sequence[Path], out: Path) -> int:
         import pyarrow.parquet as pq
     except ImportError as error:
         raise OutputError("Parquet needs pyarrow: pip install 'motet[scale]'") from error
-    columns, count = {"path": "input", "hash": "hash", "answer": "rows", "error": "error"}, 0
+    columns = {"path": "input", "hash": "hash", "answer": "rows", "error": "error"}
+    count = 0
     answers = ({**answer, "rows": json.dumps(answer["rows"])} for _, answer in _in_order(parts))
     schema = pa.schema([(name, pa.string()) for name in columns])
     with pq.ParquetWriter(out, schema) as writer:

@@ -115,18 +115,19 @@ def files_of(given: Sequence[Path]) -> list[Path]:
 
 def _files(path: Path) -> list[Path]:
     if path.is_dir():
-        found, where = files_in(path, KINDS), "are in it"
+        found = files_in(path, KINDS)
+        where = "are in it"
     elif url := url_of(path):
-        found, where = _listed(path, url), "are there"
+        found = _listed(path, url)
+        where = "are there"
     elif path.suffix.lower() == ".zip" and path.is_file():
         with ZipFiles(path) as archive:
-            found, where = (
-                [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in KINDS],
-                "are in it",
-            )
+            found = [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in KINDS]
+            where = "are in it"
     elif glob.has_magic(str(path)) and not place_of(split_clip(path, READABLE)[0]).exists():
         matching = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-        found, where = [one for one in matching if one.suffix.lower() in KINDS], "have such names"
+        found = [one for one in matching if one.suffix.lower() in KINDS]
+        where = "have such names"
     else:
         return [path]
     if not found:
@@ -175,7 +176,8 @@ def _clips_of(parts: Contents, path: Path, clip: str | None, figure: str | None)
 def opened(path: Path) -> Iterator[Path]:
     """Where a file lies; one in a zip is unpacked for as long as the context lasts, with the skeleton (.asf) that an
     .amc needs. Errors name it by its path in the zip."""
-    member, url = member_of(path), url_of(path)
+    member = member_of(path)
+    url = url_of(path)
     if member is None and (url is None or path.exists()):
         yield path
         return
@@ -192,7 +194,8 @@ def opened(path: Path) -> Iterator[Path]:
         try:
             yield place
         except MotionError as error:
-            line, reason = getattr(error, "line", None), getattr(error, "reason", str(error))
+            line = getattr(error, "line", None)
+            reason = getattr(error, "reason", str(error))
             raise FormatError(path, str(reason).replace(folder, str(box)), line) from error
 
 

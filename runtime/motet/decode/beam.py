@@ -63,7 +63,8 @@ def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> lis
     Scores are log-probabilities, not divided by length. A hypothesis that ended keeps its score and its place as long
     as no ``beams`` others are better; a row is done when all of its have ended.
     """
-    rows, end = len(context), limits.end
+    rows = len(context)
+    end = limits.end
     scores = np.where(np.arange(beams) == 0, 0.0, -np.inf) * np.ones((rows, 1))
     words = np.full((rows, beams, 1), limits.start, dtype=np.int64)
     state = zero_state(step, rows * beams)
@@ -90,14 +91,16 @@ def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Sco
     left: log-probabilities (N, V) of the words after those ``alive``; used up.
     """
     (rows, beams), width, one = scores.shape, min(scores.shape[1], left.shape[1]), np.arange(len(left))
-    pool, words = np.full((rows * beams, width), -np.inf), np.full((rows * beams, width), end, dtype=np.int64)
+    pool = np.full((rows * beams, width), -np.inf)
+    words = np.full((rows * beams, width), end, dtype=np.int64)
     pool[:, 0] = scores.ravel()  # ended hypotheses are kept unchanged
     for place in range(width):  # a few passes of argmax take a fraction of argpartition's time
         likeliest = left.argmax(axis=1)
         words[alive, place] = likeliest
         pool[alive, place] = scores.ravel()[alive] + left[one, likeliest]
         left[one, likeliest] = -np.inf
-    pool, words = pool.reshape(rows, -1), words.reshape(rows, -1)
+    pool = pool.reshape(rows, -1)
+    words = words.reshape(rows, -1)
     order = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
     return np.take_along_axis(pool, order, 1), order // width, np.take_along_axis(words, order, 1)
 
@@ -119,12 +122,14 @@ def draw_sequences(
     uniform number u (systematic sampling). A word of probability p then comes n p times, rounded up or down, and n p
     times on average: the draws show the distribution better than independent ones.
     """
-    rows, noise = len(context), noise_of(limits, draws) if noise is None else noise
+    rows = len(context)
+    noise = noise_of(limits, draws) if noise is None else noise
     found = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
     scores = np.zeros(rows * draws)
     alive = np.arange(rows * draws)  # the draws that have not ended; those that begin alike are neighbours
     row = two_rows(np.arange(rows))  # of each beginning, as the last word and the state
-    last, state = np.full(len(row), limits.start, dtype=np.int64), zero_state(step, len(row))
+    last = np.full(len(row), limits.start, dtype=np.int64)
+    state = zero_state(step, len(row))
     begun = alive // draws  # of each draw the beginning
     for length in range(limits.longest + 1):
         if not len(alive):
@@ -137,10 +142,12 @@ def draw_sequences(
         scores[alive] += outputs["log_probabilities"][begun, chosen]
         goes_on = chosen != limits.end
         longer = (begun * left.shape[1] + chosen)[goes_on]
-        alive, unique = alive[goes_on], two_rows(np.unique(longer))
+        alive = alive[goes_on]
+        unique = two_rows(np.unique(longer))
         begun = np.searchsorted(unique, longer)
         parent, last = np.divmod(unique, left.shape[1])
-        row, state = row[parent], {name: array[parent] for name, array in following.items()}
+        row = row[parent]
+        state = {name: array[parent] for name, array in following.items()}
     return [
         _counted(found[at : at + draws].tolist(), scores[at : at + draws].tolist(), limits.end)
         for at in range(0, rows * draws, draws)
@@ -214,8 +221,10 @@ def score_words(step: Graph, contexts: Floats, rows: Ids, words: Ids) -> Scores:
     step: as :func:`beam_search`. contexts: (R, C). rows: (N,) of contexts. words: (N, W), the start, the words, the
     end, and 0 behind it. Sequences of one row share the steps of the words with which they all begin.
     """
-    found, group = np.zeros(len(rows)), rows
-    state, count = zero_state(step, len(contexts)), int(words.max()) + 1
+    found = np.zeros(len(rows))
+    group = rows
+    state = zero_state(step, len(contexts))
+    count = int(words.max()) + 1
     for given, coming in zip(words.T, words.T[1:], strict=False):
         alive = np.flatnonzero(coming)
         if not len(alive):

@@ -151,8 +151,10 @@ class RowNoise:
     BLOCK = 16  # ticks drawn at once
 
     def __init__(self, seeds: Sequence[int], width: int) -> None:
-        self.seeds, self.width = tuple(seeds), width
-        self._index, self._block = -1, np.empty((0, 0, 0), dtype=np.float32)
+        self.seeds = tuple(seeds)
+        self.width = width
+        self._index = -1
+        self._block = np.empty((0, 0, 0), dtype=np.float32)
 
     def at(self, tick: int) -> Floats:
         """The noise (rows, width) float32 of one tick."""

@@ -75,7 +75,8 @@ HAND = (
 THUMB = ((0.0, 0.010), (0.06, 0.015), (0.35, 0.0155), (0.7, 0.0135), (0.93, 0.010), (1.0, 0.004))
 """Of each ring how far along it is, and its radius."""
 
-THUMB_FROM, THUMB_TO = np.array([0.704, 1.396, 0.020]), np.array([0.782, 1.376, 0.070])
+THUMB_FROM = np.array([0.704, 1.396, 0.020])
+THUMB_TO = np.array([0.782, 1.376, 0.070])
 
 LEG = (
     (1.004, 0.026, 0.026, 0.0), (0.990, 0.054, 0.054, -0.002), (0.965, 0.078, 0.080, -0.005),
@@ -96,7 +97,8 @@ SHOE = (
 )  # fmt: skip
 """Of each ring of the left shoe its place along z, half its width, its bottom and its top."""
 
-LEG_X, ARM_Y = 0.09, 1.40
+LEG_X = 0.09
+ARM_Y = 1.40
 """Where the joints of the left leg lie along x, and those of the arm above the ground."""
 
 
@@ -162,14 +164,16 @@ def _as_large(coarse: Array, fine: Array) -> Array:
 
 def _trunk(detail: float) -> Mesh:
     rows = np.array(TRUNK)
-    middle, depth = (rows[:, 2] - rows[:, 3]) / 2, (rows[:, 2] + rows[:, 3]) / 2
+    middle = (rows[:, 2] - rows[:, 3]) / 2
+    depth = (rows[:, 2] + rows[:, 3]) / 2
     rings = _flat(16, 2.4, (2, 0), np.stack([0 * middle, rows[:, 0], middle, depth, rows[:, 1]], axis=1), detail)
     chain = tuple((_index(name), height, 0.10) for name, height in
                   (("hips", 0.0), ("spine", 1.07), ("chest", 1.17), ("upperChest", 1.27)))  # fmt: skip
     mesh = _carried(rings, 1, chain, SHIRT)
     mesh.parts[mesh.places[:, 1] < BELT] = TROUSERS
     # towards the shoulders the collar bones carry more and more of the chest: recorded ones often slope by 40 degrees
-    x, height = mesh.places[:, 0], mesh.places[:, 1]
+    x = mesh.places[:, 0]
+    height = mesh.places[:, 1]
     part = eased((np.abs(x) - 0.03) / 0.10) * eased((height - 1.29) / 0.09)
     for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
         on_side = (sign * x > 0) & (part > 0)
@@ -236,7 +240,8 @@ def _limbs(side: str, detail: float) -> list[Mesh]:
     leg = ((joint["UpperLeg"], 0.0, 0.0), (joint["LowerLeg"], -0.50, 0.10), (joint["Foot"], -0.09, 0.05))
     x, tall, deep = np.array(ARM).T
     arms = _flat(10, 2.0, (1, 2), np.stack([x, 0 * x + ARM_Y, 0 * x, tall, deep], axis=1), detail)
-    hand, yoke = _along_arm(8, 2.5, HAND, detail), _along_arm(10, 2.0, YOKE, detail)
+    hand = _along_arm(8, 2.5, HAND, detail)
+    yoke = _along_arm(10, 2.0, YOKE, detail)
     meshes = [
         _carried(arms, 0, arm, SHIRT),
         _carried(hand, 0, arm, own),

@@ -55,9 +55,11 @@ class Body:
         .76 high. Figures that rest with all their bones in a line would be taken for half as high.
         """
         lengths = np.linalg.norm(self.skeleton.offsets, axis=1)
-        below, longest = np.zeros(len(lengths)), 0.0
+        below = np.zeros(len(lengths))
+        longest = 0.0
         for i in range(len(lengths) - 1, 0, -1):
-            parent, reach = self.skeleton.joints[i].parent, lengths[i] + below[i]
+            parent = self.skeleton.joints[i].parent
+            reach = lengths[i] + below[i]
             longest = max(longest, float(below[parent] + reach))
             below[parent] = max(below[parent], reach)
         return max(self.skeleton.height, 0.62 * longest) or 1.0
@@ -86,15 +88,19 @@ class Body:
     def bones(self) -> tuple[Bone, ...]:
         """A bone to each joint apart from its parent, the flanks, and the skull in place of what is inside it."""
         joints = self.skeleton.joints
-        lengths, rest = np.linalg.norm(self.skeleton.offsets, axis=1) / self.height, self._rest
+        lengths = np.linalg.norm(self.skeleton.offsets, axis=1) / self.height
+        rest = self._rest
         # how much body hangs on each joint: along a limb lengths add up, where limbs meet their squares
         squares = np.zeros(len(joints))
         squares[self.head] = 0.15**2  # the length that a head counts for in the thickness of the neck
         for i in range(len(joints) - 1, 0, -1):
             squares[joints[i].parent] += (lengths[i] + np.sqrt(squares[i])) ** 2
-        beyond, bones = np.sqrt(squares), []
+        beyond = np.sqrt(squares)
+        bones = []
         for i, joint in enumerate(joints):
-            parent, side, in_skull = joint.parent, self.sides[i], i == self.head and self.head_is_tip
+            parent = joint.parent
+            side = self.sides[i]
+            in_skull = i == self.head and self.head_is_tip
             if not i or lengths[i] <= SAME_SPOT or in_skull or (self._in_trunk[i] and side != MIDDLE):
                 continue
             thick, thin = (float(max(0.014, 0.07 * length**0.65)) for length in (lengths[i] + beyond[i], beyond[i]))
@@ -104,7 +110,8 @@ class Body:
             if on_trunk and side != MIDDLE and beyond[i] > 0.2 and np.linalg.norm(rest[parent]) > SAME_SPOT:
                 bones.append(Bone(i, 0, 0.8 * thick, thick, MIDDLE, (parent, 0)))
         if self.head:
-            jaw, carrier = len(joints), joints[self.head].parent
+            jaw = len(joints)
+            carrier = joints[self.head].parent
             bones.append(Bone(jaw, jaw + 1, SKULL[0][1], SKULL[1][1], MIDDLE, (carrier, carrier)))
         return tuple(bones) or (Bone(0, 0, 0.07, 0.07, MIDDLE, (0, 0)),)
 
@@ -162,7 +169,8 @@ def figure_of(motion: Motion) -> Figure:
     # a figure that moves up and down stands on y = 0 if its lowest point is that near
     stands = f"{skeleton.names[0]}.ty" in motion.channels and abs(lowest) < 0.1
     points[:, :, 1] -= 0.0 if stands else lowest
-    heading, sides = 0.0, np.array(body.sides)
+    heading = 0.0
+    sides = np.array(body.sides)
     if LEFT in body.sides:
         to_left = points[0, sides == LEFT].mean(axis=0) - points[0, sides == RIGHT].mean(axis=0)
         heading = float(np.arctan2(-to_left[2], to_left[0]))
@@ -174,7 +182,9 @@ def first_of(motion: Motion) -> int:
 
     Some programs put a joint above the hips that stays at the origin: it is not a part of the figure.
     """
-    skeleton, places, first = skeleton_of(motion), positions(motion), 0
+    skeleton = skeleton_of(motion)
+    places = positions(motion)
+    first = 0
     travelled = {name.rpartition(".")[0] for name in motion.channels if name[-3:-1] == ".t"}
     while (
         skeleton.children[first] == (first + 1,)

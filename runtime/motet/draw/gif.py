@@ -31,7 +31,8 @@ def write(file: File, motion: Motion, size: int = 320) -> None:
     figure = figure_of(motion)
     delay = delay_of(figure.fps)
     points = resampled(figure.points, figure.fps * delay / 100)
-    stage, targets = Stage(size, figure.heading + YAW), _targets(points[:, 0, ::2], 100 / delay)
+    stage = Stage(size, figure.heading + YAW)
+    targets = _targets(points[:, 0, ::2], 100 / delay)
     pictures = (stage.picture(pose, figure.bones, target) for pose, target in zip(points, targets, strict=True))
     first = next(pictures).quantize(64)
     rest = (picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures)
@@ -61,8 +62,11 @@ class Stage:
     """A square picture of ``size`` pixels, seen from ``yaw`` (radians about y; 0 looks at the +z side)."""
 
     def __init__(self, size: int, yaw: float) -> None:
-        self.size, self.pixels = size, size * DRAWN_LARGER
-        sin, cos, pitch = np.sin(yaw), np.cos(yaw), np.radians(12.0)
+        self.size = size
+        self.pixels = size * DRAWN_LARGER
+        sin = np.sin(yaw)
+        cos = np.cos(yaw)
+        pitch = np.radians(12.0)
         toward = np.array([np.cos(pitch) * sin, np.sin(pitch), np.cos(pitch) * cos])
         right = np.array([cos, 0.0, -sin])
         self.axes = np.stack([right, np.cross(toward, right), toward])
@@ -99,7 +103,8 @@ class Stage:
             across = np.ceil((steps + target[axis]) / cell) * cell - target[axis]
             for place in np.unique(np.round(across, 9)):
                 line = np.zeros((len(steps), 3))
-                line[:, 2 * axis], line[:, 2 - 2 * axis] = place, steps
+                line[:, 2 * axis] = place
+                line[:, 2 - 2 * axis] = steps
                 fade = np.clip(1 - np.hypot(place, (steps[1:] + steps[:-1]) / 2) / reach, 0, 1) ** 1.2
                 seen = self._seen(line)[0].tolist()
                 for start, end, part in zip(seen[:-1], seen[1:], fade.tolist(), strict=True):
@@ -108,7 +113,9 @@ class Stage:
     def _shadow(self, points: Array, bones: tuple[Bone, ...]) -> Image.Image:
         """How much of a shadow there is at each pixel."""
         mask = Image.new("L", (self.pixels, self.pixels))
-        draw, light, angles = ImageDraw.Draw(mask), np.array([0.35, 1.0, 0.45]), np.arange(12) * np.pi / 6
+        draw = ImageDraw.Draw(mask)
+        light = np.array([0.35, 1.0, 0.45])
+        angles = np.arange(12) * np.pi / 6
         circle = np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
         flat = points - points[:, 1:2] * light / light[1]
         for bone in bones:

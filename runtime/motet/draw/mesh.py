@@ -40,7 +40,8 @@ class Mesh:
 def normals_of(places: Array, triangles: NDArray[np.intp]) -> Array:
     """Normals (V, 3) of corners (V, 3), from the triangles around each, weighed by their areas."""
     a, b, c = places[triangles.T]
-    across, normals = np.cross(b - a, c - a), np.zeros_like(places)
+    across = np.cross(b - a, c - a)
+    normals = np.zeros_like(places)
     for corner in triangles.T:
         np.add.at(normals, corner, across)
     return unit(normals)
@@ -63,7 +64,8 @@ def loft(rings: Array) -> tuple[Array, NDArray[np.intp]]:
     count, around = rings.shape[:2]
     corner = np.arange(around)
     start = around * np.arange(count - 1)[:, None]
-    below, beside = (start + corner).reshape(-1), (start + (corner + 1) % around).reshape(-1)
+    below = (start + corner).reshape(-1)
+    beside = (start + (corner + 1) % around).reshape(-1)
     sides = np.stack([below, beside, beside + around, below, beside + around, below + around], axis=1).reshape(-1, 3)
     fan = np.stack([0 * corner[1:-1], corner[1:-1], corner[2:]], axis=1)
     return rings.reshape(-1, 3), np.concatenate([fan[:, ::-1], sides, fan + (count - 1) * around])

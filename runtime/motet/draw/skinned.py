@@ -49,7 +49,8 @@ class Skinned:
 
     def frames(self) -> tuple[Array, Array]:
         """Rotations (T, K, 3, 3) and places (T, K, 3) of the joints in the world."""
-        turns, places = self.turns.copy(), self.moves.copy()
+        turns = self.turns.copy()
+        places = self.moves.copy()
         for joint, parent in enumerate(self.parents[1:], start=1):
             places[:, joint] = places[:, parent] + rotated(turns[:, parent], places[:, joint])
             turns[:, joint] = product(turns[:, parent], turns[:, joint])
@@ -81,9 +82,11 @@ def _on_person(motion: Motion) -> Skinned | None:
         if found.confidence < SURE_OF_JOINTS:
             return None
         motion, scales = found.motion, _proportions(found.figure, motion)
-    mesh, height = person(), Body(HUMANOID).height
+    mesh = person()
+    height = Body(HUMANOID).height
     parents = [joint.parent for joint in HUMANOID.joints]
-    turns, root = local_rotations(motion), local_translations(motion)[:, 0]
+    turns = local_rotations(motion)
+    root = local_translations(motion)[:, 0]
     moves = np.tile(HUMANOID.offsets * scales[parents], (len(motion), 1, 1))
     moves[:, 0] = root
     rest = (HUMANOID.rest_positions + HUMANOID.offsets[0]) / height
@@ -103,7 +106,8 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     the humanoid's joints, of which those of arms are x and of legs and trunk y."""
     body = figure.fitted.body
     places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
-    usual, scales = HUMANOID.rest_positions, np.ones((len(HUMANOID.joints), 3))
+    usual = HUMANOID.rest_positions
+    scales = np.ones((len(HUMANOID.joints), 3))
     for bone, end, axis in LIMBS:
         for side in (side for side in LEFT_RIGHT if sided(side, end) in body.joints):
             own = places[:, body.joints[sided(side, bone)]] - places[:, body.joints[sided(side, end)]]
@@ -125,18 +129,22 @@ def _ratio(own: Array, usual: Array) -> float:
 
 def _on_bones(motion: Motion) -> Skinned:
     """The round bones of a motion's own skeleton."""
-    figure, first = figure_of(motion), first_of(motion)
+    figure = figure_of(motion)
+    first = first_of(motion)
     skeleton = below(skeleton_of(motion), first)
     body = Body(skeleton)
-    turns, moves = local_rotations(motion)[:, first:], local_translations(motion)[:, first:] / body.height
-    turns[:, 0], moves[:, 0] = global_transforms(motion)[0][:, first], figure.points[:, 0]
+    turns = local_rotations(motion)[:, first:]
+    moves = local_translations(motion)[:, first:] / body.height
+    turns[:, 0] = global_transforms(motion)[0][:, first]
+    moves[:, 0] = figure.points[:, 0]
     stretched = np.ptp(moves, axis=0).max(axis=-1) > SAME_SPOT
     rest = body.points(skeleton.rest_positions / body.height)
     bones = [
         _capsule(bone, rest, bone.end if bone.end < len(stretched) and stretched[bone.end] else None)
         for bone in body.bones
     ]
-    scales, parents = np.ones((len(skeleton.joints), 3)), tuple(joint.parent for joint in skeleton.joints)
+    scales = np.ones((len(skeleton.joints), 3))
+    parents = tuple(joint.parent for joint in skeleton.joints)
     return Skinned(together(bones), rest[: len(parents)], scales, parents, turns, moves, figure.heading, figure.fps)
 
 

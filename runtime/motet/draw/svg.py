@@ -19,10 +19,13 @@ INKS = {**CLOTHES, LEFT_PART: COLOURS[LEFT], RIGHT_PART: COLOURS[RIGHT], MIDDLE_
 """The colours of a body's parts, as of the player."""
 
 SUN = unit(np.array([0.42, 1.0, 0.5]))
-YAW, PITCH = np.radians(40.0), np.radians(12.0)
+YAW = np.radians(40.0)
+PITCH = np.radians(12.0)
 """From where it is seen: from which side of what it faces at first, and how far from above."""
 
-WIDE, TALL, APART = 110, 190, 0.75
+WIDE = 110
+TALL = 190
+APART = 0.75
 """Pixels of a pose, and heights from one to the next."""
 
 

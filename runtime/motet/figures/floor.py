@@ -41,7 +41,9 @@ def above_floor(motion: Motion) -> Motion:
     their own, or the performer was larger than the skeleton.
     """
     turned, places = global_transforms(motion)
-    turned, places, reach = np.array(turned), np.array(places), SOFT * motion.fps
+    turned = np.array(turned)
+    places = np.array(places)
+    reach = SOFT * motion.fps
     thick = np.array([THICKNESS.get(name.removeprefix("left").removeprefix("right"), 0.0) for name in HUMANOID.names])
     thick -= [TOLERATED * name.endswith(LIMBS[:4]) for name in HUMANOID.names]
     limbs = [joint for joint, name in enumerate(HUMANOID.names) if name.endswith(LIMBS)]

@@ -54,7 +54,9 @@ def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
 
 def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quaternion], list[Vector]]:
     """Rotations and places of a leg's joints where the hips are."""
-    turned, places, above = list[Quaternion](), list[Vector](), hips
+    turned = list[Quaternion]()
+    places = list[Vector]()
+    above = hips
     for local, offset in zip(limb.local, limb.offsets, strict=True):
         place = plus(place, rotated(above, offset))
         above = product(above, local)
@@ -69,5 +71,6 @@ def reached_by(hips: Quaternion, turned: list[Quaternion], places: list[Vector],
     thigh, shin, foot = turned[:3]
     leg = TwoBones(places[0], places[1], places[2], rotated_axis(shin, 0))
     turn_thigh, turn_shin = leg.turns(leg.eased(target))
-    thigh, shin = product(turn_thigh, thigh), product(turn_shin, shin)
+    thigh = product(turn_thigh, thigh)
+    shin = product(turn_shin, shin)
     return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]

@@ -32,13 +32,17 @@ def in_place(motion: Motion) -> Motion:
     unchanged. MotionError for one without skeleton.
     """
     skeleton = skeleton_of(motion)
-    carrier, up = 0, UP  # of the humanoid, or of a figure that is not human
+    # of the humanoid, or of a figure that is not human
+    carrier = 0
+    up = UP
     if skeleton != HUMANOID:
         with suppress(MotionError):
             figure = Figure.of(motion)
-            carrier, up = figure.fitted.joint_map.carrier(skeleton), figure.turn.T @ UP
+            carrier = figure.fitted.joint_map.carrier(skeleton)
+            up = figure.turn.T @ UP
     for joint in reversed(skeleton.ancestors(carrier)):
-        name, above = skeleton.names[joint], skeleton.joints[joint].parent
+        name = skeleton.names[joint]
+        above = skeleton.joints[joint].parent
         if any(f"{name}.t{axis}" in motion.channels for axis in AXES):
             rotations, places = global_transforms(motion)
             moved = np.outer(places[:, joint] @ up, up)
@@ -76,7 +80,8 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
     if motion.fps != like.fps:
         log.warning("resampled the second motion from %g to %g fps, the rate of the first", motion.fps, like.fps)
         motion = motion.continuous().resample(like.fps)
-    one, two = skeleton_of(motion), skeleton_of(like)
+    one = skeleton_of(motion)
+    two = skeleton_of(like)
     joints = [[(joint.name, joint.parent, joint.order, joint.axis) for joint in each.joints] for each in (one, two)]
     same = joints[0] == joints[1] and one.metres_per_unit == two.metres_per_unit
     if not same or np.abs(one.offsets[1:] - two.offsets[1:]).max(initial=0) > 1e-3 * two.height:
@@ -84,7 +89,8 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
         motion = from_humanoid(on_humanoid(motion), like)
     elif set(motion.channels) == set(like.channels):
         return replace(motion.select(like.channels, like.units), skeleton=two)
-    turned, moved = local_rotations(motion), local_translations(motion)
+    turned = local_rotations(motion)
+    moved = local_translations(motion)
     by_name = ({name: part[:, i] for i, name in enumerate(two.names)} for part in (turned, moved))
     return continued(like[-1:], *by_name)
 
@@ -96,20 +102,25 @@ def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) ->
     velocities at the end of the first and, after turning, at the start of the second. None if the channels lack the
     position or rotation of the hips.
     """
-    skeleton, known = skeleton_of(motion), set(motion.channels)
+    skeleton = skeleton_of(motion)
+    known = set(motion.channels)
     # the hips are the first joint with a translation
     hips = next((i for i, n in enumerate(skeleton.names) if {f"{n}.t{axis}" for axis in AXES} <= known), -1)
     if hips < 0 or not {f"{skeleton.names[hips]}.r{axis}" for axis in AXES} <= known:
         return None
-    name, above = skeleton.names[hips], skeleton.joints[hips].parent
+    name = skeleton.names[hips]
+    above = skeleton.joints[hips].parent
     rotations, places = global_transforms(motion)
-    about, last = axis_to_rotmat("y", np.array(turn)), global_transforms(before[-1])[1][0, hips]
+    about = axis_to_rotmat("y", np.array(turn))
+    last = global_transforms(before[-1])[1][0, hips]
     speed = (_velocity(before, hips, to_end=True) + about @ _velocity(motion, hips)) / 2
     to = last + seconds * speed
     place = np.array([to[0], places[0, hips, 1], to[2]]) + rotated(about, places[:, hips] - places[0, hips])
-    to_parent, origin = np.broadcast_to(np.eye(3), (len(motion), 3, 3)), np.zeros((len(motion), 3))
+    to_parent = np.broadcast_to(np.eye(3), (len(motion), 3, 3))
+    origin = np.zeros((len(motion), 3))
     if above >= 0:
-        to_parent, origin = inverse(rotations[:, above]), places[:, above]
+        to_parent = inverse(rotations[:, above])
+        origin = places[:, above]
     own = product(to_parent, product(np.broadcast_to(about, to_parent.shape), rotations[:, hips]))
     return posed(motion, {name: own}, {name: rotated(to_parent, place - origin)})
 

@@ -40,13 +40,16 @@ class TwoBones:
     straight, or a knee bent by 12 degrees, where that is e times less."""
 
     def __init__(self, hip: Vector, knee: Vector, ankle: Vector, hinge: Vector) -> None:
-        self.hip, self.ankle = hip, ankle
+        self.hip = hip
+        self.ankle = ankle
         self._along, self._down = along, down = minus(knee, hip), minus(ankle, knee)
-        upper, lower = dot(along, along), dot(down, down)
+        upper = dot(along, along)
+        lower = dot(down, down)
         self._axis = unit(minus(hinge, times(along, dot(hinge, along) / upper)))
         # the part of the shin in the plane of the bend
         in_plane = larger(1 - dot(down, self._axis) ** 2 / lower, 1e-12)
-        self._squares, self._twice = upper + lower, 2 * root(upper * lower * in_plane)
+        self._squares = upper + lower
+        self._twice = 2 * root(upper * lower * in_plane)
         self.longest = root(self._squares + self._twice)
 
     def eased(self, target: Vector) -> Vector:
@@ -56,7 +59,8 @@ class TwoBones:
         the straighter it gets, and a straight one bends only softly.
         """
         away = minus(target, self.hip)
-        now, wanted = length(minus(self.ankle, self.hip)), length(away)
+        now = length(minus(self.ankle, self.hip))
+        wanted = length(away)
         left = larger(self.longest - now, 1e-9)
         longer = -self.EASED_SHARE * left * computed(np.expm1, -larger(wanted - now, 0.0) / (self.EASED_SHARE * left))
         less = larger(now - wanted, 0.0)
@@ -79,7 +83,9 @@ class TwoBones:
         """The turn about the axis after which the shin is bent by the angle of a cosine."""
         cosine = -larger(-larger(cosine, self.SHORTEST), -1.0)
         sine = root(1 - cosine * cosine)
-        now, aside = dot(self._along, self._down), dot(cross(self._along, self._down), self._axis)  # negative: forward
+        # negative: forward
+        now = dot(self._along, self._down)
+        aside = dot(cross(self._along, self._down), self._axis)
         by = 1 / larger(root(now * now + aside * aside), 1e-300)
         # the cosine and sine of the difference of the angles, and half of it
         cosine, sine = (cosine * now + sine * aside) * by, (sine * now - cosine * aside) * by

@@ -165,7 +165,8 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     not take or the file contradicts.
     """
     file, named_clip, named_figure = split_part(file, format)
-    kind, path = _format(file, format, READABLE, "read"), place_of(file)
+    kind = _format(file, format, READABLE, "read")
+    path = place_of(file)
     clip = named_clip if clip is None else clip
     figure = named_figure if figure is None else figure
     given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "figure": figure, "rest": rest}
@@ -197,7 +198,8 @@ def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
     """The motion with the length unit that its file leaves out or, if ``loose``, states only by convention."""
     if motion.skeleton is None:
         raise FormatError(path, "a file without a skeleton has no length unit")
-    said, height = motion.skeleton.metres_per_unit, motion.skeleton.height
+    said = motion.skeleton.metres_per_unit
+    height = motion.skeleton.height
     # human figures, sole to crown or hand to hand, are .5 to 3 m high
     if said is None or (loose and (0.5 <= height * unit <= 3.0 or not 0.5 <= height * said <= 3.0)):
         return motion.with_unit(unit)
@@ -274,7 +276,9 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     """
     if motion.skeleton and _same_figure(motion.skeleton, character.rest.skeleton):
         return motion
-    found, joint_map, has_nodes = on_humanoid(motion), character.joint_map, character.nodes is not None
+    found = on_humanoid(motion)
+    joint_map = character.joint_map
+    has_nodes = character.nodes is not None
     try:
         found = grounded(found) if has_nodes else found
         put = from_humanoid(found, character.rest, joint_map, skin=character.skin, ahead=has_nodes)

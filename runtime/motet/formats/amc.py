@@ -38,7 +38,8 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
     FormatError names the file, and the line where it is cut or wrong.
     """
-    path, lines = place_of(file), text.read_text(file).split("\n")
+    path = place_of(file)
+    lines = text.read_text(file).split("\n")
     if asf is None and not isinstance(file, str | Path):
         raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
@@ -84,7 +85,8 @@ def _find_asf(path: Path) -> Path:
 
 def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | None]:
     """The number of lines before the first frame, the angle unit, and the frame rate if a comment states it."""
-    unit, fps = asf.angle, None
+    unit = asf.angle
+    fps = None
     for line, content in enumerate(lines):
         word = content.strip().lower()
         if word in (":degrees", ":radians"):

@@ -98,7 +98,8 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
         if word in ("begin", "end") and (word == "begin") == bool(start):
             raise FormatError(path, f"{word!r} where {'a bone' if start else 'no bone'} has begun", line)
         if word == "begin":
-            start, block = line, []
+            start = line
+            block = []
         elif word == "end":
             yield start, block
             start = 0
@@ -173,7 +174,8 @@ def _joints(bones: dict[str, _Bone]) -> list[Joint]:
     waiting = [("root", -1, bones["root"].reach)]
     while waiting:
         name, parent, offset = waiting.pop()
-        bone, here = bones[name], len(joints)
+        bone = bones[name]
+        here = len(joints)
         turns = "".join(dof[1] for dof in reversed(bone.dofs) if dof[0] == "r")
         joints.append(Joint(name, parent, offset, complete_order(turns), bone.axis))
         reach = bone.reach if parent >= 0 else (0.0, 0.0, 0.0)
@@ -211,12 +213,14 @@ def asf_text(asf: Asf) -> str:
 def _bones(asf: Asf) -> list[_Bone]:
     """The root, with the position in place of its reach, and all bones that the skeleton needs."""
     bones: dict[str, _Bone] = {}
-    joints, names = asf.skeleton.joints, Names(asf.skeleton.names)
+    joints = asf.skeleton.joints
+    names = Names(asf.skeleton.names)
     tips = {i for i in range(1, len(joints)) if _is_tip(asf, i)}
     for i, joint in enumerate(joints):
         if i in tips:
             continue
-        axis, children = joint.axis, asf.skeleton.children[i]
+        axis = joint.axis
+        children = asf.skeleton.children[i]
         if joint.order != "zyx" and any(axis):  # in the order of its own rotation: some readers take one for the other
             c, b, a = np.degrees(rotmat_to_euler(joint.frame, joint.order)).tolist()
             axis = (a, b, c)
@@ -239,7 +243,8 @@ def _bones(asf: Asf) -> list[_Bone]:
 
 def _is_tip(asf: Asf, i: int) -> bool:
     """Whether a joint needs no bone, because the reader adds it to the last bone."""
-    joint, parent = asf.skeleton.joints[i], asf.skeleton.joints[asf.skeleton.joints[i].parent]
+    joint = asf.skeleton.joints[i]
+    parent = asf.skeleton.joints[asf.skeleton.joints[i].parent]
     alone = asf.skeleton.children[joint.parent] == (i,) and not asf.skeleton.children[i]
     named = joint.name == parent.name + END_SUFFIX and joint.name not in asf.dofs
     return parent.parent != -1 and alone and named and any(joint.offset)

@@ -35,7 +35,8 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
     figure: one of several ROOTs, by its name or its number from 1; by default the first, with a warning in the log.
     FormatError names file and line.
     """
-    path, lines = place_of(file), text.read_text(file).split("\n")
+    path = place_of(file)
+    lines = text.read_text(file).split("\n")
     figures, motion_line = _hierarchy(path, lines)
     names = _figure_names(figures)
     chosen = text.chosen(path, names, figure, "figure")
@@ -146,7 +147,8 @@ def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
 
 def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int, int, float]:
     """The number of lines before the first frame, the declared number of frames and the frame rate."""
-    frames, fps = None, None
+    frames = None
+    fps = None
     for line, content in enumerate(lines[motion_line:], start=motion_line + 1):
         found = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", content, re.IGNORECASE)
         if found and found[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", found[2]):
@@ -200,7 +202,8 @@ def write(file: File, motion: Motion) -> None:
     translated = {0, *(skeleton_of(motion).index(name) for name in moving)}
     motion = text.with_names(motion, names)
     lines, joints = _tree(motion, translated)
-    translations, angles = local_translations(motion), _zyx_degrees(motion)
+    translations = local_translations(motion)
+    angles = _zyx_degrees(motion)
     blocks = [block[:, i] for i in joints for block in ((translations, angles) if i in translated else (angles,))]
     rows = np.concatenate(blocks, axis=1)
     if not np.isfinite(rows).all():
@@ -211,7 +214,8 @@ def write(file: File, motion: Motion) -> None:
 
 def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
     """The lines of the hierarchy, and the joints written as ROOT or JOINT in their order; others are End Sites."""
-    skeleton, moved = skeleton_of(motion), {channel.rpartition(".")[0] for channel in motion.channels}
+    skeleton = skeleton_of(motion)
+    moved = {channel.rpartition(".")[0] for channel in motion.channels}
     lines: list[str] = []
     joints: list[int] = []
     waiting: list[tuple[int | None, int]] = [(0, 0)]
@@ -227,7 +231,8 @@ def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
         is_last = not children or (len(children) == len(lone) == 1 and not skeleton.children[skeleton.children[i][0]])
         offset = skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
         kinds = "6 Xposition Yposition Zposition" if i in translated else "3"
-        kind, channels = "JOINT" if i else "ROOT", f"\tCHANNELS {kinds} Zrotation Yrotation Xrotation"
+        kind = "JOINT" if i else "ROOT"
+        channels = f"\tCHANNELS {kinds} Zrotation Yrotation Xrotation"
         start = (f"{kind} {skeleton.joints[i].name}", "{", f"\tOFFSET {text.spaced(offset)}", channels)
         lines += [indent + line for line in start]
         if is_last:

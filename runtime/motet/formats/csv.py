@@ -32,7 +32,8 @@ def read(file: File) -> Motion:
     try:
         for row in reader:
             if not row or row[0].startswith("#"):
-                comment, line = ",".join(row), reader.line_num
+                comment = ",".join(row)
+                line = reader.line_num
                 if comment.startswith(COMMENT):
                     fps = frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
             elif not header:

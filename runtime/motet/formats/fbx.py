@@ -25,7 +25,8 @@ Takes = list[tuple[str, set[int]]]
 
 PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
 
-FBX_MAX_BYTES, FBX_SECONDS = 2**29, 600
+FBX_MAX_BYTES = 2**29
+FBX_SECONDS = 600
 """The largest file read, and how long reading may take."""
 
 
@@ -82,7 +83,8 @@ def as_gltf(file: File, take: int | None = None) -> BytesIO:
 
     FormatError with the program's reason for refusing a file, or if ufbx crashes.
     """
-    path, content = place_of(file), read_bytes(file, FBX_MAX_BYTES)
+    path = place_of(file)
+    content = read_bytes(file, FBX_MAX_BYTES)
     if find_spec("ufbx") is None:
         raise FormatError(path, "FBX files need the package ufbx: install the extra with  pip install 'motet[fbx]'")
     command = [sys.executable, "-P", str(PROGRAM), "-1" if take is None else str(take)]

@@ -176,7 +176,8 @@ def frame_times(scene: Scene, take: Take) -> list[float]:
     """
     first = min((curve.min_time for curve in take.curves), default=0.0)
     last = max((curve.max_time for curve in take.curves), default=0.0)
-    begin, end = max(first, take.stack.time_begin), min(last, take.stack.time_end)
+    begin = max(first, take.stack.time_begin)
+    end = min(last, take.stack.time_end)
     begin, end = (begin, end) if begin < end else (first, max(first, last))
     fps, _ = frame_rate(scene, take)
     if not (end - begin) * fps * len(scene.near) < min(10**7, 10**5 + scene.size / 4):

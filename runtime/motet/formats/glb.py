@@ -28,7 +28,8 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import Joint, Skeleton
 
-VERTICES, INDICES = 34962, 34963
+VERTICES = 34962
+INDICES = 34963
 """glTF's buffer targets."""
 
 Track = tuple[int, str, Array]
@@ -74,7 +75,8 @@ def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
     if skeleton_of(motion).metres_per_unit is not None:
         motion = motion.scaled(1.0)
-    buffer, skeleton = Buffer(), skeleton_of(motion)
+    buffer = Buffer()
+    skeleton = skeleton_of(motion)
     made = animation(buffer, "motion", motion, joint_tracks(motion, skeleton))
     inverse = np.tile(np.eye(4), (len(skeleton.joints), 1, 1))
     inverse[:, :3, 3] = -_rest(skeleton)
@@ -127,7 +129,8 @@ def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
 
 def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
     """The tracks of the joints' nodes, which come first: of those that turn or move, and always of the root."""
-    turns, moves = rotmat_to_quat(local_rotations(motion)), local_translations(motion)
+    turns = rotmat_to_quat(local_rotations(motion))
+    moves = local_translations(motion)
     for i, joint in enumerate(skeleton.joints):
         tracks = {"rotation": (turns[:, i], [0, 0, 0, 1]), "translation": (moves[:, i], joint.offset)}
         yield from ((i, path, track) for path, (track, rest) in tracks.items() if i == 0 or np.any(track != rest))
@@ -171,7 +174,9 @@ def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> dict[str, An
     joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], corners + 1)
     colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * corners + 2, axis=0)
     # triangles of a prism, counterclockwise from outside
-    now, after, tip = np.arange(1, corners + 1), np.arange(1, corners + 1) % corners + 1, 2 * corners + 1
+    now = np.arange(1, corners + 1)
+    after = np.arange(1, corners + 1) % corners + 1
+    tip = 2 * corners + 1
     parts = [(0 * now, after, now), (now, after, now + corners), (after, after + corners, now + corners)]
     parts.append((0 * now + tip, now + corners, after + corners))
     prism = np.concatenate([np.stack(part, axis=1).reshape(-1) for part in parts])
@@ -195,7 +200,8 @@ def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, A
     side /= np.linalg.norm(side)
     angles = np.arange(corners)[:, None] * 2 * np.pi / corners
     ring = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
-    thick, thin = bone.start_radius, bone.end_radius
+    thick = bone.start_radius
+    thin = bone.end_radius
     places = [start - 0.7 * thick * axis, *(start + thick * ring), *(end + thin * ring), end + 0.7 * thin * axis]
     return np.array(places), np.array([-axis, *ring, *ring, axis])
 
@@ -220,7 +226,9 @@ def write_vrma(file: File, motion: Motion) -> None:
     """
     if not len(motion):
         raise MotionError("this motion has no frames, and a VRM animation cannot be empty")
-    motion, buffer, extension = grounded(on_humanoid(motion)), Buffer(), "VRMC_vrm_animation"
+    motion = grounded(on_humanoid(motion))
+    buffer = Buffer()
+    extension = "VRMC_vrm_animation"
     fingers = range(len(HUMANOID.names), len(VRMA_SKELETON.names))
     still = np.broadcast_to(np.eye(3), (len(VRMA_SKELETON.names), 3, 3))
     turned = relaxed(VRMA_SKELETON, still, VRMA_SKELETON.places)

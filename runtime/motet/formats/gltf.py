@@ -41,7 +41,8 @@ log = logging.getLogger(__name__)
 PATHS = {"rotation": 4, "translation": 3, "scale": 3}
 """The animated properties of a node, and how many numbers each has; mesh weights are left out."""
 
-MAX_SKINS, MAX_JOINTS = 500, 3000
+MAX_SKINS = 500
+MAX_JOINTS = 3000
 """Skins of a file, and joints of its skeleton: a figure has a skin for each of its meshes, and a detailed facial rig
 has a thousand joints."""
 

@@ -61,13 +61,15 @@ class Nodes:
         """
         if motion.skeleton and motion.skeleton.metres_per_unit != 1:
             motion = motion.scaled(1.0)
-        turns, moves = local_rotations(motion), local_translations(motion)
+        turns = local_rotations(motion)
+        moves = local_translations(motion)
         for i, node in enumerate(self.joints):
             parent = self.gltf.parents[node]
             to_parent = self.linear[parent] if parent >= 0 else np.eye(3)
             origin = self.places[parent] if parent >= 0 else np.zeros(3)
             left, _, right = np.linalg.svd(to_parent)
-            frame, turn = left @ right, self.gltf.local(node)["rotation"]
+            frame = left @ right
+            turn = self.gltf.local(node)["rotation"]
             if not i or np.abs(turns[:, i] - np.eye(3)).max() > 1e-6:
                 at_rest = frame @ quat_to_rotmat(turn / np.linalg.norm(turn))
                 yield node, "rotation", rotmat_to_quat(product(product(frame.T, turns[:, i]), at_rest))
@@ -134,7 +136,8 @@ def _skin(nodes: Nodes) -> dict[int, Array]:
     points, owners = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     # 200 directions, spread evenly by the golden angle; the outermost point in each is kept
     height = 1 - (2 * np.arange(200) + 1) / 200
-    angle, radius = np.arange(200) * np.pi * (3 - 5**0.5), np.sqrt(1 - height**2)
+    angle = np.arange(200) * np.pi * (3 - 5**0.5)
+    radius = np.sqrt(1 - height**2)
     directions = np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
     found = {}
     for joint in np.unique(owners[owners >= 0]).tolist():
@@ -151,7 +154,8 @@ def _meshes(nodes: Nodes) -> Iterator[tuple[Array, NDArray[np.intp]]]:
         if skin is None:
             yield points @ nodes.linear[node].T + nodes.places[node], np.full(len(points), nodes.carrier(node))
         else:
-            joints, weights = gltf.array(attributes["JOINTS_0"]).astype(np.intp), gltf.array(attributes["WEIGHTS_0"])
+            joints = gltf.array(attributes["JOINTS_0"]).astype(np.intp)
+            weights = gltf.array(attributes["WEIGHTS_0"])
             yield _skinned(nodes, gltf.objects("skins")[skin], points, joints, weights)
 
 
@@ -182,7 +186,8 @@ def _skinned(
     nodes: Nodes, skin: dict[str, Any], points: Array, joints: NDArray[np.intp], weights: Array
 ) -> tuple[Array, NDArray[np.intp]]:
     """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
-    linear, places = nodes.linear[skin["joints"]], nodes.places[skin["joints"]]
+    linear = nodes.linear[skin["joints"]]
+    places = nodes.places[skin["joints"]]
     if "inverseBindMatrices" in skin:
         bind = np.swapaxes(nodes.gltf.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4), 1, 2)[: len(linear)]
         linear, places = linear @ bind[:, :3, :3], rotated(linear, bind[:, :3, 3]) + places
@@ -262,7 +267,8 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
 
     MotionError and OutputError like :func:`write_onto`.
     """
-    gltf, buffer = nodes.gltf, Buffer()
+    gltf = nodes.gltf
+    buffer = Buffer()
     if not any(gltf.objects("nodes")[node].get("name") for node in nodes.joints):
         remedy = "which writes the character itself"
         log.warning("%s: its nodes have no names, by which a clip plays: use --onto (onto=), %s", gltf.path, remedy)
@@ -282,7 +288,9 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
         bare.append({"name": gltf.name(node), **parts})
     joints = list(nodes.joints)
     bind = np.zeros((len(joints), 4, 4))
-    bind[:, :3, :3], bind[:, :3, 3], bind[:, 3, 3] = nodes.linear[joints], nodes.places[joints], 1
+    bind[:, :3, :3] = nodes.linear[joints]
+    bind[:, :3, 3] = nodes.places[joints]
+    bind[:, 3, 3] = 1
     skin = {"joints": [at[node] for node in joints]}
     document = with_body(buffer, motion, nodes.skeleton, bare, made, skin, np.asarray(np.linalg.inv(bind), np.float64))
     write_whole(file, container(document, bytes(buffer.content)))

@@ -26,7 +26,8 @@ from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """glTF's component types."""
 
-GLTF_MAX_BYTES, MAX_UNPACKED = 2**29, 2**25
+GLTF_MAX_BYTES = 2**29
+MAX_UNPACKED = 2**25
 """Total bytes of a file's buffers, and of parts unpacked: 12 minutes of a figure of 90 joints at 60 keys per second."""
 
 MAX_NODES = 20_000
@@ -129,13 +130,16 @@ class Gltf:
         nodes: the nodes to fill, including all their ancestors; all by default. Others are not filled.
         """
         tracks = tracks or {}
-        count, wanted = len(next(iter(tracks.values()), [0])), self.order if nodes is None else set(nodes)
+        count = len(next(iter(tracks.values()), [0]))
+        wanted = self.order if nodes is None else set(nodes)
         linear, turns = (frames_last((count, len(self.parents), 3, 3)) for _ in range(2))
         places = frames_last((count, len(self.parents), 3))
         for node in (node for node in self.order if node in wanted):
             move, quat, scale = (tracks.get((node, name), rest) for name, rest in self.local(node).items())
             turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
-            linear[:, node], turns[:, node], places[:, node] = turn * scale[..., None, :], turn, move
+            linear[:, node] = turn * scale[..., None, :]
+            turns[:, node] = turn
+            places[:, node] = move
             if (parent := self.parents[node]) >= 0:
                 places[:, node] = places[:, parent] + rotated(linear[:, parent], places[:, node])
                 linear[:, node] = product(linear[:, parent], linear[:, node])
@@ -163,7 +167,8 @@ class Gltf:
     def _decoded(self, index: int) -> Array:
         accessor = self.objects("accessors")[index]
         width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor["type"]]
-        kind, count = np.dtype(COMPONENTS[accessor["componentType"]]), accessor["count"]
+        kind = np.dtype(COMPONENTS[accessor["componentType"]])
+        count = accessor["count"]
         if "bufferView" in accessor:
             values = self._rows(index, accessor, kind, count, width).astype(np.float64)
         else:
@@ -192,7 +197,8 @@ class Gltf:
         """Elements (count, width) of a part of an accessor, which names a view; FormatError beyond its buffer."""
         size = kind.itemsize * width
         content, start, stride = self._view(part["bufferView"])
-        start, stride = start + part.get("byteOffset", 0), stride or size
+        start = start + part.get("byteOffset", 0)
+        stride = stride or size
         beyond = count and start + stride * (count - 1) + size > len(content)
         if count < 0 or start < 0 or stride < size or beyond:
             raise FormatError(self.path, f"accessor {index} extends beyond its buffer: the file is truncated")
@@ -219,8 +225,10 @@ class Gltf:
             remedy = "install the extra with  pip install 'motet[meshopt]', or unpack the file with"
             command = "npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac"
             raise FormatError(self.path, f"its animations are packed by meshoptimizer: {remedy}  {command}")
-        start, length = packed.get("byteOffset", 0), packed["byteLength"]
-        count, stride = packed["count"], packed["byteStride"]
+        start = packed.get("byteOffset", 0)
+        length = packed["byteLength"]
+        count = packed["count"]
+        stride = packed["byteStride"]
         content = self.buffers[packed["buffer"]][start : start + length]
         if not 0 <= start <= start + length or len(content) < length:
             raise FormatError(self.path, "a packed part extends beyond its buffer: the file is truncated")
@@ -239,7 +247,8 @@ class Gltf:
 
 def parse(file: File) -> Gltf:
     """Read a file's parts; FormatError if it is not glTF 2.0, is truncated, or lacks its buffers."""
-    path, content = place_of(file), read_bytes(file)
+    path = place_of(file)
+    content = read_bytes(file)
     text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, b"")
     try:
         document = json.loads(text)
@@ -275,7 +284,8 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
 
 def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path | None) -> bytes:
     """The content of a buffer, up to its declared size; files in the folder ``beside`` only if given."""
-    uri, size = buffer.get("uri"), buffer["byteLength"]
+    uri = buffer.get("uri")
+    size = buffer["byteLength"]
     if uri is None:
         return binary[:size]
     if uri.startswith("data:"):

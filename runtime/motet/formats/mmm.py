@@ -17,7 +17,8 @@ from motet.files import File, place_of
 from motet.formats.text import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
 
-MAX_DEPTH, MAX_ELEMENTS = 64, 10**5
+MAX_DEPTH = 64
+MAX_ELEMENTS = 10**5
 """Elements inside each other, MMM has seven; and before a frame ends, of which JointOrder has one per joint."""
 
 PIECE = 2**20
@@ -82,7 +83,8 @@ def _ended(file: File) -> Iterator[ElementTree.Element]:
 def _events(file: File) -> Iterator[tuple[str, ElementTree.Element]]:
     """("start", element) and ("end", element) in order, read piece by piece; of elements that are not KEPT, or within
     one of these, the content is dropped."""
-    path, content = place_of(file), read_bytes(file)
+    path = place_of(file)
+    content = read_bytes(file)
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(["start", "end"])
     opened = _Opened(path)
     try:

@@ -73,7 +73,8 @@ def read(file: File, fps: float | None = None) -> Motion:
     rate. FormatError where arrays are missing, do not fit or are of another kind, or where the file states another
     rate.
     """
-    path, content = place_of(file), read_bytes(file)
+    path = place_of(file)
+    content = read_bytes(file)
     kind = "an .npz motion written by motet"
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:

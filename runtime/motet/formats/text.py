@@ -49,14 +49,16 @@ MARK = "#"
 FRAME_RATES = (1e-3, 1e5)
 """The lowest and the highest frame rate of a file: the highest is ten times what cameras take."""
 
-MAX_POSES, FREE_POSES = 10**7, 10**6
+MAX_POSES = 10**7
+FREE_POSES = 10**6
 """Poses of a file, frames times joints: an hour of 90 joints at 30 fps; and what a small file may have, and one more
 for each of its bytes."""
 
 
 def read_bytes(file: File, most: int | None = None) -> bytes:
     """All bytes of a file or file object; FormatError if it is missing, unreadable or longer than ``most``."""
-    path, limit = place_of(file), -1 if most is None else most + 1
+    path = place_of(file)
+    limit = -1 if most is None else most + 1
     try:
         if not isinstance(file, str | Path):
             content = file.read(limit)
@@ -162,7 +164,8 @@ class Names:
         candidate = name
         while candidate in self._taken:
             suffix = self._next.get(name, 2)
-            candidate, self._next[name] = f"{name}_{suffix}", suffix + 1
+            candidate = f"{name}_{suffix}"
+            self._next[name] = suffix + 1
         self._taken.add(candidate)
         return candidate
 
@@ -200,8 +203,10 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
     ]
     if bad:
         raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(bad)}")
-    translations, moved = local_translations(motion), {joint for _, joint, kind in parts if kind[0] == "t"}
-    joints, moving = list(skeleton.joints), []
+    translations = local_translations(motion)
+    moved = {joint for _, joint, kind in parts if kind[0] == "t"}
+    joints = list(skeleton.joints)
+    moving = []
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         if joint.name in moved and len(motion):
             if np.ptp(translations[:, i], axis=0).max() > 1e-9 * skeleton.height:
@@ -287,7 +292,8 @@ def _does_not_move(path: Path, clip: str, figure: str, moving: Sequence[str]) ->
 
 def _nearest_first(clip: str, names: Sequence[str]) -> list[str]:
     """Names of clips, first those that an unknown one is a part of or is spelt like."""
-    wanted, known = clip.casefold(), names[:1000]
+    wanted = clip.casefold()
+    known = names[:1000]
     holding = [name for name in known if wanted and wanted in name.casefold()]
     alike = get_close_matches(clip[:200], [name for name in known if name not in set(holding)])
     return list(dict.fromkeys([*sorted(holding, key=len), *alike, *names]))

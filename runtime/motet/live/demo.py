@@ -18,7 +18,8 @@ from motet.predict.model import PredictModel
 from motet.steering.model import SteerModel
 
 PROMPTS = ("a person waves", "a person kicks", "someone bows", "a man walks in a circle")
-GIVEN, FUTURE = 1.0, 5.0
+GIVEN = 1.0
+FUTURE = 5.0
 """Seconds of the walk that is given, and of its prediction."""
 
 
@@ -47,7 +48,8 @@ def write_demo(folder: str | Path) -> None:
 
 def _pages(place: Path) -> Iterator[Card]:
     """Write the pages; what the index says of each."""
-    steer, writer = load_as(SteerModel, "control"), load_as(CodesModel, "generate")
+    steer = load_as(SteerModel, "control")
+    writer = load_as(CodesModel, "generate")
     walk = steer.run("walk 4s, run 4s")
     write_live_page(place / "live.html", steer, 3, "motet live")
     yield Card("live.html", "Live", "Steer it by keys, touch, pad or words; or drop a motion or an avatar on it.", walk)
@@ -58,8 +60,10 @@ def _pages(place: Path) -> Iterator[Card]:
     future = load_as(PredictModel, "predict").predict(given, seconds=FUTURE, append=True, beyond=writer)
     write(place / "predict.html", future, [(0.0, "given"), (given.duration, "predicted")], "motet predict")
     yield Card("predict.html", "Predict", "A second of a walk is given; the rest goes on from it.", future)
-    one, other = made[0][:SHORT], made[2][:SHORT]
-    joined, start = load_as(FillModel, "fill").join(one, other), one.duration
+    one = made[0][:SHORT]
+    other = made[2][:SHORT]
+    joined = load_as(FillModel, "fill").join(one, other)
+    start = one.duration
     told = [(0.0, PROMPTS[0]), (start, "filled"), (start + JOIN_SECONDS, PROMPTS[2])]
     write(place / "join.html", joined, told, "motet join")
     yield Card("join.html", "Fill and join", "Two motions, with a transition between them.", joined)

@@ -46,7 +46,8 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
 
 def net_data(model: SteerModel) -> dict[str, Any]:
     """All that ``control.js`` steers a figure with, ready for JSON: ``Given`` of ``livePage.ts``, and the bytes."""
-    manifest, kinds = model.manifest, (SteeringSettings, FootLockSettings)
+    manifest = model.manifest
+    kinds = (SteeringSettings, FootLockSettings)
     motion = manifest.source["motion"]
     return {
         "manifest": {

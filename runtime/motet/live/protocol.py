@@ -52,7 +52,9 @@ class ClientSession:
     they have obeyed. ticks: since they started."""
 
     def __init__(self, model: SteerModel, characters: int = 1, words: SaidActs | None = None) -> None:
-        self.model, self.words, self.heard = model, words, 0
+        self.model = model
+        self.words = words
+        self.heard = 0
         self._start({"characters": characters})
 
     def handle(self, text: str | bytes) -> list[str]:
@@ -81,10 +83,12 @@ class ClientSession:
         return []
 
     def _start(self, given: dict[str, Any]) -> None:
-        characters, positions = given.pop("characters", 1), given.pop("positions", False)
+        characters = given.pop("characters", 1)
+        positions = given.pop("positions", False)
         checked_int("characters", characters, 1, CLIENT_FIGURES, ControlError)
         self.session = self.model.start(given.pop("gait", None), characters=characters, words=self.words, **given)
-        self.positions, self.ticks = positions, 0
+        self.positions = positions
+        self.ticks = 0
 
     def tick(self) -> Pose:
         """The next pose."""

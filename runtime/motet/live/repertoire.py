@@ -101,7 +101,8 @@ def repertoire() -> dict[str, Any]:
 def made(generate: CodesModel, control: SteerModel) -> dict[str, Any]:
     """The repertoire: each sentence by the first draw of ``generate``, as an act of ``control``."""
     words = {action["sentence"]: action["words"] for action in generate.manifest.source["actions"]}
-    acts, rows = [], []
+    acts = []
+    rows = []
     for sentence in (*WHOLE, *ARMS):
         (shown,) = generate.generate(sentence, 1, seed=0, whole=True, numbers=False)
         numbers = control.act_of(shown.motion, sentence).numbers.astype(np.float64)

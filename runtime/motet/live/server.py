@@ -60,7 +60,8 @@ LIMITS = Limits()
 class Connection(ServerConnection):
     """One that is cut off where its client sends too many frames that are no messages: they are answered unread."""
 
-    controls, since = 0, 0.0
+    controls = 0
+    since = 0.0
 
     def data_received(self, data: bytes) -> None:
         """See the class: only so many bytes are looked at before others have their turn."""
@@ -130,9 +131,12 @@ class LiveClients:
         limits: Limits = LIMITS,
         words: GenerateModel | None = None,
     ) -> None:
-        self.model, self.characters = model, characters
+        self.model = model
+        self.characters = characters
         self.words = None if words is None else SaidActs(model, words)
-        self.rate, self.watch, self.limits = rate or model.fps, watch, limits
+        self.rate = rate or model.fps
+        self.watch = watch
+        self.limits = limits
         ClientSession(model, characters)  # refuses now what it would refuse every client
         self._clients: list[ClientSession] = []
 
@@ -150,7 +154,8 @@ class LiveClients:
             said = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
             await connection.close(1013, said)  # try again later
             return
-        client, fault = ClientSession(self.model, self.characters, self.words), None
+        client = ClientSession(self.model, self.characters, self.words)
+        fault = None
         self._clients.append(client)
         try:
             await connection.send(protocol.hello(self.model))
@@ -171,7 +176,8 @@ class LiveClients:
         return sum(client.session.characters for client in self._clients)
 
     async def _listen(self, connection: Wire, client: ClientSession) -> None:
-        tick, count = 0, 0
+        tick = 0
+        count = 0
         while True:
             text = await connection.recv()
             tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
@@ -242,7 +248,8 @@ class LiveServer(LiveClients):
         words: GenerateModel | None = None,
     ) -> None:
         super().__init__(model, characters, rate, watch, limits, words)
-        self.host, self.port = host, port
+        self.host = host
+        self.port = port
         self._origins = [None, LOCAL, *map(Origin, origins)]
         self._server: Server | None = None
 

@@ -97,7 +97,8 @@ def run_script(
     """
     orders = parse_orders(script, model.gaits)
     session = model.start(orders[0].gait)
-    start, ticks = time.monotonic(), 0
+    start = time.monotonic()
+    ticks = 0
     for _ in count() if repeats is None else range(repeats):
         for pose in session.follow(orders):
             ticks += 1

@@ -48,8 +48,11 @@ class BundleModel(ABC):
         for role in self.ROLES:
             if role not in graphs:
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
-        self.manifest, self.contract, self.loop = manifest, manifest.motion, self.LOOPS[manifest.loop]
-        self.graphs, self.tables = graphs, tables or {}
+        self.manifest = manifest
+        self.contract = manifest.motion
+        self.loop = self.LOOPS[manifest.loop]
+        self.graphs = graphs
+        self.tables = tables or {}
         self.defaults = self.loop.defaults(manifest.defaults)
         known = {kind.FEATURE: kind for kind in self.SETTINGS}
         if unknown := sorted(manifest.settings.keys() - known.keys()):

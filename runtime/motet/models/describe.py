@@ -161,7 +161,8 @@ class DescribeModel(LanguageModel):
         if "draws" in settings:
             settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
         contexts = self.embed(motions_of(motions))
-        least, decode = self.settings(ConfidenceSettings).log_probability, self.vocabulary.decode
+        least = self.settings(ConfidenceSettings).log_probability
+        decode = self.vocabulary.decode
         rows = [
             [Description(decode(one.ids), one.log_probability, one.score, one.log_probability >= least) for one in row]
             for row in self._hypotheses(loop, contexts, settings, progress)
@@ -182,7 +183,8 @@ class DescribeModel(LanguageModel):
         assert self.known is not None
         beam = self.LOOPS["beam"]
         count = int(beam.settled(beam.defaults(self.manifest.defaults), {"beams": beams})["beams"])
-        least, found = self.known.settings.sure, list[list[Description]]()
+        least = self.known.settings.sure
+        found = list[list[Description]]()
         for start in range(0, len(motions), AT_ONCE):
             frames = [self.frames(motion) for motion in motions[start : start + AT_ONCE]]
             vectors = [self.contexts([one], "space")[0] for one in frames]  # one by one: padding changes how sums round
@@ -206,7 +208,8 @@ class DescribeModel(LanguageModel):
         MotionError like :meth:`frames`, except for long motions.
         """
         motion = self.on_figure(motion).resample(self.fps)
-        settings, beam = self.settings(TimelineSettings), self.LOOPS["beam"]
+        settings = self.settings(TimelineSettings)
+        beam = self.LOOPS["beam"]
         if self.known is not None:
             how = self.known.settings
             spans = windows(len(motion), motion.fps, TimelineSettings(how.window, how.hop))
@@ -282,7 +285,8 @@ class DescribeModel(LanguageModel):
 
 def windows(frames: int, fps: float, settings: TimelineSettings) -> list[tuple[int, int]]:
     """Frames (start, stop) of overlapping windows, evenly spread, of the settings' length or the motion's."""
-    length, hop = max(2, round(settings.window * fps)), max(1, round(settings.hop * fps))
+    length = max(2, round(settings.window * fps))
+    hop = max(1, round(settings.hop * fps))
     count = max(1, 1 + -(-(frames - length) // hop))
     starts = np.linspace(0, max(0, frames - length), count).round().astype(int).tolist()
     return [(start, min(start + length, frames)) for start in starts]
@@ -303,12 +307,15 @@ def near_scores(
     in one batch.
     """
     places = {ids: place for place, ids in enumerate(sorted(set(said)))}
-    words, own = padded([np.array(ids) for ids in places], "int64")[0], np.array([places[ids] for ids in said])
+    words = padded([np.array(ids) for ids in places], "int64")[0]
+    own = np.array([places[ids] for ids in said])
     nearby = [np.unique(own[max(0, row - near) : row + near + 1]) for row in range(len(own))]
-    rows, columns = np.repeat(np.arange(len(own)), list(map(len, nearby))), np.concatenate(nearby)
+    rows = np.repeat(np.arange(len(own)), list(map(len, nearby)))
+    columns = np.concatenate(nearby)
     found = np.full((len(said), len(places)), -np.inf)
     for start in range(0, len(rows), at_once):
-        row, column = rows[start : start + at_once], columns[start : start + at_once]
+        row = rows[start : start + at_once]
+        column = columns[start : start + at_once]
         found[row, column] = score_words(step, contexts, row, words[column])
         progress(int(row[-1]) + 1, len(said))
     return found
@@ -321,7 +328,9 @@ def best_path(scores: Iterable[Array], change: float, at_once: int = AT_ONCE) ->
     grow with the length.
     """
     rows = iter(scores)
-    best, back, path = next(rows), list[NDArray[np.intp]](), list[int]()
+    best = next(rows)
+    back = list[NDArray[np.intp]]()
+    path = list[int]()
     for row in rows:
         leader = int(best.argmax())
         stays = best >= best[leader] - change

@@ -97,7 +97,8 @@ class LanguageModel(BundleModel):
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """Vectors (N, C) float32 of the sequences (T_i, ...) that the encoder of a role takes."""
         encoder = self.graphs[role]
-        given, context = encoder.spec.inputs[0], encoder.spec.outputs[0]
+        given = encoder.spec.inputs[0]
+        context = encoder.spec.outputs[0]
         found = np.empty((len(sequences), context.size(1)), dtype=np.float32)
         order = np.argsort(list(map(len, sequences)), kind="stable")  # similar lengths together
         for start in range(0, len(order), 32):  # 47 motions take 28 ms on one thread, and in batches of 64 they take 75

@@ -66,7 +66,8 @@ def load_as(kind: Callable[..., Kind], name_or_path: str | Path, options: Sessio
     """
     if not (isinstance(kind, type) and issubclass(kind, BundleModel)):
         raise ArgumentError(f"expected a class of models, such as motet.DescribeModel, not {quoted(repr(kind))}")
-    wanted, model = kind, load(name_or_path, options)
+    wanted = kind
+    model = load(name_or_path, options)
     if not isinstance(model, wanted):
         need = f"need one for {wanted.VERB!r}"
         if model.VERB == wanted.VERB:
@@ -104,7 +105,8 @@ class Verified:
 
 def verify(bundle: Bundle, options: SessionOptions | None = None) -> Verified:
     """Read all files of a bundle, load its model, and replay its golden vectors; BundleError at the first fault."""
-    files, golden = bundle.check_files(), bundle.manifest.golden
+    files = bundle.check_files()
+    golden = bundle.manifest.golden
     with bundle.named():
         model = kind_of(bundle.manifest).load(bundle, options)
         if golden is None:

@@ -23,7 +23,9 @@ from motet.settings import Range, Settings
 NOTHING = "no human motion that it knows"
 """What is said of a motion that is like none of those that are known, or too short to tell."""
 
-LEFT, RIGHT, STRAIGHT = 1, -1, 2
+LEFT = 1
+RIGHT = -1
+STRAIGHT = 2
 """Where a sentence says that somebody goes; 0 if it does not say."""
 
 TILE = 8192
@@ -156,7 +158,8 @@ class Known:
     def answers(self, seen: Sequence[Seen], count: int = 1) -> list[list[Answer]]:
         """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of
         :data:`NOTHING` where the motion is too short, or like none that is known."""
-        how, found = self.settings, list[list[Answer]]()
+        how = self.settings
+        found = list[list[Answer]]()
         for one in seen:  # one by one, so that each gets the very bits that it gets alone
             counted, (similarity,) = self.near(one.vector[None])
             (row,), (share,) = counted, self.shares(counted)

@@ -32,7 +32,8 @@ def skeleton_of(motion: Motion) -> Skeleton:
 
 def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Array:
     """Rotations (T, J, 3, 3) relative to the parent of every joint, or of the joints with the given indices."""
-    skeleton, columns = skeleton_of(motion), motion.rotation_columns()
+    skeleton = skeleton_of(motion)
+    columns = motion.rotation_columns()
     wanted = range(len(skeleton.joints)) if joints is None else joints
     rotations = frames_last((len(motion), len(wanted), 3, 3))
     rotations[:] = np.eye(3)
@@ -130,7 +131,8 @@ def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: 
     new = tuple(name for name in names if name not in motion.channels)
     added = [names.index(name) for name in new]
     everything = np.concatenate([values[:, added], motion.values], axis=1)
-    channels, all_units = new + motion.channels, [units[i] for i in added] + list(motion.units)
+    channels = new + motion.channels
+    all_units = [units[i] for i in added] + list(motion.units)
     for i, name in enumerate(names):
         everything[:, channels.index(name)] = values[:, i]
         all_units[channels.index(name)] = units[i]
@@ -155,7 +157,8 @@ def posed(
 ) -> Motion:
     """The motion in its channels with other local rotations (T, 3, 3) and translations (T, 3) of some joints, as
     :func:`continued` takes them. leaps: their angles may leap from frame to frame."""
-    skeleton, values = skeleton_of(motion), np.array(motion.values)
+    skeleton = skeleton_of(motion)
+    values = np.array(motion.values)
     columns = motion.rotation_columns()
     turned = [name for name in columns if name in rotations]
     joints = [skeleton.joints[skeleton.index(name)] for name in turned]
@@ -211,7 +214,8 @@ def without_heading(motion: Motion) -> Motion:
     joint = skeleton_of(motion).joints[0]
     if not {f"{joint.name}.r{axis}" for axis in AXES} <= set(motion.channels) or not len(motion):
         return motion
-    time, angle = np.arange(len(motion)), heading(motion)
+    time = np.arange(len(motion))
+    angle = heading(motion)
     line: Array = np.polyval(np.polyfit(time, angle, min(1, len(motion) - 1)), time).astype(np.float64)
     levelled = axis_to_rotmat("y", -line) @ local_rotations(motion, [0])[:, 0]
     return posed(motion, {joint.name: levelled}, {}).continuous()

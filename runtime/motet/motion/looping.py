@@ -26,14 +26,18 @@ def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     shortest: minimum length of the loop in seconds. MotionError for a motion without a skeleton, one that is too short,
     and one without a repetition.
     """
-    skeleton, hips = skeleton_of(motion), _hips(motion)
+    skeleton = skeleton_of(motion)
+    hips = _hips(motion)
     start, stop = _repetition(motion, hips, shortest)
     part = motion[start : stop + 1]
-    turned, local, moved = global_transforms(part)[0], local_rotations(part), local_translations(part)[:, hips]
+    turned = global_transforms(part)[0]
+    local = local_rotations(part)
+    moved = local_translations(part)[:, hips]
     above = turned[:, skeleton.joints[hips].parent] if hips else np.broadcast_to(np.eye(3), turned[:, 0].shape)
     heading = twist(turned[:, hips], UP)
     # joints with all three angles turn, by a share from -1/2 to 1/2 of what is left, so that both ends change equally
-    columns, share = part.rotation_columns(), np.linspace(-0.5, 0.5, len(part))[:, None]
+    columns = part.rotation_columns()
+    share = np.linspace(-0.5, 0.5, len(part))[:, None]
     whole = [i for i, name in enumerate(skeleton.names) if len(columns.get(name, ())) == 3]
     rotations = {skeleton.names[i]: _closed(local[:, i], share) for i in whole if i != hips}
     if hips in whole:  # the heading stays: only the tilt of the hips is made to repeat
@@ -45,7 +49,8 @@ def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     stay = {f"{name}.r{axis}" for name in rotations for axis in AXES}
     stay |= {f"{skeleton.names[hips]}.{kind}" for kind in ("tx", "ty", "tz", "ry")}
     turns = np.array([TURN.get(unit, np.inf) for unit in part.units])
-    off, angles = part.values[-1] - part.values[0], np.isfinite(turns)
+    off = part.values[-1] - part.values[0]
+    angles = np.isfinite(turns)
     off[angles] -= np.round(off[angles] / turns[angles]) * turns[angles]
     off[[name in stay for name in part.channels]] = 0
     closed = replace(part, values=part.values - share * off)
@@ -75,7 +80,8 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
             f"a motion of {motion.duration:.2g} s is too short for a loop of {shortest:g} s: use a longer one"
         )
     # at most 1,500 frames are compared pairwise: in longer motions every second or third, then those in between
-    seen, step = _seen(motion, hips), -(-len(motion) // 1500)
+    seen = _seen(motion, hips)
+    step = -(-len(motion) // 1500)
     lengths = range(-(-least // step), -(-len(motion) // step))
     apart = _apart(seen[::step], seen[::step])
     energy = _energy(seen)[::step]
@@ -91,8 +97,10 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
     first, last = (np.arange(max(0, at - step + 1), min(len(seen), at + step)) for at in ends)
     apart = np.where(last - first[:, None] >= least, _apart(seen[first], seen[last]), np.inf)
     i, j = np.unravel_index(apart.argmin(), apart.shape)
-    start, stop = int(first[i]), int(last[j])
-    off, most = float(np.linalg.norm(seen[start] - seen[stop])), 0.04
+    start = int(first[i])
+    stop = int(last[j])
+    off = float(np.linalg.norm(seen[start] - seen[stop]))
+    most = 0.04
     # of 40 recorded walks, on the humanoid at 30 fps, nine in ten repeat within 0.03 of the height, steady strides
     # within 0.01 to 0.02; half of the running takes, which are short and turn or leap, repeat only within 0.06
     if off > most:

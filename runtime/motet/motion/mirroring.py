@@ -23,7 +23,8 @@ def lateral_axis(skeleton: Skeleton) -> int:
 
     MotionError if no joints are paired, or their positions do not mirror each other across a coordinate plane.
     """
-    partners, rest = np.array(partners_of(skeleton.names)), skeleton.rest_positions
+    partners = np.array(partners_of(skeleton.names))
+    rest = skeleton.rest_positions
     apart = np.abs(rest - rest[partners])
     if not apart.any():
         raise MotionError(
@@ -43,15 +44,19 @@ def mirror(motion: Motion) -> Motion:
     gives the motion itself. MotionError for a motion without skeleton or without paired joints, and for channels other
     than Euler angles and translations of joints.
     """
-    skeleton, units = skeleton_of(motion), dict(zip(motion.channels, motion.units, strict=True))
+    skeleton = skeleton_of(motion)
+    units = dict(zip(motion.channels, motion.units, strict=True))
     parts = [(name, *name.rpartition(".")[::2]) for name in motion.channels]
     bad = [name for name, joint, kind in parts if joint not in skeleton.names or not re.fullmatch("[rt][xyz]", kind)]
     if bad:
         raise MotionError(f"only Euler angles and translations of joints can be mirrored, not {', '.join(bad)}")
     axis = lateral_axis(skeleton)
-    signs, values, harder = np.where(np.arange(3) == axis, -1.0, 1.0), np.array(motion.values), []
+    signs = np.where(np.arange(3) == axis, -1.0, 1.0)
+    values = np.array(motion.values)
+    harder = []
     for i, partner in enumerate(partners_of(skeleton.names)):
-        joint, other = skeleton.joints[i], skeleton.joints[partner]
+        joint = skeleton.joints[i]
+        other = skeleton.joints[partner]
         same = signs[:, None] * other.frame * signs
         alike = joint.order == other.order and np.allclose(same, joint.frame, rtol=0, atol=1e-6)
         for letter in "rt":
@@ -75,14 +80,17 @@ def mirror(motion: Motion) -> Motion:
 def _with_mirrored(result: Motion, motion: Motion, i: int, partner: int, letter: str, signs: Array) -> Motion:
     """The result with rotation ("r") or translation ("t") of joint i that of its partner in the motion, mirrored: in
     the channels that it has, and in others that would leave their rest value."""
-    joint, units = skeleton_of(motion).joints[i], dict(zip(motion.channels, motion.units, strict=True))
+    joint = skeleton_of(motion).joints[i]
+    units = dict(zip(motion.channels, motion.units, strict=True))
     names = [f"{joint.name}.{letter}{axis}" for axis in AXES]
     usual = next((units[name] for name in names if name in units), "deg") if letter == "r" else "length"
     own = [units.get(name, usual) if letter == "r" else usual for name in names]
     if letter == "r":
         rotations = signs[:, None] * local_rotations(motion, [partner])[:, 0] * signs
-        rest, values = (0.0, 0.0, 0.0), euler_of(rotations, joint) * [TURN[unit] / (2 * np.pi) for unit in own]
+        rest = (0.0, 0.0, 0.0)
+        values = euler_of(rotations, joint) * [TURN[unit] / (2 * np.pi) for unit in own]
     else:
-        rest, values = joint.offset, local_translations(motion)[:, partner] * signs
+        rest = joint.offset
+        values = local_translations(motion)[:, partner] * signs
     needed = [n for n in range(3) if names[n] in units or (np.abs(values[:, n] - rest[n]) > 1e-9).any()]
     return with_channels(result, tuple(names[n] for n in needed), values[:, needed], tuple(own[n] for n in needed))

@@ -172,9 +172,11 @@ class Motion:
         Euler angles change by whole turns and gimbal flips, forward from the first frame; exponential maps ("JOINT.ex",
         "JOINT.ey", "JOINT.ez") by whole turns, backward from the last one.
         """
-        values, turns = np.array(self.values), np.array([TURN.get(unit, np.inf) for unit in self.units])
+        values = np.array(self.values)
+        turns = np.array([TURN.get(unit, np.inf) for unit in self.units])
         places = {} if self.skeleton is None else self.skeleton.places
-        triples, singles = [], []
+        triples = []
+        singles = []
         for name, columns in self.rotation_columns().items():
             if self.skeleton is not None and len(columns) == 3 and name in places:
                 order = self.skeleton.joints[places[name]].order

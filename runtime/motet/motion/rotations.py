@@ -39,12 +39,15 @@ def angle_of(sine: Array, cosine: Array) -> Array:
 def axis_to_rotmat(axis: str, angle: Array) -> Array:
     """Rotation matrices (..., 3, 3) about one coordinate axis ("x", "y" or "z") by ``angle`` (...)."""
     i = "xyz".index(axis)
-    j, k = (i + 1) % 3, (i + 2) % 3
-    cos, sin = np.cos(angle), np.sin(angle)
+    j = (i + 1) % 3
+    k = (i + 2) % 3
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     matrix = np.zeros((*np.shape(angle), 3, 3))
     matrix[..., i, i] = 1.0
     matrix[..., j, j] = matrix[..., k, k] = cos
-    matrix[..., k, j], matrix[..., j, k] = sin, -sin
+    matrix[..., k, j] = sin
+    matrix[..., j, k] = -sin
     return matrix
 
 
@@ -57,12 +60,15 @@ def euler_to_rotmat(angles: Array, order: str) -> Array:
     cos_a, cos_b, cos_c = np.moveaxis((1 - tangent**2) * part, -1, 0)
     sin_a, sin_b, sin_c = np.moveaxis(2 * tangent * part, -1, 0)
     matrix = frames_last((*angles.shape[:-1], 3, 3))
-    matrix[..., i, i], matrix[..., i, j], matrix[..., i, k] = cos_b * cos_c, -cos_b * sin_c, sin_b
+    matrix[..., i, i] = cos_b * cos_c
+    matrix[..., i, j] = -cos_b * sin_c
+    matrix[..., i, k] = sin_b
     matrix[..., j, i] = sin_a * sin_b * cos_c + cos_a * sin_c
     matrix[..., j, j] = cos_a * cos_c - sin_a * sin_b * sin_c
     matrix[..., k, i] = sin_a * sin_c - cos_a * sin_b * cos_c
     matrix[..., k, j] = cos_a * sin_b * sin_c + sin_a * cos_c
-    matrix[..., j, k], matrix[..., k, k] = -sin_a * cos_b, cos_a * cos_b
+    matrix[..., j, k] = -sin_a * cos_b
+    matrix[..., k, k] = cos_a * cos_b
     return matrix
 
 
@@ -97,7 +103,8 @@ def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
     # steps of less than a sixth of a turn are nearer than the other solution, of which two angles are half a turn off
     leaping = (np.abs(np.diff(result, axis=0)) > turn / 6).any(axis=(0, -1))
     if leaping.any():
-        own, turn = result[:, leaping], turn[leaping]
+        own = result[:, leaping]
+        turn = turn[leaping]
         flipped = own * [1, -1, 1] + turn / 2
         # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend
         # on which of them the frame before took
@@ -161,7 +168,8 @@ def rotvec_to_rotmat(vector: Array) -> Array:
     """Rotation vectors (exponential maps) (..., 3) to matrices (..., 3, 3) (Rodrigues' formula)."""
     angle = np.linalg.norm(vector, axis=-1)
     # sin(a)/a and (1 - cos a)/a^2, both exact at 0 by numpy's sinc(t) = sin(pi t)/(pi t)
-    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
     return rodrigues(np.cos(angle), first[..., None] * vector, second[..., None] * vector, vector)
 
 
@@ -190,7 +198,8 @@ def rotmat_to_rotvec(matrix: Array) -> Array:
 
 def quat_to_rotmat(quat: Array) -> Array:
     """Unit quaternions (..., 4), scalar last, to matrices (..., 3, 3)."""
-    vector, scalar = quat[..., :3], quat[..., 3:]
+    vector = quat[..., :3]
+    scalar = quat[..., 3:]
     return rodrigues(1 - 2 * np.sum(vector**2, axis=-1), 2 * scalar * vector, 2 * vector, vector)
 
 
@@ -240,8 +249,10 @@ def unit(vectors: Array) -> Array:
 
 def swing(start: Array, end: Array) -> Array:
     """The shortest rotations (..., 3, 3) from directions (..., 3) to others; half a turn is about any axis."""
-    start, end = unit(start), unit(end)
-    axis, cosine = np.cross(start, end), np.sum(start * end, axis=-1)
+    start = unit(start)
+    end = unit(end)
+    axis = np.cross(start, end)
+    cosine = np.sum(start * end, axis=-1)
     versed = axis / np.maximum(1 + cosine, 1e-9)[..., None]
     # 1 - (1 - cosine) instead of the cosine: a direction of 0 gives the identity
     turn = rodrigues(1 - np.sum(versed * axis, axis=-1), axis, versed, axis)
@@ -257,14 +268,16 @@ def twist(rotations: Array, axis: Array) -> Array:
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         return np.broadcast_to(np.eye(3), rotations.shape)
-    quats, along = rotmat_to_quat(rotations), axis / length
+    quats = rotmat_to_quat(rotations)
+    along = axis / length
     angles = 2 * angle_of(quats[..., :3] @ along, quats[..., 3])
     return rotvec_to_rotmat(angles[..., None] * along)
 
 
 def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """Products of quaternions (..., 4): the right rotation first, then the left."""
-    a, b = left[..., :3], right[..., :3]
+    a = left[..., :3]
+    b = right[..., :3]
     found = np.empty(np.broadcast_shapes(left.shape, right.shape), dtype=left.dtype)
     found[..., :3] = left[..., 3:] * b + right[..., 3:] * a + cross(a, b)
     found[..., 3] = left[..., 3] * right[..., 3] - (a * b).sum(axis=-1)

@@ -123,7 +123,9 @@ def product(left: Quaternion, right: Quaternion) -> Quaternion:
 def rotated(quat: Quaternion, vector: Vector) -> Vector:
     """A vector rotated by a unit quaternion."""
     (x, y, z, w), (a, b, c) = quat, vector
-    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    p = 2 * (y * c - z * b)
+    q = 2 * (z * a - x * c)
+    r = 2 * (x * b - y * a)
     return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
 
 
@@ -135,8 +137,12 @@ def yawed(quat: Quaternion, sine: Part, cosine: Part) -> Quaternion:
 
 def rotated_axis(quat: Quaternion, axis: int) -> Vector:
     """A unit vector along x, y or z (0, 1 or 2), rotated by a unit quaternion."""
-    i, j, k, w = quat[axis], quat[(axis + 1) % 3], quat[(axis + 2) % 3], quat[3]
-    p, q = 2 * j, 2 * k
+    i = quat[axis]
+    j = quat[(axis + 1) % 3]
+    k = quat[(axis + 2) % 3]
+    w = quat[3]
+    p = 2 * j
+    q = 2 * k
     found = 1 - j * p - k * q, i * p + w * q, i * q - w * p
     return found[-axis], found[1 - axis], found[2 - axis]
 
@@ -162,10 +168,8 @@ def swing(start: Vector, end: Vector) -> Quaternion:
     a, b, c = cross(start, end)
     if half is not False and np.any(half):
         tall = abs(x) > abs(z)
-        a, b, c = (
-            where(half, where(tall, -y, 0.0), a),
-            where(half, where(tall, x, -z), b),
-            where(half, where(tall, 0.0, y), c),
-        )
+        a = where(half, where(tall, -y, 0.0), a)
+        b = where(half, where(tall, x, -z), b)
+        c = where(half, where(tall, 0.0, y), c)
         cosine = where(half, 0.0, cosine)
     return normalised((a, b, c, cosine + (both == 0)))

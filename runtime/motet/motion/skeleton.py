@@ -20,7 +20,9 @@ END_SUFFIX = "_end"
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 """Name of a unit of length -> its metres."""
 
-LEFT, MIDDLE, RIGHT = "left", "middle", "right"
+LEFT = "left"
+MIDDLE = "middle"
+RIGHT = "right"
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,8 @@ def _partners(names: Sequence[str]) -> list[tuple[int, str]]:
     )
     pairs = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
     other = dict(pairs) | {right: left for left, right in pairs}
-    places, found = {name: place for place, name in enumerate(names)}, []
+    places = {name: place for place, name in enumerate(names)}
+    found = []
     for place, name in enumerate(names):
         matches = (match for pattern in patterns for match in re.finditer(pattern, name))
         swapped = ((name[: m.start()] + other[m[0]] + name[m.end() :], m[0][0]) for m in matches)

@@ -35,7 +35,8 @@ def _left(damping: float, seconds: float) -> float:
 
 def damped_path(off: Values, rate: Values, damping: float, seconds: float) -> Values:
     """The integral of the distance of :func:`damped` over ``seconds`` (exact)."""
-    rise, left = rate / damping + off, math.exp(-damping * seconds)
+    rise = rate / damping + off
+    left = math.exp(-damping * seconds)
     return (rise + off - left * (rise + off + rise * damping * seconds)) / damping
 
 

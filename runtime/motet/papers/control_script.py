@@ -51,7 +51,9 @@ class _Tokens:
     """A recursive descent over the tokens of one script."""
 
     def __init__(self, script: str, labels: Sequence[str]) -> None:
-        self.script, self.labels, self.position = script, labels, 0
+        self.script = script
+        self.labels = labels
+        self.position = 0
 
     def segment(self) -> Segment:
         start = self.mix()

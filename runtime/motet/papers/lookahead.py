@@ -62,7 +62,8 @@ class Lookahead:
     channels that are no angles."""
 
     def __init__(self, settings: LookaheadSettings, fps: float, whole_turn: Floats) -> None:
-        self.settings, self.seconds = settings, 1 / fps
+        self.settings = settings
+        self.seconds = 1 / fps
         self.most: Floats = whole_turn * np.float32(settings.fastest / fps)
         self.reach = max(1, round(settings.reach * settings.width * fps))
         window = np.exp(-0.5 * (np.arange(-self.reach, self.reach + 1) / (settings.width * fps)) ** 2)
@@ -78,10 +79,12 @@ class Lookahead:
 
     def ticked(self, now: Ahead, run: Run, control: Floats) -> Ahead:
         """One tick later; ``run`` counts from now. Each character moves as it would alone, to the bit."""
-        reach, settings = self.reach, self.settings
+        reach = self.reach
+        settings = self.settings
         offset, speed = damped(now.offset, now.speed, settings.fading, self.seconds)
         moving = (np.maximum(np.abs(offset), np.abs(speed)) > settings.faded).any(axis=1, keepdims=True)
-        offset, speed = np.where(moving, offset, 0), np.where(moving, speed, 0)
+        offset = np.where(moving, offset, 0)
+        speed = np.where(moving, speed, 0)
         if control is now.control or np.array_equal(control, now.control):
             frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
         else:

@@ -63,7 +63,9 @@ class _Beam:
 
     def __init__(self, step: Graph, context: Floats, hypotheses: int, candidates: int) -> None:
         rows = len(context)
-        self.step, self.context, self.candidates = step, context, candidates
+        self.step = step
+        self.context = context
+        self.candidates = candidates
         self.shape = (rows, hypotheses)
         self.scores = np.zeros(self.shape)
         self.lengths = np.zeros(self.shape, dtype=np.int64)
@@ -81,7 +83,8 @@ class _Beam:
         inputs = {"frame": self.frame[alive], "context": self.context[alive // hypotheses]}
         outputs, state = advance(self.step, {name: array[alive] for name, array in self.state.items()}, inputs)
         running, place = np.unique(alive // hypotheses, return_inverse=True)
-        size, slot = (hypotheses, self.candidates), alive % hypotheses
+        size = (hypotheses, self.candidates)
+        slot = alive % hypotheses
         normal = [noise[row].standard_normal((*size, self.frame.shape[1] - 1), np.float32) for row in running]
         uniform = [noise[row].random((*size, 2), np.float32) for row in running]
         forced = False if length == max_frames else True if length == 0 else None
@@ -106,7 +109,8 @@ class _Beam:
         lengths[alive] += flags
         ended = np.ones_like(lengths, dtype=np.bool_)
         ended[alive] = ~flags
-        flat_scores, flat_lengths = scores.reshape(rows, -1), lengths.reshape(rows, -1)
+        flat_scores = scores.reshape(rows, -1)
+        flat_lengths = lengths.reshape(rows, -1)
         order = np.argsort(-flat_scores / np.maximum(flat_lengths, 1), axis=1, kind="stable")[:, :hypotheses]
         self.scores = np.take_along_axis(flat_scores, order, 1)
         self.lengths = np.take_along_axis(flat_lengths, order, 1)
@@ -170,7 +174,9 @@ def score_frames(step: Graph, context: Floats, frames: Floats) -> float:
 
     step: as :func:`mixture_search`.
     """
-    contexts, state, steps = np.stack([context, context]), zero_state(step, 2), []
+    contexts = np.stack([context, context])
+    state = zero_state(step, 2)
+    steps = []
     given = np.ones((2, frames.shape[1] + 1), dtype=np.float32)
     for n in range(len(frames) + 1):
         given[:, :-1] = frames[n - 1] if n else 1

@@ -32,14 +32,17 @@ class TdbnModel(ControlModel):
         super().__init__(manifest, graphs, tables)
         if manifest.control is None:
             raise BundleError("manifest, control: is missing")
-        self.encoder, self.stepper = graphs["encoder"], graphs["step"]
-        self.labels, self.starts = manifest.control.labels, manifest.control.starts
+        self.encoder = graphs["encoder"]
+        self.stepper = graphs["step"]
+        self.labels = manifest.control.labels
+        self.starts = manifest.control.starts
         self.has_free_units = self.stepper.spec.takes("codes")
         self.sizes["L"] = len(self.labels)
         self.bind("encoder", {"frames": "batch D"}, {"codes": "batch H"})
         free = {"codes": "batch H"} if self.has_free_units else {}
         self.bind("step", {**self.loop.inputs, **free}, self.loop.outputs)
-        self.taps, self.codes = self.sizes["K"], self.sizes["H"]
+        self.taps = self.sizes["K"]
+        self.codes = self.sizes["H"]
         turns = np.array([TURN.get(unit, np.inf) for unit in self.contract.units], dtype=np.float32)
         self.lookahead = Lookahead(self.settings(LookaheadSettings), self.fps, turns)
         if "history" not in self.stepper.spec.feedback:
@@ -162,8 +165,11 @@ class TdbnSession:
         self, model: TdbnModel, first: Floats, seeds: Sequence[int], settings: Mapping[str, float], smooth: bool
     ) -> None:
         """first: the frames (K, D) that all characters continue from, one character for each seed."""
-        self.model, self.smooth, self.characters = model, smooth, len(seeds)
-        self.iterations, variety = int(settings["iterations"]), settings["variety"]
+        self.model = model
+        self.smooth = smooth
+        self.characters = len(seeds)
+        self.iterations = int(settings["iterations"])
+        variety = settings["variety"]
         self._first = np.repeat(first[:, None], self.characters, axis=1)
         self._history = np.repeat(model.encode(first)[None], self.characters, axis=0)
         self._ahead: Ahead | None = None
@@ -211,10 +217,12 @@ class TdbnSession:
     def step(self) -> Floats:
         """One tick: the next frame (characters, D) float32, in the units of ``model.contract``."""
         if self.smooth:
-            control, lookahead = self._inputs["control"], self.model.lookahead
+            control = self._inputs["control"]
+            lookahead = self.model.lookahead
             now = self._ahead or lookahead.begun(self._run, self._history, self._first, control)
             self._ahead = lookahead.ticked(now, self._run, control)
-            frame, self._history = self._ahead.shown.copy(), self._ahead.histories[0]
+            frame = self._ahead.shown.copy()
+            self._history = self._ahead.histories[0]
         else:
             frame, self._history = self._run(self._history, 0)
         self._tick += 1
@@ -259,6 +267,7 @@ class TdbnSession:
         if self.smooth and snapshot.tick and snapshot.ahead is None:
             raise ControlError("a snapshot of a session that is not smooth does not fit one that is")
         self.set_control(snapshot.control)
-        self._first, self._tick = snapshot.first, snapshot.tick
+        self._first = snapshot.first
+        self._tick = snapshot.tick
         self._history = np.array(snapshot.history, dtype=np.float32)
         self._ahead = snapshot.ahead if self.smooth else None

@@ -30,7 +30,9 @@ Gap = tuple[float, float]
 """Times in seconds of the first missing frame and of the first frame after the gap."""
 
 SEEN = 5.0  # seconds around a gap from which a figure is retargeted onto the humanoid: its ground, its stance
-JOIN_SECONDS, LOOP_SECONDS = 1.0, 0.5  # of a transition between two motions, and from the end of one to its start
+# of a transition between two motions, and from the end of one to its start
+JOIN_SECONDS = 1.0
+LOOP_SECONDS = 0.5
 
 
 class FillModel(BundleModel):
@@ -49,7 +51,8 @@ class FillModel(BundleModel):
         super().__init__(manifest, graphs, tables)
         if self.contract.skeleton != HUMANOID:
             raise BundleError("manifest, motion.skeleton: a model that fills gaps needs motet's humanoid")
-        self.sizes["E"], filled = PLACED_CHANNELS, "batch gap E"
+        self.sizes["E"] = PLACED_CHANNELS
+        filled = "batch gap E"
         self.bind("filler", {"past": "batch before E", "plain": filled, "after": "batch behind E"}, {"filled": filled})
         self.context, self.least, self.longest = (int(self.defaults[key]) for key in ("context", "least", "longest"))
 
@@ -122,12 +125,14 @@ class FillModel(BundleModel):
             start, stop = map(float, gap)
         except (TypeError, ValueError) as error:
             raise MotionError(f"a gap is two numbers in seconds, such as (1.0, 2.0), not {gap!r}") from error
-        text, whole = f"the gap {start:g}:{stop:g} s", f"the motion of {motion.duration:g} s"
+        text = f"the gap {start:g}:{stop:g} s"
+        whole = f"the motion of {motion.duration:g} s"
         if not (np.isfinite([start, stop]).all() and start < stop):
             raise MotionError(f"{text} is empty: it must start before it stops")
         if start < 0 or stop > motion.duration + 0.5 / motion.fps:
             raise MotionError(f"{text} is not within {whole}")
-        first, last = round(start * motion.fps), round(stop * motion.fps)
+        first = round(start * motion.fps)
+        last = round(stop * motion.fps)
         after = "a gap needs frames after it (motet predict continues)"
         for wrong, reason in (
             (first == last, f"has no frame at {motion.fps:g} fps: make it longer"),
@@ -176,7 +181,8 @@ class FillModel(BundleModel):
                 raise MotionError("frames must be finite numbers")
         frames = checked_int("frames", frames, 0, 2 * self.longest, MotionError)
         pose = pose_of(known[0][-1])
-        past, after = seen_from(known[0][-self.context :], pose), seen_from(known[1][: self.context], pose)
+        past = seen_from(known[0][-self.context :], pose)
+        after = seen_from(known[1][: self.context], pose)
         plain = bridge(past, after, frames, pace)
         if not frames:
             return plain

@@ -51,7 +51,8 @@ class PredictModel(BundleModel):
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         self.horizon = int(self.defaults["horizon"])
-        encoder, step = graphs["encoder"].spec, graphs["step"].spec
+        encoder = graphs["encoder"].spec
+        step = graphs["step"].spec
         self.bind("encoder", {"frames": "batch L D"}, {})
         bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
         self.seed_frames = self.sizes["L"]
@@ -118,7 +119,8 @@ class PredictModel(BundleModel):
         if beyond is not None and count > self.horizon:
             found = self._beyond(given, count, append, progress, beyond, seeds_of(seed, len(given), DecodingError))
         else:
-            found, seen = [], [self._seen(motion) for motion in given]
+            found = []
+            seen = [self._seen(motion) for motion in given]
             for start in range(0, len(given), self.loop.batch):
                 part = seen[start : start + self.loop.batch]
                 following = self.next_frames([last for *_, last in part], count)
@@ -163,7 +165,8 @@ class PredictModel(BundleModel):
         progress: called with the number of samples done and in total. DecodingError unless samples is 1 to MAX_SAMPLES.
         """
         samples = checked_int("samples", samples, 1, MAX_SAMPLES, DecodingError)
-        count, seeds = self.count(seconds, frames), seeds_of(seed, samples, DecodingError)
+        count = self.count(seconds, frames)
+        seeds = seeds_of(seed, samples, DecodingError)
         return futures(beyond, self.at_own_rate(travelling(motion)), count, seeds, append, progress)
 
     def _seen(self, motion: Motion, measured: Figure | None = None) -> tuple[Motion, Motion, Array]:
@@ -249,7 +252,8 @@ class PredictSession:
     def __init__(self, model: PredictModel, start: Motion) -> None:
         self.model = model
         self._kept = math.ceil((model.seed_frames + 1) * start.fps / model.fps) + 1
-        self._start, self._motion = start, start[-self._kept :]
+        self._start = start
+        self._motion = start[-self._kept :]
 
     def push(self, frames: ArrayLike) -> None:
         """The next frame (D,), or several (T, D); MotionError where they do not fit; nothing is changed then."""
@@ -267,7 +271,8 @@ class PredictSession:
 
     def predict(self, frames: int | None = None, *, seconds: float | None = None) -> Motion:
         """Like :meth:`PredictModel.predict`, after all frames pushed so far."""
-        model, count = self.model, self.model.count(seconds, frames)
+        model = self.model
+        count = self.model.count(seconds, frames)
         whole, figure, last = model._seen(self._motion, self._figure)
         return model._shown(model.next_frames([last], count)[0], whole, figure, False, self._figure)
 

@@ -85,7 +85,8 @@ def mirror_by_joints(features: Motion, signs: Mapping[str, float]) -> FrameMirro
     lateral_x(features)
     joints = joints_with(features.channels, next(iter(signs)))
     places = {name: column for column, name in enumerate(features.channels)}
-    columns, found = np.arange(len(places)), root_signs(features.channels)
+    columns = np.arange(len(places))
+    found = root_signs(features.channels)
     for joint, partner in zip(joints, partners_of(joints), strict=True):
         for kind, sign in signs.items():
             columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]

@@ -38,10 +38,13 @@ def placed_by_way(frames: Array, fps: float) -> Array:
     steps[..., :1, :] = 0
     forward, left, turn = np.moveaxis(steps, -1, 0)
     now = np.cumsum(turn, axis=-1)
-    sin, cos = np.sin(now - turn), np.cos(now - turn)
+    sin = np.sin(now - turn)
+    cos = np.cos(now - turn)
     x, z = (np.cumsum(step, axis=-1) for step in (forward * sin + left * cos, forward * cos - left * sin))
     found = np.empty((*frames.shape[:-1], frames.shape[-1] - 1))
-    found[..., 0], found[..., 1], found[..., 2] = x, frames[..., ROOT_PLACE], z
+    found[..., 0] = x
+    found[..., 1] = frames[..., ROOT_PLACE]
+    found[..., 2] = z
     found[..., ROOT_PLACE:] = frames[..., len(ROOT_SIXD) :]
     _turn(found[..., ROOT_PLACE : ROOT_PLACE + 6], now)
     return found
@@ -81,7 +84,8 @@ def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
     arrives with the velocities it has there. pace: frames of the gap in one of the frames given.
     """
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
-    start, end = past[..., -1:, :], after[..., :1, :]
+    start = past[..., -1:, :]
+    end = after[..., :1, :]
     sides = (past[..., -4:, :ROOT_PLACE], after[..., :4, :ROOT_PLACE])
     # the hips' velocities, metres a frame, over 3 frames; 0 where there is only one
     leaves, arrives = ((side[..., -1:, :] - side[..., :1, :]) / max(1, side.shape[-2] - 1) for side in sides)
@@ -104,7 +108,8 @@ def straight(past: Array, after: Array, count: int) -> Array:
     """As :func:`bridge`, the root on a line at an even speed: the plainest interpolation."""
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
     found = bridge(past, after, count)
-    start, end = past[..., -1:, :ROOT_PLACE], after[..., :1, :ROOT_PLACE]
+    start = past[..., -1:, :ROOT_PLACE]
+    end = after[..., :1, :ROOT_PLACE]
     found[..., :ROOT_PLACE] = start + part * (end - start)
     return found
 
@@ -118,11 +123,13 @@ def unplaced(frames: Array, after: Motion) -> Motion:
 
 def mirror() -> FrameMirror:
     """How placed frames are mirrored, in the plane x = 0."""
-    columns, signs = np.arange(PLACED_CHANNELS), np.ones(PLACED_CHANNELS, dtype=np.float32)
+    columns = np.arange(PLACED_CHANNELS)
+    signs = np.ones(PLACED_CHANNELS, dtype=np.float32)
     signs[0] = -1
     for bone, partner in enumerate(partners_of(BONES)):
         own, other = (np.arange(len(SIXD_KINDS)) + ROOT_PLACE + len(SIXD_KINDS) * one for one in (bone, partner))
-        columns[own], signs[own] = other, SIXD_SIGNS
+        columns[own] = other
+        signs[own] = SIXD_SIGNS
     return FrameMirror(columns, signs)
 
 
@@ -140,6 +147,9 @@ def _turned(frames: Array, angle: Array) -> Array:
 
 def _turn(vectors: Array, angle: Array) -> None:
     """Turn vectors (..., 3 N), which lie one after the other, in place."""
-    sin, cos = np.sin(angle)[..., None], np.cos(angle)[..., None]
-    x, z = np.array(vectors[..., 0::3]), np.array(vectors[..., 2::3])
-    vectors[..., 0::3], vectors[..., 2::3] = x * cos + z * sin, z * cos - x * sin
+    sin = np.sin(angle)[..., None]
+    cos = np.cos(angle)[..., None]
+    x = np.array(vectors[..., 0::3])
+    z = np.array(vectors[..., 2::3])
+    vectors[..., 0::3] = x * cos + z * sin
+    vectors[..., 2::3] = z * cos - x * sin

@@ -45,7 +45,8 @@ def _apart(own: Skeleton, other: Skeleton) -> tuple[str | None, tuple[str, ...]]
     for name in own.names:
         if name not in other.places:
             continue
-        one, two = own.joints[own.places[name]], other.joints[other.places[name]]
+        one = own.joints[own.places[name]]
+        two = other.joints[other.places[name]]
         if two.parent >= 0 and (parent := other.names[two.parent]) in own.places:
             ends = [(at.rest_positions[at.places[name]], at.rest_positions[at.places[parent]]) for at in (own, other)]
             bones = [end - start for end, start in ends]
@@ -126,12 +127,17 @@ def from_model_figure(found: Motion, own: Motion, ends: Motion, figure: Figure |
     if own.skeleton is None:
         log.info("the new frames use the model's figure: the file has no skeleton")
         return None
-    skeleton, at = own.skeleton, [0, -1][: len(ends)]
+    skeleton = own.skeleton
+    at = [0, -1][: len(ends)]
     back = found if found.skeleton == skeleton else from_humanoid(on_humanoid(found), figure or own)
-    turned, moved = local_rotations(back), local_translations(back)
-    turns, off = product(inverse(turned[at]), local_rotations(ends)), local_translations(ends) - moved[at]
+    turned = local_rotations(back)
+    moved = local_translations(back)
+    turns = product(inverse(turned[at]), local_rotations(ends))
+    off = local_translations(ends) - moved[at]
     carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
-    joint, above = skeleton.index(carrier), []  # the hips and all above them
+    # the hips and all above them
+    joint = skeleton.index(carrier)
+    above = []
     while joint >= 0:
         above.append(joint)
         joint = skeleton.joints[joint].parent
@@ -163,11 +169,13 @@ def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
     reason, turned = _apart(motion.skeleton, skeleton)
     if reason:
         raise MotionError(reason)
-    own, columns = motion.skeleton, motion.rotation_columns()
+    own = motion.skeleton
+    columns = motion.rotation_columns()
     turned = tuple(name for name in turned if name in columns)
     if not turned:
         return motion
-    places, joints = [own.places[name] for name in turned], list(own.joints)
+    places = [own.places[name] for name in turned]
+    joints = list(own.joints)
     wanted = [skeleton.joints[skeleton.places[name]] for name in turned]
     units = [motion.units[columns[name][0]] for name in turned]
     turns = np.array([TURN[unit] for unit in units])[:, None]

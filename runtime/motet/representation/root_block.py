@@ -117,7 +117,8 @@ def ground_velocities(places: Array, heading: Array, fps: float) -> Array:
     if len(places) < 2:
         return np.zeros((len(places), 3))
     x, z = np.diff(places[:, [0, 2]], axis=0).T
-    sin, cos = np.sin(heading[:-1]), np.cos(heading[:-1])
+    sin = np.sin(heading[:-1])
+    cos = np.cos(heading[:-1])
     found = np.column_stack([x * sin + z * cos, x * cos - z * sin, np.diff(heading)]) * fps
     return np.concatenate([found[:1], found])
 
@@ -159,7 +160,8 @@ def way(steps: Array, start: ArrayLike = (0.0, 0.0, 0.0), facing: float = 0.0) -
     origin = np.asarray(start, dtype=np.float64)
     # summed from the start on: a way that is continued later is the same to the bit
     now = np.cumsum(np.append(facing, steps[:, 2]))
-    sin, cos = np.sin(now[:-1]), np.cos(now[:-1])
+    sin = np.sin(now[:-1])
+    cos = np.cos(now[:-1])
     x = np.cumsum(np.append(origin[0], steps[:, 0] * sin + steps[:, 1] * cos))
     z = np.cumsum(np.append(origin[2], steps[:, 0] * cos - steps[:, 1] * sin))
     return now[1:], x[1:], z[1:]
@@ -179,12 +181,15 @@ def plant_feet(motion: Motion) -> Motion:
     the feet are at their lowest. MotionError for a motion without the root block, or without a skeleton with feet and a
     unit of length.
     """
-    skeleton, placed = skeleton_of(motion), from_root_block(motion)
-    joints, metres = feet_of(skeleton), skeleton.unit_factor(1.0)
+    skeleton = skeleton_of(motion)
+    placed = from_root_block(motion)
+    joints = feet_of(skeleton)
+    metres = skeleton.unit_factor(1.0)
     if len(motion) < 2:
         return motion
     places = positions(placed) * metres
-    root, feet = places[:, 0], places[:, joints]
+    root = places[:, 0]
+    feet = places[:, joints]
     above = feet[..., 1] - ground_of(feet[..., 1])
     was = np.diff(root[:, [0, 2]], axis=0) * motion.fps
     velocity = velocity_by_feet((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, trust=0.1)
@@ -227,7 +232,8 @@ class RootAngles(Representation):
         found = Angles().mirror(features.select(tuple(features.channels[d] for d in joints)))
         columns = np.arange(len(features.channels))
         signs = root_signs(features.channels)
-        columns[joints], signs[joints] = joints[found.columns], found.signs
+        columns[joints] = joints[found.columns]
+        signs[joints] = found.signs
         return FrameMirror(columns, signs)
 
 
@@ -254,7 +260,8 @@ class RootVectors(Representation):
         """
         if after is not None and set(features.channels) <= set(after.channels):
             return features
-        name, joints = skeleton_of(features if after is None else after).names[0], joints_of(features.channels)
+        name = skeleton_of(features if after is None else after).names[0]
+        joints = joints_of(features.channels)
         last = at_rest(features, (name, *joints)) if after is None else after[-1]
         root, places = root_in_world(features, after)
         vectors = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in VECTOR_KINDS)).values

@@ -116,7 +116,8 @@ def joint_rotations(features: Motion) -> dict[str, Array]:
 
 def sixd_to_rotmat(sixd: Array) -> Array:
     """Two axes (..., 6), of any length and not quite orthogonal, to matrices (..., 3, 3) by Gram and Schmidt."""
-    x, y = sixd[..., :3], sixd[..., 3:]
+    x = sixd[..., :3]
+    y = sixd[..., 3:]
     x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
     y = y - (x * y).sum(axis=-1, keepdims=True) * x
     y = y / np.maximum(np.linalg.norm(y, axis=-1, keepdims=True), 1e-9)

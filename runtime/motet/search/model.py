@@ -85,7 +85,8 @@ class SearchModel(LanguageModel):
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Frames (T, D) and a sentence ("text" of the settings) to ids (words,) int64 and the vectors (E,) of both."""
         ids, _ = self.vocabulary.encode(str(settings["text"]))
-        motion, text = self.contexts([given["frames"]], "motion"), self.contexts([ids], "text")
+        motion = self.contexts([given["frames"]], "motion")
+        text = self.contexts([ids], "text")
         return {"ids": ids, "motion": motion[0], "text": text[0]}
 
 
@@ -185,9 +186,11 @@ class Index:
         kept = place if place.is_file() else Path(file or place / INDEX_FILE)
         before = _read(kept, model) if kept.is_file() else None
         if before is not None and kept == place:
-            folder, shard = before.folder, shard or before.shard
+            folder = before.folder
+            shard = shard or before.shard
         else:
-            folder, shard = place, shard or Shard()
+            folder = place
+            shard = shard or Shard()
         known = [one for one in (before, *(_read(Path(one), model) for one in merge)) if one is not None]
         found = _renewed(folder, model, known, unit, jobs, shard, progress)
         if before is None or _state(before) != _state(found):
@@ -226,15 +229,18 @@ class Index:
     def _nearest(self, query: Query, wanted: int) -> list[Hit]:
         how = self.model.settings(IndexSettings)
         if isinstance(query, str):
-            vector, least = self.model.embed_text(query), how.like_text
+            vector = self.model.embed_text(query)
+            least = how.like_text
         else:
-            vector, least = direction(self.model, query), how.like_motion
+            vector = direction(self.model, query)
+            least = how.like_motion
         scores = self.vectors @ vector
         found: dict[str, Hit] = {}
         for row in self._best_first(scores):
             member, start, stop = self._windows[row]
             if member.name not in found:
-                place, score = self.folder / member.path, float(scores[row])
+                place = self.folder / member.path
+                score = float(scores[row])
                 found[member.name] = Hit(place, start, stop, score, member.clip, member.in_place, score >= least)
             if len(found) == wanted:
                 break
@@ -242,11 +248,13 @@ class Index:
 
     def _best_first(self, scores: Floats) -> Iterator[int]:
         """The columns of scores (N,) by the model's loop: the few that are mostly enough, then more."""
-        done, count = 0, 256
+        done = 0
+        count = 256
         while done < len(scores):
             best = self.model.loop.run(scores, count)[done:].tolist()
             yield from best
-            done, count = done + len(best), 16 * count
+            done = done + len(best)
+            count = 16 * count
 
 
 def direction(model: SearchModel, motion: Motion) -> Floats:
@@ -277,10 +285,8 @@ def _renewed(
         raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in {'it' if shard == Shard() else shard}")
     files = list(map(partial(_file, folder), paths))
     new = [file for file in files if file.state not in known]
-    embedded, found = (
-        in_order(partial(_embedded, folder, model=model, unit=unit), new, jobs),
-        list[tuple[Member, Floats]](),
-    )
+    embedded = in_order(partial(_embedded, folder, model=model, unit=unit), new, jobs)
+    found = list[tuple[Member, Floats]]()
     for done, file in enumerate(files, start=1):
         found += known.get(file.state) or next(embedded)
         progress(done, len(paths))
@@ -365,10 +371,14 @@ def _read(file: Path, model: SearchModel) -> Index:
     """Read what :func:`_keep` wrote; FormatError for anything else, or another model's index."""
     try:
         with zipfile.ZipFile(file) as archive:
-            vectors, text = array(archive, "vectors", "f"), array(archive, "index", "u")
+            vectors = array(archive, "vectors", "f")
+            text = array(archive, "index", "u")
         data = json.loads(text.tobytes())
-        version, made = int(data["version"]), str(data["model"])
-        folder, unit, shard = Path(data["folder"]), data.get("unit"), Shard.parse(data.get("shard", "1/1"))
+        version = int(data["version"])
+        made = str(data["model"])
+        folder = Path(data["folder"])
+        unit = data.get("unit")
+        shard = Shard.parse(data.get("shard", "1/1"))
         members = tuple(_member(**entry) for entry in data["members"]) if version == VERSION else ()
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:

@@ -56,8 +56,12 @@ class Answers:
     """
 
     def __init__(self, generate: CodesModel, describe: DescribeModel, predict: PredictModel, limits: Limits) -> None:
-        self._writer, self._describer, self._predictor, self.limits = generate, describe, predict, limits
-        self._models, self._threads = ThreadPoolExecutor(1, "models"), ThreadPoolExecutor(2, "requests")
+        self._writer = generate
+        self._describer = describe
+        self._predictor = predict
+        self.limits = limits
+        self._models = ThreadPoolExecutor(1, "models")
+        self._threads = ThreadPoolExecutor(2, "requests")
         self._bounds = Bounds(limits.motion_seconds, 8 * limits.body_bytes)
         self._readers = Readers(limits.body_bytes, limits.seconds)
         self._generated = Batcher(unwarned(self._generate), self._models, limits.batch)
@@ -233,7 +237,8 @@ class Answers:
 def rig_of(asked: Asked, form: str, limits: Limits) -> Character | None:
     """The rig "like" that a motion is to be put on. RequestError where that, or a file "like" or "onto", does not go
     with the format, or the frame rate is out of range."""
-    like, onto = asked.files.get("like") or asked.settings.get("like"), asked.files.get("onto")
+    like = asked.files.get("like") or asked.settings.get("like")
+    onto = asked.files.get("onto")
     if not 0 < asked.settings.get("fps", 1.0) <= limits.fps:
         raise RequestError(f"fps: expected more than 0 and at most {limits.fps:g}, not {asked.settings['fps']:g}")
     if like and onto:

@@ -30,7 +30,9 @@ class Batcher(Generic[Key, Item, Found]):
     """
 
     def __init__(self, call: Callable[[Key, list[Item]], Sequence[Found]], worker: Executor, batch: int) -> None:
-        self._call, self._worker, self._batch = call, worker, batch
+        self._call = call
+        self._worker = worker
+        self._batch = batch
         self._waiting: deque[_Waiting[Key, Item, Found]] = deque()
         self._running: asyncio.Task[None] | None = None
 

@@ -66,7 +66,8 @@ def frames_of(motion: Motion) -> dict[str, Any]:
     """The frames of a motion for JSON: of each joint that moves from its parent its "translations" (T, 3) by name, in
     the skeleton's unit, and "rotations" (T, J, 4) of all joints, quaternions (x, y, z, w) in the parent's frame."""
     moving = dict.fromkeys(name[:-3] for name in motion.channels if name[-3:] in (".tx", ".ty", ".tz"))
-    places, skeleton = local_translations(motion), skeleton_of(motion)
+    places = local_translations(motion)
+    skeleton = skeleton_of(motion)
     return {
         "translations": {name: rounded(places[:, skeleton.places[name]]) for name in moving if name in skeleton.places},
         "rotations": rounded(rotmat_to_quat(local_rotations(motion))),

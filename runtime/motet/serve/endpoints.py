@@ -43,7 +43,8 @@ PAGE = {
 
 def routes(answers: Answers, version: str) -> list[Route]:
     """All addresses but that of live figures."""
-    document, start = described(version), source("motet.serve", "page.html")
+    document = described(version)
+    start = source("motet.serve", "page.html")
     start = start.replace("{{STYLE}}", source("motet.draw", "page.css")).replace("{{TAKES}}", ",".join(TAKES))
 
     async def health(_: Request) -> Response:
@@ -127,7 +128,8 @@ async def _to_the_end(lines: AsyncIterator[bytes], limits: Limits) -> AsyncItera
 
 async def while_there(request: Request, work: Awaitable[T]) -> T:
     """What is worked out for a client, whose request is read; ClientDisconnect as soon as it leaves."""
-    working, leaving = asyncio.ensure_future(work), asyncio.ensure_future(request.receive())
+    working = asyncio.ensure_future(work)
+    leaving = asyncio.ensure_future(request.receive())
     try:
         await asyncio.wait({working, leaving}, return_when=asyncio.FIRST_COMPLETED)
         if not working.done():

@@ -61,7 +61,9 @@ class Visitors:
     """
 
     def __init__(self, app: ASGIApp, origins: Sequence[str], hosts: Sequence[str] | None) -> None:
-        self.app, self.origins, self.hosts = app, frozenset(origins), hosts
+        self.app = app
+        self.origins = frozenset(origins)
+        self.hosts = hosts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, or refuse it."""
@@ -94,7 +96,8 @@ class Gate:
     what is too much at once; and that leaves clients who do not take their answer."""
 
     def __init__(self, app: ASGIApp, limits: Limits) -> None:
-        self.app, self.limits = app, limits
+        self.app = app
+        self.limits = limits
         self.requests = self.held = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -117,7 +120,8 @@ class Gate:
             nonlocal held
             message = await receive()
             size = len(message.get("body", b""))
-            held, self.held = held + size, self.held + size
+            held = held + size
+            self.held = self.held + size
             if held > self.limits.body_bytes:
                 raise HTTPException(413, self._too_large(), {"Connection": "close"})
             if self.held > self.limits.all_bytes:
@@ -143,7 +147,8 @@ class Gate:
             if not begun:
                 await refusal(503, "the server is stopping", Connection="close")(scope, receive, send)
         finally:
-            self.requests, self.held = self.requests - 1, self.held - held
+            self.requests = self.requests - 1
+            self.held = self.held - held
 
     def _too_large(self) -> str:
         return f"the request is too large: expected at most {self.limits.body_bytes} bytes"

@@ -44,7 +44,8 @@ IDLE = "a person stands still"
 REACH = 0.5
 """Seconds within which a figure comes to a key pose and leaves it."""
 
-SLOWEST, FASTEST = 1.0, 240.0
+SLOWEST = 1.0
+FASTEST = 240.0
 """Frames a second."""
 
 LARGEST = 4_000_000
@@ -74,7 +75,9 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
     model_id = "motet"
 
     def __init__(self, model: CodesModel, fill: FillModel, steer: SteerModel) -> None:
-        self.model, self.fill, self.steer = model, fill, steer
+        self.model = model
+        self.fill = fill
+        self.steer = steer
 
     def capabilities(self) -> ModelSpec:
         """See the SDK: no end effectors, no ground but a flat one, one seed for a whole time line."""
@@ -101,7 +104,8 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
 
     def answer(self, request: GenerateRequest) -> MotionResult:
         """See :meth:`generate`."""
-        fps, options = request.fps(self.fill.fps), request.options or schemas.Options()
+        fps = request.fps(self.fill.fps)
+        options = request.options or schemas.Options()
         _check(request, fps, options)
         with _refused("invalid_skeleton"):
             figure = _figure(request.skeleton)
@@ -146,7 +150,8 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         whole = max(2, round((frames - 1) / fps * self.fill.fps))
         gap = min(round(LOOP_SECONDS * self.fill.fps), whole // 3)
         drawn = whole - gap
-        prompt, seconds = getattr(segment, "prompt", IDLE), (drawn + 2) / self.fill.fps
+        prompt = getattr(segment, "prompt", IDLE)
+        seconds = (drawn + 2) / self.fill.fps
         motion = self.model.story(prompt, seconds=seconds, seed=seed).playable(self.fill.fps)[:drawn]
         known = placed(motion)
         steps = np.diff(known[:, [0, 2]], axis=0)
@@ -179,7 +184,8 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         """What the client cannot see: the seed that was drawn, and what was not understood."""
         said = [("seed", "info", f"drawn with the seed {seed}")]
         for text in dict.fromkeys(getattr(segment, "prompt", IDLE) for segment in request.segments):
-            found, unknown = self.model.understood(text), self.model.unknown(text)
+            found = self.model.understood(text)
+            unknown = self.model.unknown(text)
             shown = self.model.likeliest(text)
             if shown.lacking:
                 said.append(("left_out", "warning", shown.left_out(text)))
@@ -279,7 +285,8 @@ def _pose(given: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
 
 def _steps(keys: Keys, figure: Figure) -> dict[int, Moment]:
     """Where a root path goes, by frame, at the humanoid's size; where the figure faces first."""
-    scale, found = leg_length() / figure.fitted.leg, {}
+    scale = leg_length() / figure.fitted.leg
+    found = {}
     for frame, key in keys.items():
         if np.isfinite(key.place[[0, 2]]).all():
             x, z = (scale * key.place[[0, 2]]).tolist()
@@ -302,7 +309,8 @@ def _line(told: Sequence[Moment], steps: Mapping[int, Moment], fps: float, rate:
 def _humanoid(figure: Figure, keys: Keys, fps: float) -> Motion:
     """Key poses of the client's figure, one after the other, as a motion of the humanoid; joints that are not given
     are at rest, and a root that is not stays where it was."""
-    skeleton, at = figure.posture[0], figure.posture[0].offsets[0]
+    skeleton = figure.posture[0]
+    at = figure.posture[0].offsets[0]
     turns = np.tile(np.eye(3), (len(keys), len(skeleton.joints), 1, 1))
     places = np.tile(skeleton.offsets, (len(keys), 1, 1))
     for number, key in enumerate(keys.values()):
@@ -316,6 +324,7 @@ def _humanoid(figure: Figure, keys: Keys, fps: float) -> Motion:
 
 def _on_figure(motion: Motion, figure: Figure) -> Moves:
     """A motion of the humanoid on the client's figure, whose root alone moves: joints above the hips do not turn."""
-    found, skeleton = from_humanoid(motion, figure), figure.posture[0]
+    found = from_humanoid(motion, figure)
+    skeleton = figure.posture[0]
     root = skeleton.offsets[0] + (local_translations(found) - skeleton.offsets).sum(axis=1)
     return Moves(local_rotations(found), root, heading(motion))

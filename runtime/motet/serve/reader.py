@@ -85,7 +85,8 @@ def read(head: Head, parts: Sequence[bytes]) -> Answer:
 
 def put(head: Head, parts: Sequence[bytes]) -> Answer:
     """The content of an answer: a motion, the first part, put onto the character of a file, the second."""
-    motion, file = unpacked(head["motion"], parts[0]), Upload(parts[1], head["name"])
+    motion = unpacked(head["motion"], parts[0])
+    file = Upload(parts[1], head["name"])
     return {}, content_of(motion, Order(**head["order"]), read_character(file))
 
 
@@ -141,7 +142,8 @@ def is_used() -> bool:
 def main() -> None:
     """Answer requests until the input ends."""
     logging.disable()
-    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    requests = sys.stdin.buffer
+    answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints does not break into a message
     with suppress(AttributeError, OSError):
         os.nice(5)  # models go first

@@ -23,7 +23,8 @@ PROGRAM = ("-P", "-m", "motet.serve.reader")
 READERS = 2
 """Files that are read at once; the others wait."""
 
-MEMORY, MEMORY_OF_BODY = 2**30, 8
+MEMORY = 2**30
+MEMORY_OF_BODY = 8
 """Bytes that a process may take, and how many more for each byte that a request may have."""
 
 ERRORS: dict[str, type[MotetError]] = {

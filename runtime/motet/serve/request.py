@@ -16,7 +16,8 @@ from motet.serve.limits import Limits
 from motet.serve.uploads import RequestError, Upload
 from motet.settings import is_number
 
-LONGEST_TEXT, MOST_TEXTS = 1000, 100
+LONGEST_TEXT = 1000
+MOST_TEXTS = 100
 
 Kind = Literal["text", "texts", "number", "numbers", "whole", "flag"]
 
@@ -78,7 +79,8 @@ async def asked(request: Request, parameters: Mapping[str, Parameter], files: Se
 
     The body is a JSON object, a form, or the bytes of the file called "file", whose type is in "format".
     """
-    given, uploads = from_texts(request.query_params.multi_items(), parameters), dict[str, Upload]()
+    given = from_texts(request.query_params.multi_items(), parameters)
+    uploads = dict[str, Upload]()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "multipart/form-data" or (kind == "application/x-www-form-urlencoded" and "file" not in files):
         async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:

@@ -33,7 +33,8 @@ GROUND_PERCENT = 10
 VOTING_HEIGHT = 0.07
 """Metres above the ground from which on a point has no vote on where the root goes."""
 
-TOGETHER, REACH = 0.05, 1.0
+TOGETHER = 0.05
+REACH = 1.0
 """Seconds over which votes are brought together, and beyond which they do not reach."""
 
 ALLOWED = (3 * 0.2, 0.2)
@@ -105,7 +106,8 @@ def feet_of(skeleton: Skeleton) -> list[int]:
     """Indices of the joints of both feet, the low ones at rest; MotionError if no joints are paired."""
     if not has_feet(skeleton):
         raise MotionError("no left-right pairs of joints to find the feet among: name the joints of the feet")
-    paired, height = _paired(skeleton), skeleton.rest_positions[:, 1]
+    paired = _paired(skeleton)
+    height = skeleton.rest_positions[:, 1]
     # joints of the feet are within a tenth of the figure's height
     return [i for i in paired if height[i] <= height[paired].min() + 0.1 * skeleton.height]
 
@@ -149,7 +151,8 @@ def lay_root_path(
     # a jump up forward in time is a fall backward: only frames on which both agree are flight
     flight = np.minimum(_with_flight(standing, motion.fps), _with_flight(standing[::-1], motion.fps)[::-1])
     height = smoothed(flight[:, None, None], 0.015, motion.fps)[:, 0, 0]
-    plane, velocity = smoothed(points[..., [0, 2]], tremble, motion.fps), np.zeros((0, 2))
+    plane = smoothed(points[..., [0, 2]], tremble, motion.fps)
+    velocity = np.zeros((0, 2))
     if len(motion) > 1:
         velocity = velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps)
     return led_along(motion, velocity, height, metres)
@@ -167,7 +170,10 @@ def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> 
 def _with_flight(standing: Array, fps: float) -> Array:
     """Heights (T,) of the root in metres, from those at which the feet are on the ground, where it falls freely."""
     # the upward velocity is measured over .05 s
-    heights, speed, span, gravity = standing.tolist(), 0.0, max(1, round(0.05 * fps)), 9.81
+    heights = standing.tolist()
+    speed = 0.0
+    span = max(1, round(0.05 * fps))
+    gravity = 9.81
     for t in range(1, len(heights)):
         falling = heights[t - 1] + speed / fps - 0.5 * gravity / fps**2
         if falling > heights[t]:
@@ -188,9 +194,11 @@ def velocity_by_feet(
     """
     # a vote counts less the higher its point is
     near = contacts((above[1:] + above[:-1]) / 2, None, ContactSettings(heights=(0.0, VOTING_HEIGHT)))
-    votes, reach = -np.diff(points, axis=0) * fps, round(REACH * fps)
+    votes = -np.diff(points, axis=0) * fps
+    reach = round(REACH * fps)
     nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (TOGETHER * fps))
-    weights, velocity = near, np.zeros(votes[:, 0].shape)
+    weights = near
+    velocity = np.zeros(votes[:, 0].shape)
     for attempt in range(11):
         if attempt:
             off = votes - velocity[:, None]

@@ -98,7 +98,8 @@ def _measured(
         sides = [[HUMANOID.index(sided(side, part)) for part in LEG[:3]] for side in LEFT_RIGHT]
         return [(joints, np.array([1.0, 0.0, 0.0])) for joints in sides], 1.0, soles
     figure = Figure.of(motion)
-    fitted, joints_of = figure.fitted, figure.fitted.joint_map.joints
+    fitted = figure.fitted
+    joints_of = figure.fitted.joint_map.joints
     if not np.array_equal(figure.turn, np.eye(3)):
         raise MotionError("this figure does not stand along y: turn it upright with to_humanoid")
     scale = leg_length() / fitted.leg
@@ -128,11 +129,13 @@ def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
     touch = contacts_of(points, fps, settings.contact)
     weights = touch / np.maximum(touch.sum(axis=1, keepdims=True), 1e-9)
     undone = -(touch.max(axis=1) * (weights[..., None] * steps).sum(axis=1).T).T
-    times, values = [], []
+    times = []
+    values = []
     # the first and last frame of each stance; those with less between them than a lifted foot are one
     edges = np.flatnonzero(np.diff([False, *(touch.max(axis=1) > 0), False])).reshape(-1, 2)
     apart = edges[1:, 0] - edges[:-1, 1] >= settings.lifted * fps
-    starts, stops = edges[np.r_[True, apart][: len(edges)], 0], edges[np.r_[apart, True][: len(edges)], 1]
+    starts = edges[np.r_[True, apart][: len(edges)], 0]
+    stops = edges[np.r_[apart, True][: len(edges)], 1]
     for start, stop in zip(starts, stops, strict=True):
         path = np.concatenate([np.zeros((1, 2)), np.cumsum(undone[start:stop], axis=0)])
         path -= np.median(path if settings.anchor is None else path[: round(settings.anchor * fps) + 1], axis=0)
@@ -149,7 +152,8 @@ def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
 def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, blend: float) -> Array:
     """Values (frames, 2) that are known at ``times``, go to 0 and come back in ``blend`` frames, smoothly."""
     zero = np.zeros((1, 2))
-    keys, known = [np.array([-2 * blend])], [zero]
+    keys = [np.array([-2 * blend])]
+    known = [zero]
     for time, value in zip(times, values, strict=True):
         last = keys[-1][-1]
         if time[0] - last > 2 * blend:
@@ -159,7 +163,8 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
         known.append(value)
     keys.append(keys[-1][-1:] + blend)
     known.append(zero)
-    at, of = np.concatenate(keys), np.concatenate(known)
+    at = np.concatenate(keys)
+    of = np.concatenate(known)
     frame = np.arange(frames)
     after = np.clip(np.searchsorted(at, frame, side="right"), 1, len(at) - 1)
     part = rise((frame - at[after - 1]) / (at[after] - at[after - 1]), 0, 1)[:, None]

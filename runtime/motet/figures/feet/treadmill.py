@@ -114,7 +114,8 @@ def _stays(motion: Motion, settings: TreadmillSettings) -> bool:
 
 def _strides(motion: Motion, settings: TreadmillSettings) -> bool:
     """Whether the feet of the humanoid, which stands, stride further than its root goes."""
-    points, root = sole_points(*global_transforms(motion)), local_translations(motion)[:, 0]
+    points = sole_points(*global_transforms(motion))
+    root = local_translations(motion)[:, 0]
     slid = _averaged(_slid(motion, points, settings), settings.span * motion.fps)
     went = _averaged(np.diff(root[:, [0, 2]], axis=0) * motion.fps, settings.span * motion.fps)
     speeds = np.linalg.norm(slid, axis=1)

@@ -35,7 +35,9 @@ def frame(left: Array, up: Array, upright: bool = True) -> Array:
     other = unit(other - np.sum(other * given, axis=-1, keepdims=True) * given)
     left, up = (other, given) if upright else (given, other)
     rotations = frames_last((*up.shape, 3))
-    rotations[..., 0], rotations[..., 1], rotations[..., 2] = left, up, np.cross(left, up)
+    rotations[..., 0] = left
+    rotations[..., 1] = up
+    rotations[..., 2] = np.cross(left, up)
     return rotations
 
 
@@ -45,7 +47,8 @@ def body_frame(pose: Array, body: Body, exact: bool = False) -> Array | None:
     A body stands where both legs point one way and the trunk the other, feet forward, and left is left. Axes near
     those of the coordinates, as they are in every rest pose that somebody made, are taken to be just these.
     """
-    across, up = body.to_left(pose, "UpperLeg"), body.legs_up(pose)
+    across = body.to_left(pose, "UpperLeg")
+    up = body.legs_up(pose)
     if not np.linalg.norm(across) or abs(float(np.dot(unit(across), up))) > 0.9:
         return None
     own = frame(across, up)
@@ -81,11 +84,13 @@ def alignments_of_pose(body: Body, rotations: Array, pose: Array, own: Array) ->
 
     rotations: (J, 3, 3) and pose: positions (J, 3) of the joints in that pose; own: its frame.
     """
-    joint_map, carrier = body.joint_map, body.joint_map.carrier(body.skeleton)
+    joint_map = body.joint_map
+    carrier = body.joint_map.carrier(body.skeleton)
     if joint_map.rest is None:
         turns = _found_turns(body, pose, own)
     else:
-        known, bones = joint_map.rest, (*joint_map.joints, "spine", "neck")
+        known = joint_map.rest
+        bones = (*joint_map.joints, "spine", "neck")
         turns = {bone: own @ rotvec_to_rotmat(np.radians(known.get(bone, (0.0, 0.0, 0.0)))) for bone in bones}
     wanted = {joint: turns[bone] for bone, joint in joint_map.joints.items()} | {carrier: turns["hips"]}
     wanted |= {joint: turns.get("spine", own) for joint in joint_map.spine}
@@ -105,7 +110,8 @@ def _found_turns(body: Body, pose: Array, own: Array) -> dict[str, Array]:
             if bone not in body.joints:
                 continue
             if body.aims[bone] and not bone.endswith("Toes"):
-                target, start = body.direction(pose, bone), carried @ humanoid_direction(bone)
+                target = body.direction(pose, bone)
+                start = carried @ humanoid_direction(bone)
                 if bone.endswith("Foot"):
                     carried = _foot_turn(target, own, carried)
                 elif not bone.endswith("Hand") or float(start @ target) > 0.8:
@@ -132,7 +138,8 @@ def axes_agree(body: Body, rotations: Array, positions: Array) -> bool:
 
     Other skeletons can have the same names. rotations (T, J, 3, 3) and positions (T, J, 3) are those of frames.
     """
-    joint_map, bones = body.joint_map, [bone for bone, ends in body.aims.items() if ends]
+    joint_map = body.joint_map
+    bones = [bone for bone, ends in body.aims.items() if ends]
     # joint -> where the humanoid's bone points, and where the joint's does
     seen = {body.joints[bone]: (humanoid_direction(bone), body.along(positions, bone)) for bone in bones}
     for joint, part in ((body.joints["hips"], "UpperLeg"), (joint_map.spine[-1], "UpperArm")):
@@ -166,7 +173,10 @@ class Calibration:
     """The weight of a limb's shortest turn beside its hinge, which counts by the sine of its bend."""
 
     def __init__(self, body: Body, rotations: Array, positions: Array, along_axes: bool) -> None:
-        self.body, self.rotations, self.positions, self.along_axes = body, rotations, positions, along_axes
+        self.body = body
+        self.rotations = rotations
+        self.positions = positions
+        self.along_axes = along_axes
         self.aligned = np.tile(np.eye(3), (rotations.shape[1], 1, 1))
         self._trunk()
         for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
@@ -197,17 +207,21 @@ class Calibration:
 
     def _trunk(self) -> None:
         """Hips and back: up towards the arms, the joint that carries the arms and those above: up towards the head."""
-        body, positions, spine = self.body, self.positions, self.body.joint_map.spine
+        body = self.body
+        positions = self.positions
+        spine = self.body.joint_map.spine
         legs, arms = (unit(body.to_left(positions, part)) for part in ("UpperLeg", "UpperArm"))
         above = [*body.joint_map.neck, *([body.joints["head"]] if "head" in body.joints else [])]
         back = [body.joints["hips"], *spine, *above]
-        chest, shoulders = len(spine), body.middle(positions, "UpperArm")
+        chest = len(spine)
+        shoulders = body.middle(positions, "UpperArm")
         for i, joint in enumerate(back):
             left = legs * (1 - i / chest) + arms * (i / chest) if i < chest else arms
             start = body.middle(positions, "UpperLeg") if i == 0 else positions[:, joint]
             end = shoulders if i < chest else positions[:, back[-1]]
             if i == len(back) - 1:
-                start, end = positions[:, back[max(i - 1, chest - 1)]], positions[:, joint]
+                start = positions[:, back[max(i - 1, chest - 1)]]
+                end = positions[:, joint]
             self._settle(joint, frame(left, end - start))
 
     def _leg(self, bones: list[str]) -> None:
@@ -229,7 +243,9 @@ class Calibration:
 
     def _arm(self, bones: list[str], sign: float) -> None:
         """Elbows are hinges that bend forwards with the arms out to the sides; hands are in line with the forearms."""
-        joints, body, chest = self.body.joints, self.body, self._turns(self.body.joint_map.spine[-1])
+        joints = self.body.joints
+        body = self.body
+        chest = self._turns(self.body.joint_map.spine[-1])
         if bones[0] in joints:
             self._settle(joints[bones[0]], chest)
         upper = body.direction(self.positions, bones[1])

@@ -146,9 +146,11 @@ def with_figure(motion: Motion) -> Motion:
     """The motion of an MMM file on its figure; angles of joints that the figure lacks are left out."""
     # an angle of MMM, whose x points right, y forward and z up -> the channel here, and its sign
     axes = {"x": ("rx", -1.0), "y": ("rz", 1.0), "z": ("ry", 1.0)}
-    names, columns = [], []
+    names = []
+    columns = []
     for i, channel in enumerate(motion.channels):
-        joint, axis = channel.removesuffix("_joint")[:-1], channel.removesuffix("_joint")[-1]
+        joint = channel.removesuffix("_joint")[:-1]
+        axis = channel.removesuffix("_joint")[-1]
         if channel.startswith("root."):
             names.append(channel)
             columns.append(motion.values[:, i])
@@ -175,7 +177,9 @@ def rig(name: str) -> Skeleton:
     if name not in RIGS:
         raise MotionError(f"there is no rig {name!r}; expected one of {', '.join(RIGS)}")
     content = json.loads((files("motet.figures.humanoid") / "conventions" / f"{name}.json").read_text("utf-8"))
-    known, rig, place = content["joints"], content["rig"], dict(zip(HUMANOID.names, T_POSE, strict=True))
+    known = content["joints"]
+    rig = content["rig"]
+    place = dict(zip(HUMANOID.names, T_POSE, strict=True))
     back = _shared_out([place[bone] for bone in ("hips", *SPINE)], len(known["spine"]))
     neck = _shared_out([place[bone] for bone in (SPINE[-1], *NECK)], len(known["neck"]) + 1)[:-1]
     trunk = [known["hips"][0], *known["spine"], *known["neck"]]

@@ -108,7 +108,9 @@ class Body:
     """
 
     def __init__(self, skeleton: Skeleton, joint_map: JointMap) -> None:
-        self.skeleton, self.joint_map, self.joints = skeleton, joint_map, joint_map.joints
+        self.skeleton = skeleton
+        self.joint_map = joint_map
+        self.joints = joint_map.joints
         self.aims: dict[str, tuple[int, ...]] = {}
         for limb in LIMB_BONES:
             for bone, after in zip(limb, (*limb[1:], ""), strict=True):
@@ -312,7 +314,9 @@ def _bones(
     content: dict[str, Any], sides: Sequence[str]
 ) -> tuple[dict[str, tuple[str, ...]], frozenset[str], frozenset[str]]:
     """Of each bone the plain names, all names as they are written, and the bones that only some files have."""
-    names, spelled, optional = {}, set(), set()
+    names = {}
+    spelled = set()
+    optional = set()
     for part, known in content["joints"].items():
         for side, word in [("", "")] if part in UNSIDED else zip(LEFT_RIGHT, sides, strict=True):
             written = [name.replace("{s}", word) for name in known]

@@ -198,7 +198,8 @@ def map_of(motion: Motion) -> JointMap:
 
 def map_by_tree(motion: Motion) -> JointMap:
     """The map by lengths, forks and sides; MotionError where the tree is not that of a human."""
-    tree, skeleton = _Tree(motion), skeleton_of(motion)
+    tree = _Tree(motion)
+    skeleton = skeleton_of(motion)
     frames = positions(motion) if len(motion) else skeleton.rest_positions[None]
     try:
         return _mapped(tree, frames, *tree.legs_and_arms())
@@ -220,11 +221,13 @@ def _mapped(tree: _Tree, frames: Array, legs: _Fork, arms: _Fork) -> JointMap:
     back = [joint for joint in skeleton.ancestors(arms.joint) if joint not in hips_up]
     if not back:
         raise MotionError(f"{NO_HUMAN}; there is no back between {skeleton.names[legs.joint]!r} and the arms")
-    leg_pair, arm_pair = tree.legs(legs), tree.arms(arms)
+    leg_pair = tree.legs(legs)
+    arm_pair = tree.arms(arms)
     # legs that are folded or crossed do not tell sides, as they do at rest where the figure stands there
     shown = skeleton.rest_positions[None] if _stands(skeleton.rest_positions, leg_pair, arms) else frames
     to_left = _to_left(shown, leg_pair, skeleton)
-    joints, named = {"hips": legs.joint}, False
+    joints = {"hips": legs.joint}
+    named = False
     for pair, parts, first in ((leg_pair, LEG, "UpperLeg"), (arm_pair, ARM, "UpperArm")):
         left_first, by_name = _left_first(tree, shown, to_left, [limb[first] for limb in pair])
         named = named or by_name
@@ -241,7 +244,9 @@ def _two_bones(places: list[float], ends: list[int]) -> tuple[int, int, int]:
 
     def unlike(choice: tuple[int, int, int]) -> float:
         start, middle, end = choice
-        upper, lower, first = places[middle] - places[start], places[end] - places[middle], start + 1
+        upper = places[middle] - places[start]
+        lower = places[end] - places[middle]
+        first = start + 1
         whole = upper + lower
         # a bone begins with at least .15 of its limb: hips and buttocks often have a short one before the thigh
         begins = places[first] - places[start] > 0.15 * whole > 0
@@ -256,7 +261,8 @@ def _check_straight(skeleton: Skeleton, frames: Array, joints: dict[str, int]) -
         for one, other in (*pairwise(LEG[:3]), *pairwise(ARM[1:])):
             if sided(side, other) not in joints:
                 continue
-            upper, lower = joints[sided(side, one)], joints[sided(side, other)]
+            upper = joints[sided(side, one)]
+            lower = joints[sided(side, other)]
             above = skeleton.ancestors(lower)
             within = above[: above.index(upper) + 1]
             pieces = sum(np.linalg.norm(frames[:, low] - frames[:, high], axis=-1) for low, high in pairwise(within))
@@ -277,7 +283,8 @@ def _stands(pose: Array, legs: Limbs, arms: _Fork) -> bool:
 
 def _to_left(frames: Array, legs: Limbs, skeleton: Skeleton) -> Array:
     """Directions (T, 3) to the figure's left, told from its feet."""
-    forward, up = np.zeros(frames[:, 0].shape), np.zeros(frames[:, 0].shape)
+    forward = np.zeros(frames[:, 0].shape)
+    up = np.zeros(frames[:, 0].shape)
     for leg in legs:
         ends = [*([leg["Toes"]] if "Toes" in leg else []), *skeleton.children[leg["Foot"]]]
         forward += unit(frames[:, ends[0]] - frames[:, leg["Foot"]]) if ends else 0.0

@@ -57,7 +57,8 @@ class Fitted:
     def soles(self, bones: dict[str, Array], places: Array) -> Array:
         """Points (T, P, 3) of soles from rotations (T, 3, 3) of the humanoid's feet and toes, and positions (T, J,
         3)."""
-        scale, points = self.leg / leg_length(), []
+        scale = self.leg / leg_length()
+        points = []
         for bone, height in self.heights.items():
             for x, _, z in SOLE[part_of(bone)]:
                 point = np.array([x * scale, -height, z * scale])
@@ -82,7 +83,9 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
 
 
 def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
-    skeleton, joint_map, rest = body.skeleton, body.joint_map, body.skeleton.rest_positions
+    skeleton = body.skeleton
+    joint_map = body.joint_map
+    rest = body.skeleton.rest_positions
     leg = leg_of(body, places[0] if len(places) else rest)
     stands = body_frame(rest, body)
     moving = len(places) > 1 and rests_in_motion(body)
@@ -113,13 +116,14 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
     how, confidence = ("known by the convention", 0.95) if known else ("found from the frames", 0.85)
     note = f"the rest pose is not a standing body: how the joints stand was {how}"
     if moving and not known:
-        note, confidence = (
+        note = (
             "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees; "
-            "give a file of this figure that rests in a T-pose (rest=, --rest)",
-            0.7,
+            "give a file of this figure that rests in a T-pose (rest=, --rest)"
         )
+        confidence = 0.7
     aligned = Calibration(body, rotations, places, along_axes=known or not moving).aligned
-    hips, carrier = joint_map.joints["hips"], joint_map.carrier(skeleton)
+    hips = joint_map.joints["hips"]
+    carrier = joint_map.carrier(skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
     return Fitted(body, aligned, leg, _heights(body, leg, None), None, confidence, (note,))
 
@@ -131,7 +135,8 @@ def _agreement(body: Body, pose: Array, frame: Array, points: dict[str, Array]) 
 
 def _heights(body: Body, leg: float, rise: Array | None) -> dict[str, float]:
     """Heights of feet and toes over the sole: over the lowest joint at rest (rise (J)), else as the humanoid's."""
-    scale, heights = leg / leg_length(), {}
+    scale = leg / leg_length()
+    heights = {}
     for bone in (bone for side in LEFT_RIGHT for part in SOLE if (bone := sided(side, part)) in body.joints):
         joint = body.joints[bone]
         usual = -SOLE[part_of(bone)][0][1] * scale
@@ -192,7 +197,8 @@ def height_of(fitted: Fitted) -> float:
         chain = skeleton.ancestors(joint)
         return sum(float(np.linalg.norm(skeleton.offsets[i])) for i in chain[: chain.index(hips)])
 
-    joint_map, skeleton = fitted.joint_map, fitted.body.skeleton
+    joint_map = fitted.joint_map
+    skeleton = fitted.body.skeleton
     top = "head" if "head" in joint_map.joints else "neck" if joint_map.neck else SPINE[-1]
     joint = joint_map.joints.get("head", (*joint_map.spine, *joint_map.neck)[-1])
     usual = back(HUMANOID, 0, HUMANOID.index(top))
@@ -221,7 +227,9 @@ def check_frames(body: Body, positions: Array, hinges: dict[str, Array]) -> None
     hinges: of each side the axis (T, 3) about which the knee bends, to the left, however the thigh is turned. A knee
     bends the wrong way where the pelvis says so, too: recorded thighs can be twisted by much.
     """
-    toes, wrong, bent = [], 0, 0
+    toes = []
+    wrong = 0
+    bent = 0
     left = body.to_left(positions, "UpperLeg")
     for side, hinge in hinges.items():
         bones = [bone for bone in (sided(side, part) for part in LEG[:3]) if body.aims[bone]]

@@ -187,8 +187,10 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     confidence = round(joint_map.confidence * fitted.confidence, 2)
     leg = height = None
     if unit.metres is not None:
-        leg, height = fitted.leg * unit.metres, height_of(fitted) * unit.metres
-    joints, convention = joint_map.names(skeleton), joint_map.convention
+        leg = fitted.leg * unit.metres
+        height = height_of(fitted) * unit.metres
+    joints = joint_map.names(skeleton)
+    convention = joint_map.convention
     return Humanoid(found, joints, convention, confidence, unit.metres, leg, height, tuple(notes), figure)
 
 
@@ -211,7 +213,8 @@ def grounded(motion: Motion) -> Motion:
 def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Array:
     """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those (T, J, 3, 3) and the positions
     (T, J, 3) of the figure's."""
-    joint_map, own = fitted.joint_map, product(rotations, fitted.aligned)
+    joint_map = fitted.joint_map
+    own = product(rotations, fitted.aligned)
     turned = {bone: own[:, joint] for bone, joint in joint_map.joints.items()}
     if not fitted.pelvis:
         to_legs = swing(turned["hips"][:, :, 0], fitted.body.to_left(places, "UpperLeg"))
@@ -273,7 +276,8 @@ def from_humanoid(
     x, _, z = fitted.aligned[fitted.body.joints["hips"]][:, 2]
     if ahead and np.hypot(x, z) > 0.5:  # it faces neither up nor down
         front = axis_to_rotmat("y", angle_of(x, z))
-        source, places = product(front, source), rotated(front, places)
+        source = product(front, source)
+        places = rotated(front, places)
     turned = _figure_rotations(source, fitted, skeleton, still)
     scale = fitted.leg / leg_length()
     path = places[:, HIPS].mean(axis=1) * scale - fitted.body.middle(places_of(skeleton, turned), "UpperLeg")
