@@ -10,7 +10,7 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 370
+MOST_LARGE_FUNCTIONS = 365
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 LONGEST_FILE = 800
@@ -77,23 +77,23 @@ CEILINGS = {
     "motet": 3_200,
     "motet.bench": 5_200,
     "motet.bundle": 10_000,
-    "motet.cli": 16_700,
+    "motet.cli": 16_600,
     "motet.compose": 7_400,
     "motet.corpus": 9_200,
-    "motet.decode": 4_000,
-    "motet.draw": 12_100,
-    "motet.figures": 30_500,
-    "motet.formats": 36_300,
+    "motet.decode": 3_900,
+    "motet.draw": 12_000,
+    "motet.figures": 30_400,
+    "motet.formats": 36_200,
     "motet.generate": 24_800,
     "motet.live": 5_700,
-    "motet.models": 9_000,
-    "motet.motion": 15_800,
+    "motet.models": 8_900,
+    "motet.motion": 15_700,
     "motet.papers": 7_300,
     "motet.predict": 5_400,
     "motet.representation": 9_400,
-    "motet.search": 3_600,
-    "motet.serve": 17_000,
-    "motet.steering": 36_000,
+    "motet.search": 3_500,
+    "motet.serve": 16_900,
+    "motet.steering": 35_900,
     "motet.text": 5_300,
     "motet_export": 8_700,
     "motet_train": 9_400,
