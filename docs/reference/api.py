@@ -24,17 +24,21 @@ docstrings by `python docs/reference/api.py`; [architecture.md](architecture.md)
 def page() -> str:
     """The text of docs/reference/api.md."""
     geometry = [name for name in motet.motion.__all__ if name not in motet.__all__]
+    first: dict[Any, str] = {}
     parts = [HEAD]
     for module, names in ((motet, motet.__all__), (motet.motion, geometry)):
-        parts += [f"## {module.__name__}\n", *(entry(name, getattr(module, name)) for name in names)]
+        parts += [f"## {module.__name__}\n", *(entry(name, getattr(module, name), first) for name in names)]
     return "\n".join(parts)
 
 
-def entry(name: str, found: Any) -> str:
-    """A public name: a class with its public methods and properties, a function, a module or a constant."""
+def entry(name: str, found: Any, first: dict[Any, str]) -> str:
+    """A public name: a class with its public methods and properties, a function, a module or a constant.
+
+    first: the class under which each member of a private base is described, which this adds to.
+    """
     if inspect.isclass(found):
         code = "\n".join([f"class {name}", *fields(found)])
-        return f"### {name}\n\n{described(code, found)}{''.join(members(found))}"
+        return f"### {name}\n\n{described(code, found)}{''.join(members(found, first))}"
     if inspect.isfunction(found):
         return f"### {name}\n\n{described(signature(found, name), found)}"
     return (
@@ -52,11 +56,17 @@ def fields(kind: type) -> Iterator[str]:
             yield f"    {text}"
 
 
-def members(kind: type) -> Iterator[str]:
-    """What a class gives its users, but for what it has from another class of this page."""
+def members(kind: type, first: dict[Any, str]) -> Iterator[str]:
+    """What a class gives its users, but for what it has from another class of this page; what several have from a
+    private base is described once."""
+    elsewhere: dict[str, list[str]] = {}
     for name, found in inspect.getmembers_static(kind):
         owner = next(one for one in kind.__mro__ if name in vars(one))
         if name.startswith("_") or not owner.__module__.startswith("motet") or (owner is not kind and public(owner)):
+            continue
+        place = first.setdefault((owner, name), kind.__name__)
+        if place != kind.__name__:
+            elsewhere.setdefault(place, []).append(f"`{name}`")
             continue
         if isinstance(found, property | cached_property):
             getter = found.fget if isinstance(found, property) else found.func
@@ -65,6 +75,8 @@ def members(kind: type) -> Iterator[str]:
             call = getattr(found, "__func__", found)
             if not (call.__doc__ or "").startswith("See :"):  # what it overrides is described
                 yield described(signature(call, f"{kind.__name__}.{name}"), call)
+    for place, names in elsewhere.items():
+        yield f"As of `{place}`: {', '.join(names)}.\n\n"
 
 
 def public(kind: type) -> bool:
