@@ -111,12 +111,12 @@ def test_the_text_has_a_column_for_each_generator(monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_look_up_shares_most_words_in_fewest() -> None:
-    found = LookUp(TRIALS)
-    assert found.found(STILL).name == "unheard_of"  # five words
-    assert found.found("he stands").name == "ACCAD_Male2_A1_Stand"  # one word of two, before one of three
-    assert found.found("what is it").name == "ACCAD_Male2_A9_Lie"  # "is"
-    assert found.found("xyzzy").name == "ACCAD_Male2_A1_Stand"  # nothing is shared: the shortest, and by name
-    assert found.generate(LYING, 3) is TRIALS[2].motion
+    look_up = LookUp(TRIALS)
+    assert look_up.nearest(STILL).name == "unheard_of"  # five words
+    assert look_up.nearest("he stands").name == "ACCAD_Male2_A1_Stand"  # one word of two, before one of three
+    assert look_up.nearest("what is it").name == "ACCAD_Male2_A9_Lie"  # "is"
+    assert look_up.nearest("xyzzy").name == "ACCAD_Male2_A1_Stand"  # nothing is shared: the shortest, and by name
+    assert look_up.generate(LYING, 3) is TRIALS[2].motion
     with pytest.raises(DataError, match="no trial to look up has a sentence"):
         LookUp([replace(TRIALS[0], sentences=())])
 

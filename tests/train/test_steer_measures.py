@@ -25,6 +25,7 @@ from motet_train.evaluate.steer.following import (
     Track,
     aside_errors,
     creep_errors,
+    joint_steps,
     speed_errors,
     standing,
     stretches,
@@ -33,7 +34,7 @@ from motet_train.evaluate.steer.following import (
     ways_errors,
 )
 from motet_train.evaluate.steer.players import FIGURES, reversal_figures, stick_figures
-from motet_train.evaluate.steer.report import Limits, Watch, astray, broken, frozen, leaps, turns, wandering, watched
+from motet_train.evaluate.steer.report import Limits, Watch, astray, broken, frozen, turns, wandering, watched
 
 
 def puppets(**how: Any) -> Any:
@@ -56,7 +57,9 @@ def test_a_track_is_where_the_recording_is(walk: Motion, track: Track) -> None:
     np.testing.assert_allclose(track.places[:, 0], positions(named("root_sixd").motion(walk)), atol=1e-4)
     assert len(track[5:9]) == 4
     moved = track.places - track.ground[:, :, None, [0, 2, 1]] * (1, 0, 1)
-    np.testing.assert_allclose(np.linalg.norm(moved, axis=3), np.linalg.norm(track.seen().places, axis=3), atol=1e-4)
+    np.testing.assert_allclose(
+        np.linalg.norm(moved, axis=3), np.linalg.norm(track.in_place().places, axis=3), atol=1e-4
+    )
 
 
 def test_soles_are_under_the_feet(track: Track) -> None:
@@ -176,7 +179,7 @@ def test_turns_and_leaps_are_those_of_the_bones() -> None:
     expected[BONES.index("leftLowerLeg")] = 10
     np.testing.assert_allclose(turns(track), np.broadcast_to(expected, (3, 1, len(BONES))), atol=1e-4)
     # the ankle goes along a circle around the knee, whatever the figure does over the ground
-    moved = leaps(track)
+    moved = joint_steps(track)
     assert moved[0, 0, HUMANOID.index("leftFoot")] == pytest.approx(2 * 0.42 * np.sin(np.radians(5)), abs=1e-5)
     assert moved[..., HUMANOID.index("leftLowerLeg")].max() < 1e-6
 
@@ -223,7 +226,7 @@ def test_what_breaks_is_counted(how: dict[str, Any], expected: dict[str, int]) -
 def test_figures_that_do_not_go_freeze() -> None:
     fine, slow = (watched(puppets(bend=sway, gain=gain), still_limits(), 60.0, 4) for gain in (0.5, 0.3))
     assert not frozen(fine, FPS).any()
-    told_long = (slow.since == 2 * FPS) & (slow.asked > 0.4)
+    told_long = (slow.since == 2 * FPS) & (slow.speed > 0.4)
     assert (frozen(slow, FPS) == told_long).all()
     assert told_long.sum() > 10
     # no joint moves: each figure freezes once

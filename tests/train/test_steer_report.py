@@ -27,7 +27,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.steer import following, players, told
+from motet_train.evaluate.steer import commands, following, players
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
 from motet_train.runs import Run
@@ -75,8 +75,8 @@ def report(model: SteerModel, store: Store) -> Any:
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
         patch.setattr(following, "STRAIGHT", 2.0)
-        patch.setattr(told, "SAID", ("wave",))
-        patch.setattr(told, "UNTIL", 1.0)
+        patch.setattr(commands, "SAID", ("wave",))
+        patch.setattr(commands, "UNTIL", 1.0)
         patch.setattr(players, "SECONDS", 1.0)
         return steer_report(model, Recorded.of(store), minutes=0.02, characters=3)
 

@@ -50,6 +50,7 @@ def compose_report(writer: CodesModel, seed: int = 0) -> dict[str, Report]:
 
 def _unconstrained(writer: CodesModel, moments: list[Moment], seed: int) -> Motion:
     """The prompts of a composition as a story, moved to its start."""
+    # each prompt lasts until the next one, or until the end
     sentences = []
     starts = []
     for moment in moments:
@@ -76,19 +77,22 @@ def _figures(compositions: Sequence[tuple[Motion, Sequence[Met]]]) -> Report:
     delays = [goal.late for goal in goals]
     report["late"] = {"mean": float(np.mean(delays)), "worst": max(delays)}
 
-    # quality of the motions
+    report["feet"] = _quality([motion for motion, _ in compositions])
+    return report
+
+
+def _quality(motions: Sequence[Motion]) -> dict[str, float]:
     speeds = []
     accelerations = []
     leaps = []
-    for motion, _ in compositions:
+    for motion in motions:
         points = positions(motion)
         root = points[:, 0]
         speeds.append(speed(points[:, BALLS], root, motion.fps))
         accelerations.append(acceleration(points, root, motion.fps))
         leaps.append(leap(motion))
-    report["feet"] = {
+    return {
         "speed": float(np.nanmean(speeds)),
         "tremble": float(np.mean(accelerations)),
         "leap": max(leaps),
     }
-    return report

@@ -111,9 +111,9 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
 
     A panel ends slightly above the largest error of all but constant velocity, which soon leaves it.
     """
-    names = list(next(iter(errors.values())))
-    looks = looks_of(names)
+    looks = looks_of(list(next(iter(errors.values()))))
     legend_outside = len(looks) > 4  # more names do not fit into a panel
+    # at most three panels in a row, and a legend in the first one or beside them
     columns = min(3, len(errors))
     rows = -(-len(errors) // columns)
     width = 4.2 * columns + (2.6 if legend_outside else 0)
@@ -122,12 +122,8 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
         unused.remove()
 
     for axis, (title, systems) in zip(axes, errors.items(), strict=False):
-        for name, error in systems.items():
-            milliseconds = (np.arange(len(error)) + 1) / fps * 1000
-            axis.plot(milliseconds, error, label=name, **looks[name])
-        bounded = [error for name, error in systems.items() if not name.startswith(CONSTANT)]
-        highest = max(float(error.max()) for error in bounded or systems.values())
-        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, 1.1 * highest))
+        _plot(axis, systems, fps, looks)
+        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, 1.1 * _highest(systems)))
 
     if legend_outside:
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right upper")
@@ -136,9 +132,23 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
     return figure
 
 
+def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Mapping[str, Mapping[str, Any]]) -> None:
+    """Plot errors (N,) against the true time."""
+    for name, error in systems.items():
+        milliseconds = (np.arange(len(error)) + 1) / fps * 1000
+        axis.plot(milliseconds, error, label=name, **looks[name])
+
+
+def _highest(systems: Mapping[str, Array]) -> float:
+    """The largest error of all but constant velocity, or of all if there is nothing else."""
+    others = [error for name, error in systems.items() if not name.startswith(CONSTANT)]
+    return max(float(error.max()) for error in others or systems.values())
+
+
 def looks_of(names: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Colour and style of each system's line: floors are grey; line styles change once the ten colours are used up."""
     styles = ("-", "--", ":", "-.", (0, (1, 3)))
+    # floors stand back behind what is compared
     floors = [name for name in names if name in FLOORS]
     others = [name for name in names if name not in FLOORS]
     looks: dict[str, dict[str, Any]] = {}

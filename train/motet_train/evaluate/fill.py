@@ -80,16 +80,13 @@ def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
 
 
 def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
+    # what was recorded: which feet stand, and across which gaps the figure travels
     recorded = _places(joints, windows, [window.truth for window in windows])
-    recorded_jerk = jerk(recorded, fps)
     stands = _standing_feet(recorded, fps)
+    going = _going(windows, fps)
+    figures = {"gaps": float(len(windows)), "gaps_going": float(going.sum()), "jerk_recorded": jerk(recorded, fps)}
 
-    # gaps across which the figure travels
-    crossings = np.array([(window.after[0] - window.past[-1])[[0, 2]] for window in windows])
-    steps_across = len(windows[0].truth) + 1
-    going = length(crossings) * fps / steps_across > 0.5
-
-    figures = {"gaps": float(len(windows)), "gaps_going": float(going.sum()), "jerk_recorded": recorded_jerk}
+    # every system, relative to the recording
     for name, fill in systems.items():
         filled = [fill(window.past, window.after, len(window.truth)) for window in windows]
         places = _places(joints, windows, filled)
@@ -98,11 +95,20 @@ def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Wind
         figures[f"cm{suffix}"] = 100 * float(errors.mean())
         figures[f"cm_going{suffix}"] = 100 * float(errors[going].mean()) if going.any() else np.nan
         figures[f"slide{suffix}"] = _slide(places, stands, fps)
-        figures[f"jerk{suffix}"] = jerk(places, fps) / recorded_jerk
+        figures[f"jerk{suffix}"] = jerk(places, fps) / figures["jerk_recorded"]
+
     figures["slide_recorded"] = _slide(recorded, stands, fps)
     figures["of_interpolation"] = figures["cm"] / figures["cm_interpolation"]
     figures["of_interpolation_going"] = figures["cm_going"] / figures["cm_going_interpolation"]
     return figures
+
+
+def _going(windows: list[Window], fps: float) -> Flags:
+    """Whether the figure travels across each gap (W,)."""
+    crossings = np.array([(window.after[0] - window.past[-1])[[0, 2]] for window in windows])
+    frames_across = len(windows[0].truth) + 1
+    speeds = length(crossings) * fps / frames_across
+    return speeds > 0.5
 
 
 def _standing_feet(places: Array, fps: float) -> Flags:

@@ -59,6 +59,16 @@ def arrival(inside: Flags, fps: float) -> Array:
 
 def stances(points: Array, root: Array, fps: float) -> list[Array]:
     """The positions (N, 3) of a point in each stance, for all points (T, K, 3) of a figure with its root at (T, 3)."""
+    runs = []
+    for point, flags in enumerate(standing_points(points, root, fps).T):
+        for start, stop in spells(flags):
+            if stop - start >= 0.1 * fps:
+                runs.append(points[start:stop, point])
+    return runs
+
+
+def standing_points(points: Array, root: Array, fps: float) -> Flags:
+    """Whether points (T, K, 3) of a figure with its root at (T, 3) stand (T, K)."""
     smooth_points = smoothed(points, 0.05, fps)
     smooth_root = smoothed(root[:, None], 0.05, fps)
 
@@ -70,14 +80,7 @@ def stances(points: Array, root: Array, fps: float) -> list[Array]:
     root_step = np.gradient(smooth_root, axis=0)
     step_ahead = np.gradient(smooth_points, axis=0) - root_step / 2
     forward = (step_ahead[..., [0, 2]] * root_step[..., [0, 2]]).sum(axis=-1)
-    stands = standing(heights, forward, ContactSettings(heights=(0.03, 0.03), speeds=(0.0, 0.0)))
-
-    long_enough = []
-    for point, flags in enumerate(stands.T):
-        for start, stop in spells(flags):
-            if stop - start >= 0.1 * fps:
-                long_enough.append(points[start:stop, point])
-    return long_enough
+    return standing(heights, forward, ContactSettings(heights=(0.03, 0.03), speeds=(0.0, 0.0)))
 
 
 def slides(stances: Iterable[Array]) -> Array:

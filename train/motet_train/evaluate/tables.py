@@ -40,8 +40,11 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
     left: the left-aligned columns; all others are right-aligned.
     """
     table_rows = [row for row in rows if len(row) > 1]
+    # the width of each column
     columns = zip_longest(*table_rows, fillvalue="")
     widths = [max(map(len, cells)) for cells in columns]
+
+    # cells padded to it
     lines = []
     for row in rows:
         if len(row) > 1:
@@ -60,6 +63,7 @@ def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[st
 
     beside: further columns, to which goals do not apply.
     """
+    # the names of reports are shortened, those beside them are heads already
     others = beside or {}
     columns = [*reports.values(), *others.values()]
     rows = [["", *short_names(list(reports)), *others, ""]]

@@ -59,13 +59,10 @@ def _action_figures(model: DescribeModel, shown: list[Shown], descriptions: list
     probabilities = np.array([description.probability for description in descriptions])
     empty = np.array([description.text == NOTHING for description in descriptions])
 
-    # a model that answers with known sentences can reach only their actions
-    sayable = {named(text) for text in (model.known.sentences if model.known else ())}
-    reachable = np.array([any(map(actions.right_kinds, sayable)) for actions in shown])
     return {
         "of": float(len(shown)),
         "right": share(right),
-        "reachable": share(reachable) if sayable else np.nan,
+        "reachable": _reachable(model, shown),
         "sure": share(sure),
         "right_if_sure": share(right[sure]),
         "wrong_if_sure": share(~right[sure]),
@@ -73,6 +70,14 @@ def _action_figures(model: DescribeModel, shown: list[Shown], descriptions: list
         "calibration_error": calibration_error(probabilities, right),
         "calibration_by_chance": error_by_chance(probabilities),
     }
+
+
+def _reachable(model: DescribeModel, shown: list[Shown]) -> float:
+    """The share of motions that some known sentence of a model describes correctly; NaN for a model without any."""
+    known_kinds = {named(text) for text in (model.known.sentences if model.known else ())}
+    if not known_kinds:
+        return np.nan
+    return share(np.array([any(map(actions.right_kinds, known_kinds)) for actions in shown]))
 
 
 def _looked_up(references: Sequence[Sequence[str]], shown: list[Shown]) -> float:
@@ -95,6 +100,7 @@ def _turns(corpus: SplitStore, records: Sequence[int], descriptions: Sequence[De
         agreed_side = common_side([sentence for sentence in sentences if turning(sentence)])
         if agreed_side is None:
             continue
+        # half of the sentences have to mention a turn to this side
         turns = [sentence for sentence in sentences if side(sentence) == {agreed_side} and "turn" in sentence]
         if 2 * len(turns) >= len(sentences):
             mentioned.append(side(description.text) == {agreed_side})
@@ -108,21 +114,19 @@ def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int], 
     usable = [record for record in records if fits_timeline(corpus.motion(record))]
     if len(usable) < CHAIN:
         return {}
+    # the same chains for every model
     random = np.random.default_rng(0)
     chains = [random.choice(usable, CHAIN, replace=False).tolist() for _ in range(count)]
     described = timelines_of(model, corpus, chains, within=0.5)
     shown = {record: _shown(corpus, record) for record in usable}
     right = [shown[record].right(part.text) for record, part in described.moments]
-    return {
-        "time_right": share(np.array(right)),
-        "joins_found": described.joins_found / ((CHAIN - 1) * count),
-        "cuts_right": described.joins_found / described.cuts if described.cuts else np.nan,
-    }
+    return {"time_right": share(np.array(right)), **described.cut_shares(count)}
 
 
 def calibration_error(probability: NDArray[np.float64], right: Truths) -> float:
     """The expected calibration error (Guo et al. 2017): the mean distance between probability (N,) and share of right
     ones over tenths of the probability, weighted by their size."""
+    # equal bins of the probability
     bins = np.minimum((probability * BINS).astype(int), BINS - 1)
     errors = [abs(probability[bins == number].sum() - right[bins == number].sum()) for number in range(BINS)]
     return float(sum(errors) / len(right))
@@ -130,5 +134,6 @@ def calibration_error(probability: NDArray[np.float64], right: Truths) -> float:
 
 def error_by_chance(probability: NDArray[np.float64], times: int = 1000) -> float:
     """The mean calibration error of perfectly calibrated probabilities (N,), due to the small number of motions."""
+    # outcomes drawn with these very probabilities
     drawn = np.random.default_rng(0).random((times, len(probability))) < probability
     return float(np.mean([calibration_error(probability, right) for right in drawn]))

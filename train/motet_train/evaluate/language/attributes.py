@@ -55,6 +55,7 @@ def turning(sentence: str) -> bool:
 
 def common(attributes: Sequence[frozenset[str]]) -> frozenset[str]:
     """The attributes that at least half of a motion's sentences mention, by those of each sentence."""
+    # how many sentences mention each attribute
     every: frozenset[str] = frozenset().union(*attributes)
     counts = {name: sum(name in mentions for mentions in attributes) for name in every}
     return frozenset(name for name in every if 2 * counts[name] >= len(attributes))
@@ -73,6 +74,7 @@ def common_side(sentences: Sequence[str]) -> str | None:
 
 def common_turning(sentences: Sequence[str]) -> bool | None:
     """Whether half of the sentences say that a walk or run turns; None for anything but walking and running."""
+    # jumps and everything else have no path to speak of
     verbs = common_verbs(sentences)
     if not verbs or verbs - {"walk", "run"}:
         return None
@@ -85,6 +87,11 @@ def action_right(text: str, sentences: Sequence[str]) -> bool:
     return bool(actions) and actions <= mentioned(ACTIONS, *sentences)
 
 
+def _verbs_right(text: str, agreed: frozenset[str], sentences: Sequence[str]) -> bool:
+    verbs = mentioned(VERBS, text)
+    return bool(verbs & agreed) and verbs <= mentioned(VERBS, *sentences)
+
+
 def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) -> dict[str, float]:
     """The shares of hypotheses that are right, NaN without any, and their numbers with the suffix "_of".
 
@@ -93,17 +100,12 @@ def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) 
     """
     right: dict[str, list[bool]] = {"verbs": [], "sides": [], "turns": []}
     for text, sentences in zip(hypotheses, references, strict=True):
-        agreed_verbs = common_verbs(sentences)
-        if agreed_verbs:
-            verbs = mentioned(VERBS, text)
-            right["verbs"].append(bool(verbs & agreed_verbs) and verbs <= mentioned(VERBS, *sentences))
-        agreed_side = common_side(sentences)
-        if agreed_side:
+        # each attribute counts only where people agree on it
+        if agreed_verbs := common_verbs(sentences):
+            right["verbs"].append(_verbs_right(text, agreed_verbs, sentences))
+        if agreed_side := common_side(sentences):
             right["sides"].append(side(text) == {agreed_side})
-        agreed_turning = common_turning(sentences)
-        if agreed_turning is not None:
+        if (agreed_turning := common_turning(sentences)) is not None:
             right["turns"].append(turning(text) == agreed_turning)
-
     shares = {key: sum(flags) / len(flags) if flags else np.nan for key, flags in right.items()}
-    counts = {f"{key}_of": float(len(flags)) for key, flags in right.items()}
-    return shares | counts
+    return shares | {f"{key}_of": float(len(flags)) for key, flags in right.items()}

@@ -70,6 +70,8 @@ def calibrated(scores: NDArray[np.float64], right: Truths) -> ConfidenceSettings
     order = np.argsort(scores, kind="stable")
     gains = np.where(right[order], 1, -1)
     gains_above = np.append(np.cumsum(gains[::-1])[::-1], 0)
+
+    # between the last rejected and the first accepted one
     best = int(gains_above.argmax())
     bounds = [2 * scores[order[0]], *scores[order], 0.0]
     limit = float(bounds[best] + bounds[best + 1]) / 2
@@ -91,6 +93,13 @@ class Timelines(NamedTuple):
     cuts: int
     moments: list[Moment]
 
+    def cut_shares(self, count: int) -> dict[str, float]:
+        """The shares of joins in ``count`` timelines with a cut, and of cuts with a join."""
+        return {
+            "joins_found": self.joins_found / (count * (CHAIN - 1)),
+            "cuts_right": self.joins_found / self.cuts if self.cuts else np.nan,
+        }
+
 
 def timelines_of(model: DescribeModel, corpus: SplitStore, chains: Iterable[Sequence[int]], within: float) -> Timelines:
     """Describe chains of records as timelines. within: seconds between a join and a cut that finds it."""
@@ -100,9 +109,12 @@ def timelines_of(model: DescribeModel, corpus: SplitStore, chains: Iterable[Sequ
     for chain in chains:
         motions = corpus.motions(chain)
         parts = model.timeline(joined(motions))
+        # joins that cuts have found
         ends = np.cumsum([motion.duration for motion in motions])
         joins_found += matched(ends[:-1].tolist(), [part.start for part in parts[1:]], within)
         cuts += len(parts) - 1
+
+        # what goes on in every tenth of a second, and what is said about it
         for time in np.arange(0.05, ends[-1], 0.1):
             place = min(int(np.searchsorted(ends, time)), len(chain) - 1)
             part = next((part for part in parts if time < part.stop), parts[-1])
@@ -124,26 +136,20 @@ def timeline_figures(
     others = _others(corpus, records)
     if not others:
         return {}
+    # described as timelines, and each motion alone
     random = np.random.default_rng(seed)
     chains = [_chain(others, random) for _ in range(count)]
     timelines = timelines_of(model, corpus, chains, within=1.0)
-    right = []
-    sure = []
-    for record, part in timelines.moments:
-        right.append(action_right(part.text, corpus.sentences(record)))
-        sure.append(part.confident)
-    alone: list[bool] = []
-    for chain in chains:
-        alone += judged(model, corpus, chain)[1].tolist()
-    cuts = timelines.cuts
+    right = np.array([action_right(part.text, corpus.sentences(record)) for record, part in timelines.moments])
+    sure = np.array([part.confident for _, part in timelines.moments])
+    alone = np.concatenate([judged(model, corpus, chain)[1] for chain in chains])
     return {
-        "joins_found": timelines.joins_found / (count * (CHAIN - 1)),
-        "cuts_right": timelines.joins_found / cuts if cuts else np.nan,
-        "parts": cuts / count + 1,
-        "time_right": share(np.array(right)),
-        "time_confident": share(np.array(sure)),
-        "time_right_if_confident": share(np.array(right)[sure]),
-        "alone_right": share(np.array(alone)),
+        **timelines.cut_shares(count),
+        "parts": timelines.cuts / count + 1,
+        "time_right": share(right),
+        "time_confident": share(sure),
+        "time_right_if_confident": share(right[sure]),
+        "alone_right": share(alone),
     }
 
 
@@ -154,6 +160,7 @@ def fits_timeline(motion: Motion) -> bool:
 
 def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence[tuple[str, int]]]:
     """For each record the records of other actions, once for each of their actions, with the action."""
+    # the actions in any sentence about a record, and those that half of its sentences agree on
     mentioned_actions: dict[int, frozenset[str]] = {}
     agreed_actions: dict[int, frozenset[str]] = {}
     for record in records:
@@ -162,12 +169,13 @@ def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence
         if fits_timeline(corpus.motion(record)):
             agreed_actions[record] = common(actions)
 
-    others: dict[int, list[tuple[str, int]]] = {}
+    # neighbours differ if no sentence about one mentions what people agree on in the other
+    others = {}
     for record, agreed in agreed_actions.items():
         rest = []
         for other, other_agreed in agreed_actions.items():
-            differ = agreed.isdisjoint(mentioned_actions[other]) and other_agreed.isdisjoint(mentioned_actions[record])
-            if differ:
+            clear = agreed.isdisjoint(mentioned_actions[other])
+            if clear and other_agreed.isdisjoint(mentioned_actions[record]):
                 rest += [(action, other) for action in sorted(other_agreed)]
         if agreed and rest:
             others[record] = rest
@@ -178,6 +186,7 @@ def _chain(others: Mapping[int, Sequence[tuple[str, int]]], random: np.random.Ge
     """Three records in a row: each action is drawn before its motion, so that rare ones are as frequent."""
     chain = [int(random.choice(list(others)))]
     while len(chain) < CHAIN:
+        # one of the actions that differ from the last motion's, then a motion of it
         candidates = others[chain[-1]]
         actions = sorted({action for action, _ in candidates})
         drawn = actions[random.integers(len(actions))]
@@ -192,6 +201,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
 
 def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) -> int:
     """How many joins have a cut of their own within a time in seconds, matched nearest first."""
+    # the nearest pairs first, each join and cut once
     pairs = sorted((abs(join - cut), join, cut) for join in joins for cut in cuts)
     free_joins = set(joins)
     free_cuts = set(cuts)

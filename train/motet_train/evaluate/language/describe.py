@@ -44,6 +44,7 @@ def bleu(hypotheses: Sequence[str], references: References, marks: bool = False,
     form = f"{SOS} {{}} {EOS}" if marks else "{}"
     texts = [form.format(plain(hypothesis)) for hypothesis in hypotheses]
     marked = [[form.format(sentence) for sentence in sentences] for sentences in references]
+    # sacrebleu takes the first references of all motions, then the second ones
     streams = [list(stream) for stream in zip_longest(*marked)]
     metric = BLEU(smooth_method="none", tokenize="none", force=True, max_ngram_order=longest)
     score: float = metric.corpus_score(texts, streams).score
@@ -80,6 +81,7 @@ def agreement(references: References) -> float:
     weights = []
     for place in range(max(map(len, several))):
         rows = [sentences for sentences in several if len(sentences) > place]
+        # each motion with a sentence at this place, against its other sentences
         hypotheses = [sentences[place] for sentences in rows]
         others = [[*sentences[:place], *sentences[place + 1 :]] for sentences in rows]
         scores.append(bleu(hypotheses, others))
@@ -125,6 +127,7 @@ def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
         for sentence in corpus.sentences(record):
             records.append(record)
             train_sentences.append(sentence)
+    # cosines between all sentences and those of training
     vectors = TfidfVectorizer(token_pattern=r"\S+")
     table = vectors.fit_transform(train_sentences)
     similarities = (vectors.transform(sentences) @ table.T).toarray()
@@ -145,25 +148,27 @@ def describe_report(model: DescribeModel, corpus: SplitStore) -> Report:
 
 
 def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
+    # table 2
     train = corpus.described(corpus.parts.train, 200)
     test = corpus.described(corpus.parts.test)
-    train_scores, _ = _table_2(model, corpus, "train", train)
-    yield train_scores
-    test_scores, hypotheses = _table_2(model, corpus, "test", test)
-    yield test_scores
-
+    yield _table_2("train", _hypotheses(model, corpus, train), corpus.references(train))
+    hypotheses = _hypotheses(model, corpus, test)
     references = corpus.references(test)
+    yield _table_2("test", hypotheses, references)
+
+    # the same on references that are not in training
     copied = corpus.references(nearest_motions(corpus, corpus.motions(test)))
     yield _unseen(hypotheses, copied, references, corpus.unseen(test))
 
+    # the best description of each motion against the floors
     best = [row[0] for row in hypotheses]
+    score = bleu(best, references)
     floors = {
         "nearest": copied_bleu(copied, references),
         "frequent": bleu([frequent_sentence(corpus)] * len(references), references),
-        "human": agreement(references),
     }
-    score = bleu(best, references)
-    yield {"floor": floors, "gain": {key: score - floors[key] for key in ("nearest", "frequent")}}
+    gains = {key: score - floor for key, floor in floors.items()}
+    yield {"floor": {**floors, "human": agreement(references)}, "gain": gains}
     yield {"words": words_right(best, references), "likelihood": {"test": _log_probability(model, corpus, test)}}
 
     validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
@@ -172,19 +177,18 @@ def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
         yield {"timeline": timeline_figures(model, corpus, validation)}
 
 
-def _table_2(
-    model: DescribeModel, corpus: SplitStore, part: str, records: Sequence[int]
-) -> tuple[Report, list[list[str]]]:
-    """The rows of table 2 for a part of the data, and the hypotheses of each of its motions."""
-    hypotheses = []
-    for row in model.describe(corpus.motions(records), RANKS):
-        hypotheses.append([description.text for description in row])
-    references = corpus.references(records)
-    scores = {
+def _hypotheses(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> list[list[str]]:
+    """The ranked descriptions of each record."""
+    rows = model.describe(corpus.motions(records), RANKS)
+    return [[description.text for description in row] for row in rows]
+
+
+def _table_2(part: str, hypotheses: list[list[str]], references: References) -> Report:
+    """The rows of table 2 for a part of the data."""
+    return {
         f"bleu_{part}": ranks(hypotheses, references),
         f"bleu_{part}_marked": ranks(hypotheses, references, marks=True),
     }
-    return scores, hypotheses
 
 
 def _unseen(hypotheses: list[list[str]], copied: References, references: References, unseen: References) -> Report:
@@ -197,16 +201,24 @@ def _unseen(hypotheses: list[list[str]], copied: References, references: Referen
         "test_motions_unseen": float(len(motions)),
     }
     if not motions:
-        ranks_without = {str(rank + 1): np.nan for rank in range(RANKS)}
-        return {"wording": wording, "bleu_unseen": ranks_without}
-
-    unseen_references = [unseen[i] for i in motions]
+        return {"wording": wording, "bleu_unseen": {str(rank + 1): np.nan for rank in range(RANKS)}}
+    # only motions with unseen references count
     rows = [hypotheses[i] for i in motions]
-    best = [row[0] for row in rows]
     nearest = [copied[i] for i in motions]
-    scores = {f"bleu_{n}": bleu(best, unseen_references, longest=n) for n in ORDERS}
-    floors = {f"nearest_{n}": copied_bleu(nearest, unseen_references, n) for n in ORDERS}
-    return {"wording": wording, "bleu_unseen": ranks(rows, unseen_references), "unseen": scores | floors}
+    rows_unseen = [unseen[i] for i in motions]
+    return {
+        "wording": wording,
+        "bleu_unseen": ranks(rows, rows_unseen),
+        "unseen": _by_order(rows, nearest, rows_unseen),
+    }
+
+
+def _by_order(hypotheses: list[list[str]], copied: References, references: References) -> dict[str, float]:
+    """BLEU of the first hypotheses, and of copying, for n-grams of each length."""
+    best = [row[0] for row in hypotheses]
+    scores = {f"bleu_{n}": bleu(best, references, longest=n) for n in ORDERS}
+    floors = {f"nearest_{n}": copied_bleu(copied, references, n) for n in ORDERS}
+    return scores | floors
 
 
 def _log_probability(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> float:

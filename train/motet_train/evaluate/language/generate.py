@@ -47,10 +47,12 @@ def generate_report(model: GenerateModel, corpus: SplitStore, describe: Describe
 def _generated(model: GenerateModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
     test = corpus.described(corpus.parts.test)
     train = corpus.described(corpus.parts.train, 40)
+    # the chain from sentences to motions and back
     test_answers = answers(model, corpus, test)
     if describe is not None:
         yield _chain(describe, corpus, {"train": answers(model, corpus, train), "test": test_answers})
 
+    # whether motions do what sentences say, by thresholds from the training motions
     travels = kinds(corpus)
     limits = thresholds(travels)
     quiet = quiet_energy(corpus.motions(corpus.parts.train), corpus.contract)
@@ -58,6 +60,7 @@ def _generated(model: GenerateModel, corpus: SplitStore, describe: DescribeModel
     if measurable(limits):
         yield {"asked": prompted(model, limits), "asked_data": recognised(travels, limits)}
 
+    # measures of the motions themselves
     generated = [row[0].features for row in test_answers.rows]
     recorded = corpus.motions(test_answers.records)
     yield {"motion": measures(generated, corpus.contract, quiet)}
@@ -142,9 +145,11 @@ def best_descriptions(describe: DescribeModel, motions: Sequence[Motion]) -> lis
 def _chain(describe: DescribeModel, corpus: SplitStore, answers: Mapping[str, Answers]) -> Report:
     train = corpus.described(corpus.parts.train, 200)
     train_bleu = bleu(best_descriptions(describe, corpus.motions(train)), corpus.references(train))
+    # absolute scores, and those of recorded motions
     rows = {part: chained(describe, part_answers, corpus) for part, part_answers in answers.items()}
     bounds = bounds_chained(describe, answers["test"], corpus)
 
+    # relative to the describe model on its own training motions
     report: Report = {f"chain_{part}": row for part, row in rows.items()}
     for part, row in rows.items():
         report[f"relative_{part}"] = {rank: _relative(score, train_bleu) for rank, score in row.items()}
@@ -225,6 +230,7 @@ ASKED: Mapping[str, KindPrompt] = {
 def travel(motion: Motion) -> Travel:
     """How a motion with the root block moves; the velocities of its first frame repeat the second and do not count."""
     block = motion.select(ROOT_BLOCK, ROOT_BLOCK_UNITS).values
+    # the first frame has no velocity of its own
     steps = block[1:]
     height = block[:, 3]
     speed = float(np.median(steps[:, 0])) if len(steps) else 0.0
@@ -246,6 +252,7 @@ def kinds(corpus: SplitStore) -> dict[str, list[Travel]]:
         verbs = common_verbs(sentences)
         turning = common_turning(sentences)
         side = common_side(sentences)
+        # a single verb, and straight on or a turn to one side
         record_kinds = [f"{verb}s" for verb in verbs] if len(verbs) == 1 else []
         if turning is False:
             record_kinds.append("straight")
@@ -263,6 +270,7 @@ def thresholds(travels: Mapping[str, Sequence[Travel]]) -> dict[str, float]:
     walks and of runs. turn: degrees, half-way between the median turns of straight and of turning motions. rise: m,
     half-way between the median rises of walks and of jumps.
     """
+    # the figures of each kind, on both sides of a threshold
     walks = travels["walks"]
     walk_speeds = [walk.speed for walk in walks]
     run_speeds = [run.speed for run in travels["runs"]]

@@ -23,6 +23,7 @@ def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) 
     frozen: the share whose last second has less energy than ``quiet``, see :func:`energy`. Speed and skate are left out
     if the motions have no root block or no skeleton.
     """
+    # frames in standard deviations of the training motions
     frames = [contract.normalised(contract.frames(motion)) for motion in motions]
     end_energies = [last_energy(z, contract.fps) for z in frames]
     means = {
@@ -31,6 +32,7 @@ def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) 
         "end_energy": np.mean(end_energies),
         "frozen": np.mean(np.array(end_energies) < quiet),
     }
+    # what needs to know the path over the ground
     if moves(motions[0]):
         means["speed"] = np.mean([speed(motion) for motion in motions])
         slides = [slide for slide in map(skate, motions) if np.isfinite(slide)]
@@ -72,6 +74,7 @@ def speed(motion: Motion) -> float:
 
 def skate(motion: Motion) -> float:
     """How fast foot joints at most 5 cm above the ground slide, m/s, by the slowest of several. NaN if none ever is."""
+    # feet in metres, above their own ground
     skeleton = skeleton_of(motion)
     feet = positions(from_root_block(motion))[:, feet_of(skeleton)] * skeleton.unit_factor(1.0)
     heights = feet[..., 1] - ground_of(feet[..., 1])
@@ -113,6 +116,7 @@ class Looks:
         """Mean (F,) and scale (F,) of the features; differences below .001 do not count."""
         motions = self.corpus.motions(self.corpus.parts.train)
         statistics = self._statistics(motions)
+        # an array of many features has as much weight as one of few
         sizes = [frames.shape[1] for frames in self.arrays(motions[0])]
         weights = np.repeat(1 / np.sqrt(sizes), [2 * size for size in sizes])
         deviations = np.maximum(statistics.std(axis=0), 1e-3)

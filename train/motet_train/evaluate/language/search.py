@@ -1,6 +1,7 @@
 """How well a search model finds motions by sentences that were not in training, and by motions."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -39,46 +40,30 @@ def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeMode
 
 
 def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
-    parts = corpus.parts
-    rows, sentences = _queries(corpus, parts.test)
     groups = _description_groups(corpus)
-    test_groups = groups[list(parts.test)]
-    train_groups = groups[list(parts.train)]
-    takes = _takes(corpus, parts.test)
+    train_groups = groups[list(corpus.parts.train)]
+    queries = _TestQueries.of(corpus, groups)
+    yield {"asked": queries.figures(train_groups)}
 
-    def ranked(prefix: str, order: NDArray[np.intp]) -> Report:
-        """Ranks of each sentence's motion and of those described alike. order: (Q, N) test motions, best first."""
-        return {
-            f"{prefix}text": _ranks(takes[order] == takes[rows][:, None]),
-            f"{prefix}text_alike": _ranks(test_groups[order] == test_groups[rows][:, None]),
-        }
-
-    yield {"asked": _query_figures(test_groups[rows], test_groups, train_groups)}
-
-    # the model itself
-    index = _index(model, corpus, parts.test)
-    with unknown_words_allowed():
-        hits = [index.search(sentence, len(index.members)) for sentence in sentences]
-    yield ranked("", np.array([_places(row) for row in hits]))
-
-    # the floor: by words to a training motion, from there by features
+    # motions by sentences: the model, the floor (by words to a training motion, from there by features), and likelihood
+    test_motions = corpus.motions(corpus.parts.test)
+    yield queries.ranks("", _orders(model, corpus, queries.sentences))
     looks = Looks(corpus)
-    query_features = looks.features(corpus.motions(retrieved(corpus, sentences)))
-    test_features = looks.features(corpus.motions(parts.test))
-    train_features = looks.features(corpus.motions(parts.train))
-    yield ranked("words_", cdist(query_features, test_features).argsort(axis=1, kind="stable"))
-
+    query_features = looks.features(corpus.motions(retrieved(corpus, queries.sentences)))
+    test_features = looks.features(test_motions)
+    yield queries.ranks("words_", cdist(query_features, test_features).argsort(axis=1, kind="stable"))
     if describe is not None:
-        scores = _likelihoods(describe, corpus.motions(parts.test), sentences)
-        yield ranked("likelihood_", (-scores).argsort(axis=1, kind="stable"))
+        scores = _likelihoods(describe, test_motions, queries.sentences)
+        yield queries.ranks("likelihood_", (-scores).argsort(axis=1, kind="stable"))
 
     # motions by motions
-    index = _index(model, corpus, parts.train)
-    by_model = [_places(index.search(motion, 1))[0] for motion in corpus.motions(parts.test)]
+    index = _index(model, corpus, corpus.parts.train)
+    by_model = [_places(index.search(motion, 1))[0] for motion in test_motions]
+    train_features = looks.features(corpus.motions(corpus.parts.train))
     by_features = cdist(test_features, train_features).argmin(axis=1)
     yield {"like": _likeness(model, corpus, groups)}
     nearest_groups = {"alike": train_groups[by_model], "features_alike": train_groups[by_features]}
-    yield {"motion": _shares(nearest_groups, test_groups, train_groups)}
+    yield {"motion": _shares(nearest_groups, queries.groups, train_groups)}
 
 
 def _description_groups(corpus: SplitStore) -> Numbers:
@@ -89,20 +74,51 @@ def _description_groups(corpus: SplitStore) -> Numbers:
     return np.array(alike(descriptions))
 
 
-def _takes(corpus: SplitStore, part: Sequence[int]) -> NDArray[np.str_]:
-    """The take of each motion of a part; pieces of one take count as the same motion."""
-    entries = [corpus.store.records[record] for record in part]
-    return np.array([entry.take or entry.name for entry in entries])
+@dataclass(frozen=True, eq=False)
+class _TestQueries:
+    """Q sentences that search among the N test motions. rows: each sentence's own motion.
+
+    takes, groups: of the test motions; pieces of one take count as the same motion, those of one group as alike.
+    """
+
+    sentences: list[str]
+    rows: list[int]
+    takes: NDArray[np.str_]
+    groups: Numbers
+
+    @staticmethod
+    def of(corpus: SplitStore, groups: Numbers) -> "_TestQueries":
+        """Those of a corpus. groups: of all its records."""
+        test = corpus.parts.test
+        rows, sentences = _queries(corpus, test)
+        entries = [corpus.store.records[record] for record in test]
+        takes = np.array([entry.take or entry.name for entry in entries])
+        return _TestQueries(sentences, rows, takes, groups[list(test)])
+
+    def figures(self, train_groups: Numbers) -> dict[str, float]:
+        """The number of sentences, the share with a known subject, and the best "first_5"."""
+        query_groups = self.groups[self.rows]
+        motions_alike = (query_groups[:, None] == self.groups).sum(axis=1)
+        return {
+            "sentences": float(len(self.rows)),
+            "known": float(np.isin(query_groups, train_groups).mean()),
+            "best_5": float(np.minimum(1, 5 / motions_alike).mean()),
+        }
+
+    def ranks(self, prefix: str, order: NDArray[np.intp]) -> Report:
+        """Ranks of each sentence's motion and of those alike. order: (Q, N) test motions, best first."""
+        return {
+            f"{prefix}text": _ranks(self.takes[order] == self.takes[self.rows][:, None]),
+            f"{prefix}text_alike": _ranks(self.groups[order] == self.groups[self.rows][:, None]),
+        }
 
 
-def _query_figures(query_groups: Numbers, test_groups: Numbers, train_groups: Numbers) -> dict[str, float]:
-    """The number of sentences, the share with a known subject, and the best "first_5"."""
-    motions_alike = (query_groups[:, None] == test_groups).sum(axis=1)
-    return {
-        "sentences": float(len(query_groups)),
-        "known": float(np.isin(query_groups, train_groups).mean()),
-        "best_5": float(np.minimum(1, 5 / motions_alike).mean()),
-    }
+def _orders(model: SearchModel, corpus: SplitStore, sentences: Sequence[str]) -> NDArray[np.intp]:
+    """The test motions (Q, N) in the order in which sentences find them."""
+    index = _index(model, corpus, corpus.parts.test)
+    with unknown_words_allowed():
+        hits = [index.search(sentence, len(index.members)) for sentence in sentences]
+    return np.array([_places(row) for row in hits])
 
 
 def _likelihoods(describe: DescribeModel, motions: Sequence[Motion], sentences: Sequence[str]) -> Array:
@@ -125,9 +141,12 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> dict[s
     settings = model.settings(IndexSettings)
     figures: dict[str, float] = {}
     for kind, least in (("text", settings.like_text), ("motion", settings.like_motion)):
+        # the limit that validation would choose
         if corpus.parts.validation:
             scores, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
             figures[f"{kind}_least"] = float(np.percentile(scores[right], 5)) if right.any() else np.nan
+
+        # how well the bundle's limit does in the test
         scores, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
         figures[f"{kind}_kept"] = float((scores[right] >= least).mean()) if right.any() else np.nan
         figures[f"{kind}_told"] = float((scores[~right] < least).mean()) if not right.all() else np.nan
@@ -138,31 +157,30 @@ def _first_hits(
     model: SearchModel, corpus: SplitStore, part: Sequence[int], groups: Numbers, kind: str
 ) -> tuple[Array, NDArray[np.bool_]]:
     """The scores (Q,) of the first hits of a part's sentences or motions, and whether they are right."""
-    rows: Sequence[int]
-    queries: Sequence[str | Motion]
-    if kind == "text":
-        searched = part
-        rows, queries = _queries(corpus, part)
-    else:
-        searched = corpus.parts.train
-        rows = range(len(part))
-        queries = corpus.motions(part)
+    searched = part if kind == "text" else corpus.parts.train
     index = _index(model, corpus, searched)
     searched_groups = groups[list(searched)]
-    with unknown_words_allowed():
-        hits = [index.search(query, len(index.members)) for query in queries]
-
     scores = []
     right = []
-    for row, ranked_hits in zip(rows, hits, strict=True):
-        matches = searched_groups[_places(ranked_hits)] == groups[part[row]]
-        scores.append(ranked_hits[0].score)
+    for row, query in _queries_of(corpus, part, kind):
+        with unknown_words_allowed():
+            hits = index.search(query, len(index.members))
+        # which hits have an equal description
+        matches = searched_groups[_places(hits)] == groups[part[row]]
+        scores.append(hits[0].score)
         right.append(bool(matches[0]))
         # the first hit if no motion had an equal description
         if not matches.all():
-            scores.append(ranked_hits[int(matches.argmin())].score)
+            scores.append(hits[int(matches.argmin())].score)
             right.append(False)
     return np.array(scores), np.array(right)
+
+
+def _queries_of(corpus: SplitStore, part: Sequence[int], kind: str) -> list[tuple[int, str | Motion]]:
+    """The sentences or motions of a part, with their rows in it."""
+    if kind == "text":
+        return list(zip(*_queries(corpus, part), strict=True))
+    return list(enumerate(corpus.motions(part)))
 
 
 def _places(hits: Sequence[Hit]) -> list[int]:

@@ -1,7 +1,7 @@
 """A prepared corpus, divided as in the training of a model."""
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -103,35 +103,33 @@ class SplitStore:
 
 def split_as(manifest: Manifest, store: Store) -> SplitStore:
     """The store divided as the manifest of a run or bundle says; DataError if it was not trained on this store."""
-    try:
-        split = manifest.training["split"]
-        validation_names = set(split["validation"])
-        test_names = set(split["test"])
-        train_count = int(split["train"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
-
+    train_count, validation_names, test_names = _split_of(manifest)
     held_out = validation_names | test_names
-    train = []
-    validation = []
-    test = []
-    for record, entry in enumerate(store.records):
-        if entry.name in validation_names:
-            validation.append(record)
-        if entry.name in test_names:
-            test.append(record)
-        if entry.name not in held_out:
-            train.append(record)
-
-    names = {entry.name for entry in store.records}
-    all_present = held_out <= names
-    count = train_count + len(validation_names) + len(test_names)
-    if not all_present or len(train) != train_count or len(store.records) != count:
+    train = _matching(store, lambda name: name not in held_out)
+    validation = _matching(store, lambda name: name in validation_names)
+    test = _matching(store, lambda name: name in test_names)
+    complete = len(store.records) == train_count + len(validation_names) + len(test_names)
+    all_present = held_out <= {entry.name for entry in store.records}
+    if not all_present or not complete or len(train) != train_count:
         raise DataError(
             f"{manifest.name} was not trained on this data: its {train_count} training, {len(validation_names)} "
             f"validation and {len(test_names)} test motions are not the {len(store.records)} that are here"
         )
-    return SplitStore(store, Split(tuple(train), tuple(validation), tuple(test)))
+    return SplitStore(store, Split(train, validation, test))
+
+
+def _split_of(manifest: Manifest) -> tuple[int, set[str], set[str]]:
+    """The number of training motions, and the names of validation and test motions; DataError without them."""
+    try:
+        split = manifest.training["split"]
+        return int(split["train"]), set(split["validation"]), set(split["test"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
+
+
+def _matching(store: Store, wanted: Callable[[str], bool]) -> tuple[int, ...]:
+    """The records whose names are wanted."""
+    return tuple(record for record, entry in enumerate(store.records) if wanted(entry.name))
 
 
 def plain(sentence: str) -> str:

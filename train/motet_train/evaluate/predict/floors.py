@@ -44,6 +44,7 @@ def key(floor: str) -> str:
 
 def reach(decays: Array | float, frames: int) -> Array:
     """How many times the last step has been repeated after each frame (N,). decays: one, or one for each frame (N,)."""
+    # d + d^2 + ... + d^k, with the k-th decay for frame k
     powers = np.broadcast_to(decays, frames)[:, None] ** np.arange(1.0, frames + 1)
     return np.cumsum(powers, axis=1).diagonal()
 
@@ -51,6 +52,7 @@ def reach(decays: Array | float, frames: int) -> Array:
 def gone_on(last_two: Array, steps: Array) -> Array:
     """Extrapolate the last two vectors (W, 2, ...) to (W, N, ...) by ``steps`` (N,) times the last step."""
     step = last_two[:, 1] - last_two[:, 0]
+    # a factor for each frame, whatever a vector is
     factors = steps.reshape(-1, *[1] * (step.ndim - 1))
     vectors: Array = last_two[:, 1, None] + step[:, None] * factors
     return vectors
@@ -104,6 +106,7 @@ class Windows:
         last_two = []
         truth = []
         for motion in windows:
+            # the input's last two frames; the truth begins at ``first``
             first = len(motion) - frames
             last = motion[:first][-2:]
             rotations.append(local_rotations(last))
@@ -129,9 +132,12 @@ class Windows:
 
     def turned(self, decays: Array | float) -> Array:
         """Positions (W, N, J, 3) relative to the root of joints whose rotations, and the root's, are extrapolated."""
+        # the rotations go on, the root with them, but not its place
         rotations = turned_on(self.rotations, reach(decays, self.frames))
         bones = np.repeat(self.translations[:, 1:], self.frames, axis=1)
         bones[:, :, 0] = 0.0
+
+        # all frames of all windows as one motion
         flat_rotations = rotations.reshape(-1, *rotations.shape[2:])
         flat_bones = bones.reshape(-1, *bones.shape[2:])
         _, joints = chained(self.skeleton, flat_rotations, flat_bones)
@@ -178,8 +184,11 @@ def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> di
     windows = Windows.of(training_windows(store, held_out, fps, frames), frames)
     decays = {}
     for suffix, relative in RELATIVE.items():
+        # decays of the joints relative to the root
         pose_errors = [apart(relative(windows, decay), windows.truth)[1].mean(axis=0) for decay in DECAYS]
         relative_decays = best(pose_errors)
+
+        # decays of its path, with these joints
         joints = relative(windows, relative_decays)
         world_errors = [apart(joints + windows.path(decay), windows.truth)[0].mean(axis=0) for decay in DECAYS]
         decays[DAMPED + suffix] = best(world_errors), relative_decays
@@ -198,6 +207,7 @@ def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: 
         for start in range(0, last - first - frames_needed + 1, frames_needed):
             stretches.append((number, start))
 
+    # evenly spaced ones of these, as playable motions at the wanted rate
     playable = named(store.representation).motion
     every = max(1, len(stretches) // most)
     windows = []

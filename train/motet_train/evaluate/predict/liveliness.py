@@ -84,6 +84,7 @@ def gait(trajectory: Trajectory) -> str | None:
     paces = trajectory.end().paces
     if len(paces) < round(trajectory.fps) - 1:
         return None
+    # mean speeds of half seconds
     halves = np.array_split(paces, max(1, round(2 * len(paces) / trajectory.fps)))
     if min(half.mean() for half in halves) < 0.5:
         return None
@@ -95,6 +96,7 @@ def going(trials: Mapping[str, Motion], writer: CodesModel) -> dict[str, dict[st
 
     If the writer names its test motions, all others are left out; a piece counts as the recording it was cut from.
     """
+    # what the writer has not seen
     split = writer.manifest.training.get("split", {})
     unseen = {name.partition(".")[0] for name in split.get("test", ())}
     groups: dict[str, dict[str, Motion]] = {"walks": {}, "runs": {}}
@@ -117,26 +119,15 @@ def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motio
 
 
 def _group(model: PredictModel, writer: CodesModel, motions: Sequence[Motion]) -> Report:
-    frames = round(SPANS[-1][1] * model.fps)
     inputs = []
     continuations: dict[str, list[Trajectory]] = {system: [] for system in CONTINUED}
     samples = []
     for motion in tqdm(motions, unit=" motions", disable=None, leave=False):
+        # the whole recording is the input
         whole = motion.resample(model.fps, to_end=True)
-        recorded = Trajectory.of(whole)
-        last_frame = recorded.points[-1:]
-        inputs.append(recorded)
-
-        alone = model.predict(whole, frames=frames, beyond=None)
-        beyond = model.predict(whole, frames=frames, beyond=writer)
-        points = {
-            "still": np.repeat(last_frame, frames, axis=0),
-            "alone": Trajectory.of(alone).points,
-            "beyond": Trajectory.of(beyond).points,
-        }
-        for system, following in points.items():
-            joined = np.concatenate([last_frame, following])
-            continuations[system].append(Trajectory(joined, model.fps))
+        inputs.append(Trajectory.of(whole))
+        for system, trajectory in _continued(model, writer, whole).items():
+            continuations[system].append(trajectory)
         samples.append(_sample_distances(model, writer, whole))
 
     report = {"recorded": {"recordings": float(len(motions)), "slide_cm": _slide(inputs)}}
@@ -146,23 +137,35 @@ def _group(model: PredictModel, writer: CodesModel, motions: Sequence[Motion]) -
     return report
 
 
+def _continued(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[str, Trajectory]:
+    """The last frame of a motion and what follows it by each system of :data:`CONTINUED`."""
+    # to the end of the last span
+    frames = round(SPANS[-1][1] * model.fps)
+    last_frame = Trajectory.of(motion).points[-1:]
+    alone = model.predict(motion, frames=frames, beyond=None)
+    beyond = model.predict(motion, frames=frames, beyond=writer)
+    points = {
+        "still": np.repeat(last_frame, frames, axis=0),
+        "alone": Trajectory.of(alone).points,
+        "beyond": Trajectory.of(beyond).points,
+    }
+    return {system: Trajectory(np.concatenate([last_frame, points[system]]), model.fps) for system in CONTINUED}
+
+
 def figures(pairs: Sequence[tuple[Trajectory, Trajectory]]) -> dict[str, float]:
     """Figures of pairs of an input and its continuation, whose first frame is the input's last: for each span the
     medians of relative speeds and energies, the share of motions that keep their speed, and the slide."""
-    ends = [recorded.end() for recorded, _ in pairs]
     report = {}
     for start, stop in SPANS:
-        parts = [following.part(start, stop) for _, following in pairs]
-        speeds = []
-        energies = []
-        for end, part in zip(ends, parts, strict=True):
-            speeds.append(part.paces.mean() / end.paces.mean())
-            energies.append(part.energy / end.energy)
+        # each input's last seconds, and the part of its continuation in the span
+        both = [(recorded.end(), following.part(start, stop)) for recorded, following in pairs]
+        speeds = np.array([part.paces.mean() / end.paces.mean() for end, part in both])
+        energies = [part.energy / end.energy for end, part in both]
         span = f"{start}_{stop}_s"
         report[f"speed_{span}"] = float(np.median(speeds))
-        report[f"kept_{span}"] = float(np.mean(np.abs(np.array(speeds) - 1) <= KEPT))
+        report[f"kept_{span}"] = float(np.mean(np.abs(speeds - 1) <= KEPT))
         report[f"energy_{span}"] = float(np.median(energies))
-        report[f"slide_cm_{span}"] = _slide(parts)
+        report[f"slide_cm_{span}"] = _slide(part for _, part in both)
     return report
 
 
@@ -178,10 +181,12 @@ def _sample_distances(model: PredictModel, writer: CodesModel, motion: Motion) -
     """Mean distances between joints of three futures, centimetres, at the end of the first two spans: in the world
     ("place") and relative to the root ("pose")."""
     frames = round(SPANS[1][1] * model.fps)
+    # the joints of three futures
     futures = model.futures(motion, frames=frames, beyond=writer, samples=3)
     trajectories = [Trajectory.of(future) for future in futures]
     distances = {}
     for _, stop in SPANS[:2]:
+        # the last frame of the span
         frame = round(stop * model.fps) - 1
         places = [trajectory.points[frame] for trajectory in trajectories]
         poses = [trajectory.relative[frame] for trajectory in trajectories]
@@ -209,6 +214,7 @@ def alive_table(figures: Mapping[str, Figures]) -> str:
 
 
 def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
+    # the head, and the recordings
     recorded = next(iter(reports.values()))["recorded"]
     spans = ", ".join(f"{start}-{stop}" for start, stop in SPANS)
     rows: list[Sequence[str]] = [
@@ -218,21 +224,33 @@ def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
     ]
 
     # standing still is the same for all models, so only the first has its row
-    formats = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
     systems = list(CONTINUED)
-    for number, (name, report) in enumerate(reports.items()):
-        for system in systems if number == 0 else systems[1:]:
-            cells = []
-            for key, form in formats.items():
-                values = [report[system][f"{key}_{start}_{stop}_s"] for start, stop in SPANS]
-                cells.append("  ".join(f"{value:{form}}" for value in values))
-            rows.append([f"  {CONTINUED[system].format(name=name)}", *cells])
-
-    rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
-    stops = [stop for _, stop in SPANS[:2]]
     for name, report in reports.items():
-        samples = report["samples"]
-        places = "  ".join(f"{samples[f'place_cm_{stop}_s']:.0f}" for stop in stops)
-        poses = "  ".join(f"{samples[f'pose_cm_{stop}_s']:.0f}" for stop in stops)
-        rows.append([f"  {name} after {stops[0]}, {stops[1]} s", places, "", poses, ""])
+        for system in systems:
+            rows.append([f"  {CONTINUED[system].format(name=name)}", *_span_cells(report[system])])
+        systems = systems[-2:]
+
+    # how different several futures are
+    stops = ", ".join(str(stop) for _, stop in SPANS[:2])
+    rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
+    for name, report in reports.items():
+        rows.append([f"  {name} after {stops} s", *_sample_cells(report["samples"])])
     return rows
+
+
+def _sample_cells(samples: Mapping[str, float]) -> list[str]:
+    """The distances between futures in the world and relative to the root, with empty cells between."""
+    texts = []
+    for key in ("place", "pose"):
+        texts.append("  ".join(f"{samples[f'{key}_cm_{stop}_s']:.0f}" for _, stop in SPANS[:2]))
+    return [texts[0], "", texts[1], ""]
+
+
+def _span_cells(figures: Mapping[str, float]) -> list[str]:
+    """A cell for each measure, with its figures over all spans."""
+    formats = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
+    cells = []
+    for key, form in formats.items():
+        values = [figures[f"{key}_{start}_{stop}_s"] for start, stop in SPANS]
+        cells.append("  ".join(f"{value:{form}}" for value in values))
+    return cells

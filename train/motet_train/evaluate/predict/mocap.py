@@ -58,6 +58,7 @@ REST = "everything else"
 
 def kind_of(entry: Entry) -> str:
     """The kind of a record of a store, :data:`REST` if no word matches."""
+    # the action if there is one, else what most sentences say
     texts = [entry.action.partition(",")[0]] if entry.action else entry.sentences
     if not texts:
         return REST
@@ -99,6 +100,7 @@ class Measured:
     def part(self, name: str, entries: Sequence[Entry]) -> dict[str, Any]:
         """The figures of a system, and of floors by their names, in the windows of some recordings."""
         windows = self.windows(entries)
+        # how much is measured, then the system and the floors
         people = {entry.subject for entry in entries}
         counts = dict(zip(COUNTS, (len(people), len(entries), len(windows)), strict=True))
         figures: dict[str, Any] = {**counts, **self._means(name, windows)}
@@ -115,6 +117,7 @@ def mocap_report(models: Mapping[str, PredictModel], results: Measured, trials: 
     """The figures of each model: mean distances of joints in the world, "place_cm", and relative to the root,
     "pose_cm", in all windows, those of the floors, and both by "kinds" of motions; and for models that predict their
     errors the "calibration"."""
+    # the kinds of trials that have windows
     kinds = by_kind([entry for entry in trials if entry.name in results.names])
     kind_windows = {kind: results.windows(members) for kind, members in kinds.items()}
     reports: dict[str, Any] = {}
@@ -135,8 +138,8 @@ def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.int
     windows. "quarters" of the windows, smallest expected errors first: the means of both, which should rise alike.
     "rank_correlation": Spearman's, NaN where one of the two is constant.
     """
+    # how much larger errors are than expected
     all_windows = np.arange(len(true))
-
     ratios = {}
     for kind, windows in {"all": all_windows, **kinds}.items():
         ratios[kind] = by_frame(true[windows].mean(axis=0) / expected[windows].mean(axis=0))
@@ -151,14 +154,18 @@ def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.int
             expected_mean = by_frame(expected_rising[part].mean(axis=0))
             true_mean = by_frame(true_rising[part].mean(axis=0))
             quarters.append({"expected_cm": expected_mean, "measured_cm": true_mean})
+    return {"ratio": ratios, "quarters": quarters, "rank_correlation": by_frame(_rank_correlations(expected, true))}
 
+
+def _rank_correlations(expected: Array, true: Array) -> Array:
+    """Spearman's correlation (N,) at each frame of two errors (W, N), NaN where one of the two is constant."""
     correlations = []
     for expected_at_frame, true_at_frame in zip(expected.T, true.T, strict=True):
         if np.ptp(expected_at_frame) > 0 and np.ptp(true_at_frame) > 0:
             correlations.append(spearmanr(expected_at_frame, true_at_frame).statistic)
         else:
             correlations.append(np.nan)
-    return {"ratio": ratios, "quarters": quarters, "rank_correlation": by_frame(np.array(correlations))}
+    return np.array(correlations)
 
 
 def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
@@ -177,26 +184,34 @@ def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
 
 def mocap_text(reports: Mapping[str, Any], fps: float) -> str:
     """The distances in all motions and in each kind, and the calibration of models that predict their errors."""
+    # the head: frames and their times
     milliseconds = [f"{(frame + 1) / fps * 1000:.0f}" for frame in REPORTED]
     rows = [["output frame", *map(str, REPORTED)], ["milliseconds", *milliseconds]]
 
     first = next(iter(reports.values()))
     for kind in ("all", *first["kinds"]):
         parts = {name: report["kinds"].get(kind, report) for name, report in reports.items()}
-        shared = next(iter(parts.values()))  # counts and floors are the same for all models
-        counts = ", ".join(f"{shared[count]} {count}" for count in COUNTS)
-        rows.append([f"{kind}: {counts}"])
-        for measure in TITLES if kind == "all" else (PLACE,):
-            rows.append([TITLES[measure]])
-            for floor in FLOORS:
-                rows.append([f"  {floor}", *cells(shared[key(floor)][measure], 1)])
-            for name, part in parts.items():
-                rows.append([f"  {name}", *cells(part[measure], 1)])
+        rows += _kind_rows(kind, parts)
 
+    # whether models know their errors
     for name, report in reports.items():
         if "calibration" in report:
             rows += [[name], *calibration_rows(report["calibration"])]
     return aligned(rows)
+
+
+def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
+    """The rows of a kind of motions; floors and counts are the same for all models."""
+    first = next(iter(parts.values()))
+    counts = ", ".join(f"{first[count]} {count}" for count in COUNTS)
+    rows = [[f"{kind}: {counts}"]]
+    for measure in TITLES if kind == "all" else (PLACE,):
+        rows.append([TITLES[measure]])
+        for floor in FLOORS:
+            rows.append([f"  {floor}", *cells(first[key(floor)][measure], 1)])
+        for name, part in parts.items():
+            rows.append([f"  {name}", *cells(part[measure], 1)])
+    return rows
 
 
 def held_out(models: Mapping[str, PredictModel], store: Store) -> dict[Entry, Motion]:
@@ -226,31 +241,35 @@ def measured(models: Mapping[str, PredictModel], motions: Mapping[str, Motion], 
     All models must have the same frame rate, seed and horizon; DataError if the motions are too short.
     """
     first = next(iter(models.values()))
-    seed_frames = first.seed_frames
-    window_frames = seed_frames + first.horizon
+    # floors and models predict the same windows
+    names, windows = _cut(motions, first)
+    seeds = [window[: first.seed_frames] for window in windows]
+    recorded = Windows.of(windows, first.horizon)
+    predictions = floors(recorded, decays)
+    for name, model in models.items():
+        predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
-    # overlapping windows of all motions
+    # how far they are from what was recorded
+    distances = {}
+    for name, predicted in predictions.items():
+        in_world, relative = apart(predicted, recorded.truth)
+        distances[name] = {PLACE: in_world, POSE: relative}
+    return Measured(tuple(names), distances, tuple(seeds))
+
+
+def _cut(motions: Mapping[str, Motion], model: PredictModel) -> tuple[list[str], list[Motion]]:
+    """The windows of a model's seed and horizon in motions, one every horizon, and the motion of each."""
+    frames = model.seed_frames + model.horizon
     names = []
     windows = []
     for name, motion in motions.items():
-        whole = motion.resample(first.fps, to_end=True)
-        for start in range(0, len(whole) - window_frames + 1, first.horizon):
+        whole = motion.resample(model.fps, to_end=True)
+        for start in range(0, len(whole) - frames + 1, model.horizon):
             names.append(name)
-            windows.append(whole[start : start + window_frames])
+            windows.append(whole[start : start + frames])
     if not windows:
-        raise DataError(f"the motions are shorter than {window_frames} frames at the model's rate")
-    seeds = [window[:seed_frames] for window in windows]
-
-    # the predictions of floors and models, and their distances from the truth
-    truth_windows = Windows.of(windows, first.horizon)
-    predictions = floors(truth_windows, decays)
-    for name, model in models.items():
-        predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
-    distances = {}
-    for name, predicted in predictions.items():
-        in_world, relative = apart(predicted, truth_windows.truth)
-        distances[name] = {PLACE: in_world, POSE: relative}
-    return Measured(tuple(names), distances, tuple(seeds))
+        raise DataError(f"the motions are shorter than {frames} frames at the model's rate")
+    return names, windows
 
 
 def shown(models: Mapping[str, PredictModel], motion: Motion) -> dict[str, Motion]:

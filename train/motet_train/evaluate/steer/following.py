@@ -1,11 +1,10 @@
-"""What figures that are steered do, and whether they go where they are told: how soon, and how well.
+"""How steered figures follow their commands: how soon, and how exactly.
 
-All changes are measured from several phases of the stride: each figure goes on as it was told before for
-:data:`SETTLE` seconds and a part of a second more, and is then told something else. What a figure does is seen in its
-place over the ground and its facing.
+All changes are measured from several phases of the stride: each figure follows one command for :data:`SETTLE` seconds
+and a fraction of a second more, and then gets another. The measures use its place over the ground and its facing.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -20,11 +19,13 @@ from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 from motet.representation.root_sixd import ROOT_SIXD
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
+from motet.steering.session import SteerSession
 from motet_train.data.matching_rows import MatchingRows
 from motet_train.data.recorded import Recording
 from motet_train.data.sixd_windows import poses_of
 from motet_train.evaluate.positions import (
     BALLS,
+    Flags,
     acceleration,
     arrival,
     length,
@@ -38,36 +39,48 @@ from motet_train.evaluate.positions import (
 )
 
 PHASES = 8
-"""Times of a change, four ticks apart."""
+"""Times at which a command changes, four ticks apart."""
 
-SETTLE, STRAIGHT = 3.0, 10.0
-"""Seconds before a change or a measurement, and of going straight on that are measured."""
+SETTLE = 3.0
+"""Seconds before a change or a measurement."""
+
+STRAIGHT = 10.0
+"""Seconds for which going straight on is measured."""
 
 MEASURED_SPEEDS = {"walk": 1.4, "run": 3.0}
 """m/s at which a gait is measured."""
 
 PACES = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
-"""Speeds in m/s between which is changed."""
+"""Speeds in m/s of the changes in speed."""
+
+FASTEST_WALK = 1.8
+"""m/s of :data:`PACES` up to which figures walk; above they run."""
 
 WAYS = np.arange(-165.0, 195.0, 15.0)
 """24 directions of travel, in degrees from the facing."""
 
 WAYS_PACES = {"walk": (0.8, 1.28), "run": (1.2, 2.0, 3.0)}
-"""m/s at which a gait goes there."""
+"""m/s at which a gait goes in these directions."""
 
 CREEPS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-"""The slowest speeds in m/s, at which a walk is measured."""
+"""The slowest measured speeds of a walk in m/s."""
 
-Asked = dict[str, Any]
-"""What N figures are told: all that :meth:`SteerSession.control` takes of them."""
+TURNS = (45, 90, 135, 180)
+"""Degrees of the measured turns, to both sides."""
 
-AHEAD: Asked = {"direction": 0.0, "facing": 0.0}
+SLOW_SIDE_STEP = 0.8
+"""m/s of the measured side steps."""
+
+Command = dict[str, Any]
+"""A command to N figures: keyword arguments of :meth:`SteerSession.control`."""
+
+AHEAD: Command = {"direction": 0.0, "facing": 0.0}
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
     """B figures in T frames; metres, y up. ground: (T, B, 3) x, z and facing in radians, float64. rotations:
-    (T, B, J, 4) quaternions (x, y, z, w) and height (T, B) as :class:`motet.steering.pose.Pose` has them."""
+    (T, B, J, 4) quaternions (x, y, z, w) and height (T, B) as in :class:`motet.steering.pose.Pose`."""
 
     ground: Array
     rotations: Floats
@@ -76,9 +89,10 @@ class Track:
 
     @staticmethod
     def of(poses: Sequence[Pose], fps: float) -> "Track":
-        """What poses that follow each other show."""
-        columns = ([getattr(pose, name) for pose in poses] for name in ("ground", "rotations", "height"))
-        ground, rotations, height = map(np.stack, columns)
+        """From consecutive poses."""
+        ground = np.stack([pose.ground for pose in poses])
+        rotations = np.stack([pose.rotations for pose in poses])
+        height = np.stack([pose.height for pose in poses])
         return Track(ground, rotations, height, fps)
 
     def __len__(self) -> int:
@@ -89,36 +103,52 @@ class Track:
         """Some of the frames."""
         return Track(self.ground[frames], self.rotations[frames], self.height[frames], self.fps)
 
-    def seen(self) -> "Track":
-        """The same as the figures themselves see it: all at the origin, and facing z."""
+    def in_place(self) -> "Track":
+        """The same in the figures' own space: all at the origin, facing z."""
         return replace(self, ground=np.zeros_like(self.ground))
 
     @cached_property
     def transforms(self) -> tuple[Floats, Array]:
-        """Rotations (T, B, J', 4) and places (T, B, J', 3) of all joints of the humanoid in the world."""
-        ground, rotations, height = _flat(self.ground), _flat(self.rotations), _flat(self.height)
-        turned, places = Pose(ground, rotations, height, np.zeros((len(height), 2), np.float32)).global_transforms()
+        """Rotations (T, B, J', 4) and positions (T, B, J', 3) of all joints of the humanoid in the world."""
+        # all figures and frames as one batch
+        ground = _flat(self.ground)
+        rotations = _flat(self.rotations)
+        height = _flat(self.height)
+        velocity = np.zeros((len(height), 2), np.float32)
+        turned, places = Pose(ground, rotations, height, velocity).global_transforms()
         return turned.reshape(*self.height.shape, -1, 4), places.reshape(*self.height.shape, -1, 3)
 
     @property
     def places(self) -> Array:
-        """Places (T, B, J', 3) of all joints of the humanoid in the world."""
+        """Positions (T, B, J', 3) of all joints of the humanoid in the world."""
         return self.transforms[1]
 
     @cached_property
     def soles(self) -> Array:
         """Points (T, B, 6, 3): heel, ball and tip of the left sole, then of the right one."""
-        turned, places = (_flat(part).astype(np.float64) for part in self.transforms)
-        return sole_points(quat_to_rotmat(turned), places).reshape(*self.height.shape, -1, 3)
+        turned, places = self.transforms
+        matrices = quat_to_rotmat(_flat(turned).astype(np.float64))
+        points = sole_points(matrices, _flat(places).astype(np.float64))
+        return points.reshape(*self.height.shape, -1, 3)
 
 
-def tracks_of(found: Sequence[Recording], rows: MatchingRows) -> list[Track]:
-    """What recordings show, each as one figure; ``rows`` are those of all of them."""
-    tracks, start = [], 0
-    for one in found:
-        own = rows.poses[start : (start := start + len(one.features))].astype(np.float32)
-        ground = poses_of(one.features.select(ROOT_SIXD).values, one.features.fps)[:, None]
-        tracks.append(Track(ground, own[:, :-1].reshape(len(own), 1, -1, 4), own[:, -1:], one.features.fps))
+def joint_steps(track: Track) -> Array:
+    """Metres (T - 1, B, J') by which joints move between frames, in the figures' own space."""
+    return length(np.diff(track.in_place().places, axis=0))
+
+
+def tracks_of(recordings: Sequence[Recording], rows: MatchingRows) -> list[Track]:
+    """The tracks of recordings, a figure each. rows: those of all recordings."""
+    tracks = []
+    start = 0
+    for recording in recordings:
+        features = recording.features
+        stop = start + len(features)
+        poses = rows.poses[start:stop].astype(np.float32)
+        start = stop
+        ground = poses_of(features.select(ROOT_SIXD).values, features.fps)[:, None]
+        rotations = poses[:, :-1].reshape(len(poses), 1, -1, 4)
+        tracks.append(Track(ground, rotations, poses[:, -1:], features.fps))
     return tracks
 
 
@@ -128,65 +158,94 @@ def _flat(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def stretches(track: Track, pace: float) -> list[Track]:
-    """The parts of a recording, of a second at least, whose mean speed over half a second is within a fifth of
-    ``pace``, m/s."""
-    steps = length(np.gradient(track.ground[:, 0, :2], axis=0)).astype(np.float64) * track.fps
-    paces = running_mean(steps, min(round(0.5 * track.fps), len(steps)))
-    inside = spells(np.abs(paces - pace) <= 0.2 * pace)
-    return [track[start:stop] for start, stop in inside if stop - start >= track.fps]
+    """The parts of a recording of a second or more whose mean speed over half a second is within a fifth of ``pace``,
+    m/s."""
+    # the speed over the ground, smoothed
+    steps = np.gradient(track.ground[:, 0, :2], axis=0)
+    speeds = length(steps).astype(np.float64) * track.fps
+    paces = running_mean(speeds, min(round(0.5 * track.fps), len(speeds)))
+
+    # runs of frames near the pace
+    near = np.abs(paces - pace) <= 0.2 * pace
+    return [track[start:stop] for start, stop in spells(near) if stop - start >= track.fps]
 
 
 def standing(tracks: Sequence[Track]) -> dict[str, float]:
     """By the measures of :mod:`motet_train.evaluate.positions`: how far the balls of the feet and the points of the
-    soles slide in a stance, cm; how fast the balls are while they stand, m/s; and the acceleration of all joints,
-    m/s^2. Means over stances or frames, and of the balls' slide the 95th percentile."""
-    stood, soles_stood, speeds, calm, frames = list[Array](), list[Array](), list[float](), list[float](), list[int]()
-    for track in tracks:
-        for figure in range(track.height.shape[1]):
-            places, soles = (of[:, figure].astype(np.float64) for of in (track.places, track.soles))
-            root = places[:, 0]
-            stood += stances(places[:, BALLS], root, track.fps)
-            soles_stood += stances(soles, root, track.fps)
-            speeds.append(speed(places[:, BALLS], root, track.fps))
-            calm.append(acceleration(places, root, track.fps))
-            frames.append(len(places))
-    mean, tail = mean_and_tail(100 * slides(stood))
+    soles slide in a stance, cm; how fast the balls move while they stand, m/s; and the acceleration of all joints,
+    m/s^2. Means over stances or frames, and for the slide of the balls also the 95th percentile."""
+    ball_stances = []
+    sole_stances = []
+    speeds = []
+    accelerations = []
+    frames = []
+    for places, soles, fps in _figures(tracks):
+        root = places[:, 0]
+        ball_stances += stances(places[:, BALLS], root, fps)
+        sole_stances += stances(soles, root, fps)
+        speeds.append(speed(places[:, BALLS], root, fps))
+        accelerations.append(acceleration(places, root, fps))
+        frames.append(len(places))
+    mean, tail = mean_and_tail(100 * slides(ball_stances))
     return {
         "slide_cm": mean,
         "slide_p95_cm": tail,
-        "sole_slide_cm": 100 * slide(soles_stood),
+        "sole_slide_cm": 100 * slide(sole_stances),
         "toe_speed": _mean(speeds, frames),
-        "acceleration": _mean(calm, frames),
+        "acceleration": _mean(accelerations, frames),
     }
 
 
+def _figures(tracks: Sequence[Track]) -> Iterator[tuple[Array, Array, float]]:
+    """The joints (T, J', 3), soles (T, 6, 3) and frame rate of each figure of all tracks."""
+    for track in tracks:
+        for figure in range(track.height.shape[1]):
+            places = track.places[:, figure].astype(np.float64)
+            soles = track.soles[:, figure].astype(np.float64)
+            yield places, soles, track.fps
+
+
 def slide_of(tracks: Sequence[Track]) -> dict[str, float]:
-    """The part of :func:`standing` about how far the balls of the feet slide."""
-    found = standing(tracks)
-    return {name: found[name] for name in ("slide_cm", "slide_p95_cm")}
+    """The figures of :func:`standing` for the slide of the balls of the feet."""
+    figures = standing(tracks)
+    return {name: figures[name] for name in ("slide_cm", "slide_p95_cm")}
 
 
 def _mean(values: Sequence[float], weights: Sequence[int]) -> float:
-    """The weighed mean of the values that are numbers; NaN where none is."""
-    known = np.array([pair for pair in zip(values, weights, strict=True) if np.isfinite(pair[0]) and pair[1]])
-    return float(np.average(known[:, 0], weights=known[:, 1])) if len(known) else np.nan
+    """The weighted mean of the finite values; NaN without any."""
+    known = [pair for pair in zip(values, weights, strict=True) if np.isfinite(pair[0]) and pair[1]]
+    if not known:
+        return np.nan
+    table = np.array(known)
+    return float(np.average(table[:, 0], weights=table[:, 1]))
 
 
 def straight_on(model: SteerModel, gait: str, hold_feet: bool) -> Track:
-    """Six figures that go straight on, in different directions, at the speed of :data:`MEASURED_SPEEDS`."""
+    """Six figures going straight on, in different directions, at the speed of :data:`MEASURED_SPEEDS`."""
     session = model.start(gait, characters=6, hold_feet=hold_feet)
     session.control(speed=MEASURED_SPEEDS[gait], direction=np.arange(6) * 60.0)
     poses = [session.tick() for _ in range(round((SETTLE + STRAIGHT) * model.fps))]
     return Track.of(poses, model.fps)[round(SETTLE * model.fps) :]
 
 
-def responses(model: SteerModel, before: Asked, after: Asked, seconds: float, hold_feet: bool = False) -> list[Track]:
-    """What N figures do from the tick of a change on, for each phase."""
+def settled(session: SteerSession, fps: float, phase: int) -> Pose:
+    """The last pose before a change: let figures follow their command for :data:`SETTLE` seconds and a phase."""
+    pose = session.tick()
+    for _ in range(round(SETTLE * fps) + 4 * phase - 1):
+        pose = session.tick()
+    return pose
+
+
+def responses(
+    model: SteerModel, before: Command, after: Command, seconds: float, hold_feet: bool = False
+) -> list[Track]:
+    """The tracks of N figures from the tick of a change on, one for each phase."""
     tracks = []
     for phase in range(PHASES):
         session = model.start(characters=len(before["gait"]), hold_feet=hold_feet)
         session.control(**before)
-        poses = [session.tick() for _ in range(round(SETTLE * model.fps) + 4 * phase)][-1:]
+        poses = [settled(session, model.fps, phase)]
+        # the next pose is the first that follows the new command
         session.control(**after)
         poses += [session.tick() for _ in range(round(seconds * model.fps))]
         tracks.append(Track.of(poses, model.fps))
@@ -195,147 +254,198 @@ def responses(model: SteerModel, before: Asked, after: Asked, seconds: float, ho
 
 @dataclass(frozen=True)
 class Ground:
-    """Places over the ground (T, B, 3), x, z and facing, of N figures of each phase."""
+    """Places over the ground (T, B, 3), x, z and facing, of N figures in each phase."""
 
     places: Array
     fps: float
 
     @staticmethod
     def of(tracks: list[Track]) -> "Ground":
-        """Those of :func:`responses`."""
-        return Ground(np.concatenate([track.ground for track in tracks], axis=1).astype(np.float64), tracks[0].fps)
+        """From the tracks of :func:`responses`."""
+        places = np.concatenate([track.ground for track in tracks], axis=1)
+        return Ground(places.astype(np.float64), tracks[0].fps)
 
-    def gone(self, start: float, stop: float) -> Array:
+    def velocity(self, start: float, stop: float) -> Array:
         """The mean velocity (B, 2) over the ground between two times."""
-        first, last = round(start * self.fps), round(stop * self.fps)
+        first = round(start * self.fps)
+        last = round(stop * self.fps)
         return (self.places[last, :, :2] - self.places[first, :, :2]) * self.fps / (last - first)
 
     def pace(self, start: float, stop: float) -> Array:
         """The mean speed (B,) between two times."""
-        return length(self.gone(start, stop))
+        return length(self.velocity(start, stop))
 
-    def way_off(self, asked: Array, start: float, stop: float) -> Array:
-        """By how many degrees (B,) figures go elsewhere than asked (B,), between two times; 180 for none that goes."""
-        return np.where(self.pace(start, stop) > 0.05, np.abs(way_off(self.gone(start, stop), asked)), 180.0)
+    def way_off(self, directions: Array, start: float, stop: float) -> Array:
+        """Degrees (B,) between the commanded and the actual directions of travel (B,) between two times; 180 for a
+        figure that does not go."""
+        errors = np.abs(way_off(self.velocity(start, stop), directions))
+        return np.where(self.pace(start, stop) > 0.05, errors, 180.0)
 
-    def facing_off(self, asked: Array, start: float, stop: float) -> Array:
-        """By how many degrees (B,) figures face elsewhere than is asked (B,), in the mean between two times."""
+    def facing_off(self, facings: Array, start: float, stop: float) -> Array:
+        """Degrees (B,) between the commanded facings (B,) and the mean facings between two times."""
         facing = self.places[round(start * self.fps) : round(stop * self.fps), :, 2]
-        found: Array = np.abs(np.degrees(wrapped(facing - np.radians(asked))).mean(axis=0))
-        return found
+        errors: Array = np.abs(np.degrees(wrapped(facing - np.radians(facings))).mean(axis=0))
+        return errors
 
-    def seconds(self, asked: Array, calm: float) -> Array:
-        """Seconds (B,) until the direction of travel, a mean over ``calm`` seconds, is within 10 degrees of what is
-        asked (B,), in degrees, and stays so to the end; infinite where it does not."""
+    def seconds(self, directions: Array, calm: float) -> Array:
+        """Seconds (B,) until the direction of travel, averaged over ``calm`` seconds, is within 10 degrees of the
+        commanded one (B,), in degrees, and stays there to the end; infinite if it never does."""
         half = round(calm * self.fps / 2)
         steps = self.places[2 * half :, :, :2] - self.places[: -2 * half, :, :2]  # around ticks half, half + 1, ...
-        return arrival(np.abs(way_off(steps, asked)) <= 10, self.fps) + half / self.fps
+        inside = np.abs(way_off(steps, directions)) <= 10
+        return arrival(inside, self.fps) + half / self.fps
 
 
-def way_off(velocity: Array, asked: Array) -> Array:
-    """Degrees (..., B) from the directions asked (B,) to those of velocities (..., B, 2)."""
-    found: Array = np.degrees(wrapped(np.arctan2(velocity[..., 0], velocity[..., 1]) - np.radians(asked)))
-    return found
+def way_off(velocity: Array, directions: Array | Floats) -> Array:
+    """Degrees (..., B) from commanded directions (B,) to those of velocities (..., B, 2)."""
+    angles = np.arctan2(velocity[..., 0], velocity[..., 1])
+    errors: Array = np.degrees(wrapped(angles - np.radians(directions)))
+    return errors
 
 
 def gait_figures(model: SteerModel, gait: str) -> dict[str, float]:
-    """How a gait stands, see :func:`standing`, with the foot lock, and without ("free")."""
+    """The figures of :func:`standing` of a gait with the foot lock, and without it ("free")."""
     free = standing([straight_on(model, gait, False)])
-    return standing([straight_on(model, gait, True)]) | {f"free_{name}": value for name, value in free.items()}
+    locked = standing([straight_on(model, gait, True)])
+    return locked | {f"free_{name}": value for name, value in free.items()}
 
 
 def speed_errors(model: SteerModel) -> dict[str, float]:
-    """How far the speed is off, as a share of what was asked: the mean velocity from 1 to 2 s after a change between
-    all pairs of :data:`PACES`, straight on; up to 1.8 m/s it is a walk, above a run. Mean, worst, the mean for each new
-    speed; rest: m/s where 0 was asked.
+    """Relative errors of the speed: the mean velocity from 1 to 2 s after a change between all pairs of :data:`PACES`,
+    straight on, as a walk up to :data:`FASTEST_WALK` and as a run above. Mean, worst, and the mean for each new speed;
+    rest: m/s where 0 was commanded.
     """
-    old, new = np.array([(a, b) for a, b in product(PACES, PACES) if a != b]).T
-    # who stands, stands in the gait that comes, and stops in the gait that was
-    gaits = (np.where(own > 0, own, other) for own, other in ((old, new), (new, old)))
-    before, after = (
-        {**AHEAD, "gait": tuple("walk" if pace <= 1.8 else "run" for pace in own), "speed": speed}
-        for own, speed in zip(gaits, (old, new), strict=True)
-    )
-    ground = Ground.of(responses(model, before, after, 2.0))
-    off = np.abs(ground.pace(1.0, 2.0).reshape(PHASES, -1) - new) / np.where(new > 0, new, 1)
-    moving, rest = off[:, new > 0], off[:, new == 0]
-    found = {"mean": moving.mean(), "worst": moving.max(), "rest": rest.mean(), "rest_worst": rest.max()}
-    return _floats(found | {f"to_{value:g}": off[:, new == value].mean() for value in PACES[1:]})
+    old, new = np.array([(old, new) for old, new in product(PACES, PACES) if old != new]).T
+    # a figure stands in the gait that follows, and stops in the gait that it was in
+    before = {**AHEAD, "gait": _gaits(np.where(old > 0, old, new)), "speed": old}
+    after = {**AHEAD, "gait": _gaits(np.where(new > 0, new, old)), "speed": new}
+    paces = Ground.of(responses(model, before, after, 2.0)).pace(1.0, 2.0)
+
+    # relative to the new speed, or in m/s where figures stop
+    errors = np.abs(paces.reshape(PHASES, -1) - new) / np.where(new > 0, new, 1)
+    return floats(_speed_figures(errors, new))
+
+
+def _speed_figures(errors: Array, new: Array) -> dict[str, float]:
+    """Means and maxima of errors (P, N) by the new speeds (N,)."""
+    moving = errors[:, new > 0]
+    rest = errors[:, new == 0]
+    figures = {"mean": moving.mean(), "worst": moving.max(), "rest": rest.mean(), "rest_worst": rest.max()}
+    for pace in PACES[1:]:
+        figures[f"to_{pace:g}"] = errors[:, new == pace].mean()
+    return figures
+
+
+def _gaits(paces: Array) -> tuple[str, ...]:
+    return tuple("walk" if pace <= FASTEST_WALK else "run" for pace in paces)
 
 
 def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
-    """Turns by 45 to 180 degrees to both sides at a speed, and the facing with it.
+    """Turns by 45 to 180 degrees to both sides at a speed, with the facing.
 
-    s: mean seconds until the direction of travel is there (:meth:`Ground.seconds`) in 4 s; worst_s. direction, facing:
-    mean degrees off, from 2 to 3 s after the change. slide_cm, slide_p95_cm: as :func:`standing` has them, in all turns
-    and the seconds after them.
+    s: mean seconds until the direction of travel is reached (:meth:`Ground.seconds`) in 4 s; worst_s. direction,
+    facing: mean errors in degrees, from 2 to 3 s after the change. slide_cm, slide_p95_cm: see :func:`standing`, in all
+    turns and the seconds after them.
     """
-    turns, calm = (45, 90, 135, 180), 0.5
-    angles = np.array([side * turn for turn in turns for side in (1, -1)], dtype=np.float64)
+    # each turn to the left and to the right, half a second longer than is measured
+    calm = 0.5
+    angles = np.array([side * turn for turn in TURNS for side in (1, -1)], dtype=np.float64)
     before = {**AHEAD, "gait": (gait,) * len(angles), "speed": pace}
-    tracks = responses(model, before, {**before, "direction": angles, "facing": angles}, 4.0 + calm, hold_feet=True)
-    ground, asked = Ground.of(tracks), np.tile(angles, PHASES)
-    seconds = ground.seconds(asked, calm)
-    way, facing = ground.way_off(asked, 2.0, 3.0), ground.facing_off(asked, 2.0, 3.0)
-    found = slide_of(tracks)
-    for turn in turns:
-        own: NDArray[np.bool_] = np.abs(asked) == turn
-        found |= {f"s_{turn}": seconds[own].mean(), f"worst_s_{turn}": seconds[own].max()}
-        found |= {f"direction_{turn}": way[own].mean(), f"facing_{turn}": facing[own].mean()}
-    return _floats(found)
+    after = {**before, "direction": angles, "facing": angles}
+    tracks = responses(model, before, after, 4.0 + calm, hold_feet=True)
+    turned = _turn_figures(Ground.of(tracks), np.tile(angles, PHASES), calm)
+    return floats(slide_of(tracks) | turned)
+
+
+def _turn_figures(ground: Ground, angles: Array, calm: float) -> dict[str, float]:
+    seconds = ground.seconds(angles, calm)
+    direction_errors = ground.way_off(angles, 2.0, 3.0)
+    facing_errors = ground.facing_off(angles, 2.0, 3.0)
+    figures = {}
+    for turn in TURNS:
+        turned: Flags = np.abs(angles) == turn
+        figures[f"s_{turn}"] = seconds[turned].mean()
+        figures[f"worst_s_{turn}"] = seconds[turned].max()
+        figures[f"direction_{turn}"] = direction_errors[turned].mean()
+        figures[f"facing_{turn}"] = facing_errors[turned].mean()
+    return figures
 
 
 def aside_errors(model: SteerModel) -> dict[str, float]:
-    """Side steps and walking backwards at 0.8 m/s, from standing and from walking: degrees that direction and facing
-    are off, and the error of the speed as a share, from 2 to 4 s after the change."""
-    ways, slowly = {"left": 90.0, "right": -90.0, "back": 180.0}, 0.8
-    asked = np.repeat(list(ways.values()), 2)
-    before = {**AHEAD, "gait": ("walk",) * len(asked), "speed": np.tile([0.0, 1.4], len(ways))}
-    ground = Ground.of(responses(model, before, {**before, "speed": slowly, "direction": asked}, 4.0))
-    asked = np.tile(asked, PHASES)
-    off = {
-        "direction": ground.way_off(asked, 2.0, 4.0),
-        "facing": ground.facing_off(np.zeros_like(asked), 2.0, 4.0),
-        "speed": np.abs(ground.pace(2.0, 4.0) / slowly - 1),
+    """Side steps and walking backwards at :data:`SLOW_SIDE_STEP`, from standing and from walking: errors of direction
+    and facing in degrees, and the relative error of the speed, from 2 to 4 s after the change."""
+    ways = {"left": 90.0, "right": -90.0, "back": 180.0}
+    directions = np.repeat(list(ways.values()), 2)
+    before = {**AHEAD, "gait": ("walk",) * len(directions), "speed": np.tile([0.0, 1.4], len(ways))}
+    after = {**before, "speed": SLOW_SIDE_STEP, "direction": directions}
+    ground = Ground.of(responses(model, before, after, 4.0))
+
+    # the figures of each phase follow those of the one before
+    directions = np.tile(directions, PHASES)
+    errors = {
+        "direction": ground.way_off(directions, 2.0, 4.0),
+        "facing": ground.facing_off(np.zeros_like(directions), 2.0, 4.0),
+        "speed": np.abs(ground.pace(2.0, 4.0) / SLOW_SIDE_STEP - 1),
     }
-    return _floats(
-        {f"{name}_{key}": of[asked == angle].mean() for name, angle in ways.items() for key, of in off.items()}
-    )
+    figures = {}
+    for way, angle in ways.items():
+        for key, values in errors.items():
+            figures[f"{way}_{key}"] = values[directions == angle].mean()
+    return floats(figures)
 
 
 def ways_errors(model: SteerModel, gait: str) -> dict[str, float]:
     """Going in each of :data:`WAYS` with the facing kept, at each of :data:`WAYS_PACES`, from standing and from going
-    ahead as fast: degrees that the direction is off, a mean, the 95th percentile and the largest; degrees that the
-    facing is off; the error of the speed, as a share of what the gait allows that way, and the least speed as such a
-    share; from 2 to 6 s after the change. slide_cm, slide_p95_cm: as :func:`standing` has them, in all these seconds.
+    ahead at the same speed: the error of the direction in degrees, its mean, 95th percentile and maximum; the error of
+    the facing in degrees; the error of the speed relative to the fastest that the gait allows in that direction, and
+    the lowest speed relative to it; from 2 to 6 s after the change. slide_cm, slide_p95_cm: see :func:`standing`, in
+    all these seconds.
     """
-    asked, paces, moves = (part.ravel() for part in np.meshgrid(WAYS, WAYS_PACES[gait], (0.0, 1.0)))
-    before = {**AHEAD, "gait": (gait,) * len(asked), "speed": paces * moves}
-    after = {**before, "speed": paces, "direction": asked}
-    session = model.start(gait, characters=len(asked))
+    grid = np.meshgrid(WAYS, WAYS_PACES[gait], (0.0, 1.0))
+    directions, paces, moving = (part.ravel() for part in grid)
+
+    # from standing, and from going ahead at the same speed
+    before = {**AHEAD, "gait": (gait,) * len(directions), "speed": paces * moving}
+    after = {**before, "speed": paces, "direction": directions}
+
+    # the speed that a gait allows in each direction
+    session = model.start(gait, characters=len(directions))
     session.control(**after)
-    allowed = np.tile(length(session.target[:, :2]), PHASES)
+    allowed = length(session.target[:, :2])
     tracks = responses(model, before, after, 6.0, hold_feet=True)
-    ground, asked = Ground.of(tracks), np.tile(asked, PHASES)
-    way = ground.way_off(asked, 2.0, 6.0)
-    found = {"direction": way.mean(), "direction_p95": np.percentile(way, 95), "direction_worst": way.max()}
-    found["facing"] = ground.facing_off(np.zeros_like(asked), 2.0, 6.0).mean()
-    share = ground.pace(2.0, 6.0) / allowed
-    found |= {"speed": np.abs(share - 1).mean(), "speed_least": share.min()}
-    return _floats(found | slide_of(tracks))
+    errors = _way_figures(Ground.of(tracks), np.tile(directions, PHASES), np.tile(allowed, PHASES))
+    return floats(errors | slide_of(tracks))
+
+
+def _way_figures(ground: Ground, directions: Array, allowed: Array) -> dict[str, float]:
+    direction_errors = ground.way_off(directions, 2.0, 6.0)
+    facing_errors = ground.facing_off(np.zeros_like(directions), 2.0, 6.0)
+    relative_speed = ground.pace(2.0, 6.0) / allowed
+    return {
+        "direction": direction_errors.mean(),
+        "direction_p95": np.percentile(direction_errors, 95),
+        "direction_worst": direction_errors.max(),
+        "facing": facing_errors.mean(),
+        "speed": np.abs(relative_speed - 1).mean(),
+        "speed_least": relative_speed.min(),
+    }
 
 
 def creep_errors(model: SteerModel) -> dict[str, float]:
-    """Walking ahead at each of :data:`CREEPS`, from standing and from walking: how far the speed is off, m/s, a mean
-    and the largest, and slide_cm, slide_p95_cm as :func:`standing` has them; from 3 to 6 s after the change.
+    """Walking ahead at each of :data:`CREEPS`, from standing and from walking: the error of the speed, m/s, its mean
+    and maximum, and slide_cm, slide_p95_cm, see :func:`standing`; from 3 to 6 s after the change.
     """
-    asked, start = (part.ravel() for part in np.meshgrid(CREEPS, (0.0, MEASURED_SPEEDS["walk"])))
-    before = {**AHEAD, "gait": ("walk",) * len(asked), "speed": start}
-    tracks = responses(model, before, {**before, "speed": asked}, 6.0, hold_feet=True)
-    off = np.abs(Ground.of(tracks).pace(3.0, 6.0) - np.tile(asked, PHASES))
-    settled = [track[round(3.0 * track.fps) :] for track in tracks]
-    return _floats({"speed": off.mean(), "speed_worst": off.max(), **slide_of(settled)})
+    grid = np.meshgrid(CREEPS, (0.0, MEASURED_SPEEDS["walk"]))
+    speeds, old_speeds = (part.ravel() for part in grid)
+    before = {**AHEAD, "gait": ("walk",) * len(speeds), "speed": old_speeds}
+    tracks = responses(model, before, {**before, "speed": speeds}, 6.0, hold_feet=True)
+
+    # once figures have had time to slow down
+    errors = np.abs(Ground.of(tracks).pace(3.0, 6.0) - np.tile(speeds, PHASES))
+    last_seconds = [track[round(3.0 * track.fps) :] for track in tracks]
+    return floats({"speed": errors.mean(), "speed_worst": errors.max(), **slide_of(last_seconds)})
 
 
-def _floats(found: Mapping[str, float]) -> dict[str, float]:
-    return {name: float(value) for name, value in found.items()}
+def floats(figures: Mapping[str, float]) -> dict[str, float]:
+    """Figures as Python's floats."""
+    return {name: float(value) for name, value in figures.items()}

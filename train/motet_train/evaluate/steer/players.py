@@ -1,4 +1,4 @@
-"""How feet stand while a player steers: a walk that is reversed again and again, and a stick that is never still."""
+"""How feet stand while a player steers: a walk that is reversed again and again, and a stick that never rests."""
 
 from collections.abc import Iterator
 
@@ -9,60 +9,87 @@ from motet.steering.model import SteerModel
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import Track, slide_of
 
-FIGURES, SECONDS, SEED = 24, 20.0, 4
-"""So many figures are steered for so long, by a seed that chose nothing of the model."""
+FIGURES = 24
+"""Figures that are steered."""
 
-REVERSED_AT, REVERSED_AFTER = 1.28, (1.6, 2.4)
-"""m/s of a walk, and between how many seconds it is reversed."""
+SECONDS = 20.0
+"""How long they are steered."""
 
-STICK_PACES, STICK_PERIOD = (0.72, 1.28), 9.0
-"""m/s between which a stick's speed sways, and seconds of that."""
+SEED = 4
+"""Of the commands; it was not used to choose anything of the model."""
 
-STICK_TURNS, STICK_CALM = 85.0, 0.5
-"""Degrees a second that a stick turns by, a standard deviation; and in how many seconds that changes."""
+REVERSED_AT = 1.28
+"""m/s of a walk that is reversed."""
+
+REVERSED_AFTER = (1.6, 2.4)
+"""Shortest and longest time between reversals in seconds."""
+
+STICK_PACES = (0.72, 1.28)
+"""m/s between which a stick's speed oscillates."""
+
+STICK_PERIOD = 9.0
+"""Seconds of this oscillation."""
+
+STICK_TURNS = 85.0
+"""Standard deviation of a stick's rate of turning, degrees a second."""
+
+STICK_CALM = 0.5
+"""Seconds in which the rate of turning changes (the time constant of its autocorrelation)."""
 
 
 def reversal_figures(model: SteerModel) -> dict[str, float]:
-    """slide_cm, slide_p95_cm as :func:`motet_train.evaluate.steer.following.standing` has them, of figures that walk to
-    and fro."""
+    """slide_cm, slide_p95_cm as in :func:`motet_train.evaluate.steer.following.standing`, of figures that walk to and
+    fro."""
     return slide_of([_steered(model, _reversals(model.fps))])
 
 
 def stick_figures(model: SteerModel) -> dict[str, float]:
-    """The same of figures that walk as a stick tells them in each tick, whose direction turns smoothly at random, and
-    whose speed sways."""
+    """The same of figures whose walk follows a stick in every tick: its direction turns smoothly at random, and its
+    speed oscillates."""
     return slide_of([_steered(model, _sticks(model.fps))])
 
 
-def _steered(model: SteerModel, told: Iterator[tuple[Array, Array]]) -> Track:
-    """What figures do that are told speeds (B,) and directions (B,), in degrees, after the first seconds."""
+def _steered(model: SteerModel, commands: Iterator[tuple[Array, Array]]) -> Track:
+    """Figures that are steered by speeds (B,) and directions (B,), in degrees, after the first seconds."""
     session = model.start("walk", characters=FIGURES)
-    first, before, poses = round(following.SETTLE * model.fps), np.full((2, FIGURES), np.nan), []
+    first = round(following.SETTLE * model.fps)
+    before = np.full((2, FIGURES), np.nan)
+    poses = []
     for _ in range(first + round(SECONDS * model.fps)):
-        speed, direction = now = next(told)
-        if (np.asarray(now) != before).any():
+        speed, direction = next(commands)
+        command = np.array([speed, direction])
+        if (command != before).any():
             session.control(speed=speed, direction=direction)
-        before = np.array(now)
+        before = command
         poses.append(session.tick())
     return Track.of(poses[first:], model.fps)
 
 
 def _reversals(fps: float) -> Iterator[tuple[Array, Array]]:
-    rng, speed, direction = np.random.default_rng(SEED), np.full(FIGURES, REVERSED_AT), np.zeros(FIGURES)
-    left = rng.uniform(0, REVERSED_AFTER[1], FIGURES)
+    rng = np.random.default_rng(SEED)
+    speed = np.full(FIGURES, REVERSED_AT)
+    direction = np.zeros(FIGURES)
+    seconds_left = rng.uniform(0, REVERSED_AFTER[1], FIGURES)
     while True:
         yield speed, direction
-        left = left - 1 / fps
-        turns = left < 0
-        left = np.where(turns, rng.uniform(*REVERSED_AFTER, FIGURES), left)
-        direction = np.where(turns, 180 - direction, direction)
+        seconds_left = seconds_left - 1 / fps
+        reverses = seconds_left < 0
+        seconds_left = np.where(reverses, rng.uniform(*REVERSED_AFTER, FIGURES), seconds_left)
+        direction = np.where(reverses, 180 - direction, direction)
 
 
 def _sticks(fps: float) -> Iterator[tuple[Array, Array]]:
-    rng, dt, (low, high) = np.random.default_rng(SEED), 1 / fps, STICK_PACES
-    direction, sway = rng.uniform(-180, 180, FIGURES), rng.uniform(-np.pi, np.pi, FIGURES)
-    turn, left = rng.normal(0, STICK_TURNS, FIGURES), np.exp(-dt / STICK_CALM)
+    rng = np.random.default_rng(SEED)
+    dt = 1 / fps
+    low, high = STICK_PACES
+    direction = rng.uniform(-180, 180, FIGURES)
+    phase = rng.uniform(-np.pi, np.pi, FIGURES)
+    turn_rate = rng.normal(0, STICK_TURNS, FIGURES)
+    decay = np.exp(-dt / STICK_CALM)
     while True:
-        yield (low + high) / 2 + (high - low) / 2 * np.sin(sway), direction
-        turn = left * turn + rng.normal(0, STICK_TURNS * np.sqrt(1 - left**2), FIGURES)  # an Ornstein-Uhlenbeck process
-        direction, sway = direction + turn * dt, sway + 2 * np.pi * dt / STICK_PERIOD
+        speed = (low + high) / 2 + (high - low) / 2 * np.sin(phase)
+        yield speed, direction
+        # an Ornstein-Uhlenbeck process
+        turn_rate = decay * turn_rate + rng.normal(0, STICK_TURNS * np.sqrt(1 - decay**2), FIGURES)
+        direction = direction + turn_rate * dt
+        phase = phase + 2 * np.pi * dt / STICK_PERIOD

@@ -1,7 +1,7 @@
-"""All figures of a model that is steered, beside recordings and beside the same model that seldom searches.
+"""All figures of a steered model, next to those of recordings and of the same model with rare searches.
 
-Some figures are told anything at random, for minutes: whether their poses stay whole, and whether they go. What joints
-do from tick to tick is held against what they do in the recordings that are played (:class:`Limits`).
+For minutes, figures get random commands: whether their poses stay plausible, and whether they go. The movement of
+joints in each tick is compared with that in the recordings that are played (:class:`Limits`).
 """
 
 import warnings
@@ -18,12 +18,14 @@ from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
 from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
 from motet.steering.settings import SteeringSettings
 from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import rows_of
 from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
-from motet_train.evaluate.positions import Flags, length
+from motet_train.evaluate.positions import Flags, length, mean_and_tail
+from motet_train.evaluate.steer.commands import act_figures, going_figures, said_acts
 from motet_train.evaluate.steer.following import (
     MEASURED_SPEEDS,
     WAYS_PACES,
@@ -31,6 +33,7 @@ from motet_train.evaluate.steer.following import (
     aside_errors,
     creep_errors,
     gait_figures,
+    joint_steps,
     speed_errors,
     standing,
     stretches,
@@ -40,10 +43,7 @@ from motet_train.evaluate.steer.following import (
     ways_errors,
 )
 from motet_train.evaluate.steer.players import SEED, reversal_figures, stick_figures
-from motet_train.evaluate.steer.told import act_figures, going_figures, said_acts
 from motet_train.evaluate.tables import Goals, Report, gathered, report_table
-
-GOING_GOALS = {"never": 0, "off_worst_cm": 8}
 
 STEER_GOALS: Goals = {
     "walk.slide_cm": (None, 2.5),
@@ -64,24 +64,30 @@ STEER_GOALS: Goals = {
     "reversals.slide_p95_cm": (None, 6),
     "act_standing.begun_worst": (None, 0.4),
     "act_walk.begun_worst": (None, 0.4),
-    **{f"act_{who}.leaps": (None, 0) for who in ("standing", "walk", "run")},
-    **{f"going_{gait}.{name}": (None, most) for gait in MEASURED_SPEEDS for name, most in GOING_GOALS.items()},
+    "act_standing.leaps": (None, 0),
+    "act_walk.leaps": (None, 0),
+    "act_run.leaps": (None, 0),
+    "going_walk.never": (None, 0),
+    "going_walk.off_worst_cm": (None, 8),
+    "going_run.never": (None, 0),
+    "going_run.off_worst_cm": (None, 8),
     "random.broken": (None, 0),
     "random.frozen": (None, 0),
     "random.leaps": (None, 0),
     "random.under_ground": (None, 0),
 }
-"""Figure -> (least, most) that the model that comes with motet is to reach."""
+"""Figure -> (least, most): the goals of the bundle that ships with motet."""
 
 BESIDE_COLUMNS = {"recorded": "as recorded", "held": "feet held", "seldom": "seldom searched"}
-"""What stands beside a model's figures, GROUP_NAME in a report, and the heads of their columns: recordings as they are
-and with their feet held, as they are played; and the rival."""
+"""Suffix of a group in a report -> the head of its column: recordings as they are; with their feet held, as they are
+played; and the rival."""
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """The most of recordings, and of their mirror images. turn: (J,) degrees that bones turn by in a frame, the hips
-    seen from the facing. leap: (J',) metres that joints move in a frame, seen from the figure. low, high: of the hips.
+    """The extremes of recordings and of their mirror images. turn: (J,) degrees that bones turn by in a frame, the hips
+    relative to the facing. leap: (J',) metres that joints move in a frame, in the figure's own space. low, high: of the
+    hips.
     """
 
     turn: Array
@@ -91,42 +97,45 @@ class Limits:
 
     @staticmethod
     def of(tracks: list[Track]) -> "Limits":
-        """Those of recordings."""
-
-        def most(of: Callable[[Track], Array], names: tuple[str, ...]) -> Array:
-            values = np.max([of(track).max(axis=(0, 1)) for track in tracks], axis=0)
-            found: Array = np.maximum(values, values[list(partners_of(names))])
-            return found
-
+        """The limits of recordings."""
+        # the extremes of all frames of all recordings
+        turn = np.max([turns(track).max(axis=(0, 1)) for track in tracks], axis=0)
+        leap = np.max([joint_steps(track).max(axis=(0, 1)) for track in tracks], axis=0)
         heights = np.concatenate([track.height[:, 0] for track in tracks])
-        return Limits(most(turns, BONES), most(leaps, HUMANOID.names), float(heights.min()), float(heights.max()))
+
+        # a model also plays mirror images, so both sides have the larger limit
+        return Limits(
+            turn=np.maximum(turn, turn[list(partners_of(BONES))]),
+            leap=np.maximum(leap, leap[list(partners_of(HUMANOID.names))]),
+            low=float(heights.min()),
+            high=float(heights.max()),
+        )
 
 
 def turns(track: Track) -> Array:
-    """Degrees (T - 1, B, J) by which bones turn from frame to frame, seen from their parents."""
-    a, b = track.rotations[:-1].astype(np.float64), track.rotations[1:]
-    signs = np.where((a * b).sum(axis=-1, keepdims=True) < 0, -1, 1)
-    found: Array = np.degrees(4 * np.arcsin(np.minimum(length(a - signs * b) / 2, 1)))
-    return found
-
-
-def leaps(track: Track) -> Array:
-    """Metres (T - 1, B, J') by which joints move from frame to frame, as the figures see it."""
-    return length(np.diff(track.seen().places, axis=0))
+    """Degrees (T - 1, B, J) by which bones turn between frames, relative to their parents."""
+    before = track.rotations[:-1].astype(np.float64)
+    after = track.rotations[1:]
+    # of the two quaternions of a rotation the nearer one
+    signs = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1, 1)
+    # half the chord between unit quaternions is the sine of a quarter of the angle
+    half_chords = length(before - signs * after) / 2
+    angles: Array = np.degrees(4 * np.arcsin(np.minimum(half_chords, 1)))
+    return angles
 
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What T ticks of B figures were: each array is (T, B) but ``ground`` (T, B, 3).
+    """T ticks of B figures: each array is (T, B) except ``ground`` (T, B, 3).
 
-    asked: m/s. way: degrees, where to. since: ticks since the last change, 0 at the tick that follows it. finite:
-    whether all is. turn: degrees that the bone turned which turned most. leap: how far the joint moved that went the
-    farthest beside its limit, as a share of that. height: of the hips. lowest: of the soles.
+    speed: commanded, m/s. direction: commanded, degrees. since: ticks since the command changed, 0 at the first tick.
+    finite: whether the pose is. turn: degrees that the bone turned by which turned most. leap: the largest step of a
+    joint, relative to its limit. height: of the hips. lowest: height of the lowest point of the soles.
     """
 
     ground: Array
-    asked: Floats
-    way: Floats
+    speed: Floats
+    direction: Floats
     since: NDArray[np.int32]
     finite: Flags
     turn: Floats
@@ -134,112 +143,162 @@ class Watch:
     height: Floats
     lowest: Array
 
+    @staticmethod
+    def joined(parts: list["Watch"]) -> "Watch":
+        """Consecutive parts as one."""
+        arrays = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)}
+        return Watch(**arrays)
 
-class _Teller:
-    """Tells B figures something else after 0.2 to 3 s each: to stand in 15 of 100 changes, and to face where they go in
-    half of them."""
+
+class _RandomPlayer:
+    """Gives B figures random commands that last 0.2 to 3 s: 15 % of them to stand, half to face the way they go."""
 
     def __init__(self, model: SteerModel, characters: int, seed: int) -> None:
-        self.rng, self.fps, self.names = np.random.default_rng(seed), model.fps, np.array(model.gaits)
+        self.rng = np.random.default_rng(seed)
+        self.fps = model.fps
+        self.names = np.array(model.gaits)
         self.ranges = np.array([model.speeds[name] for name in model.gaits])
         self.session = model.start(characters=characters)
-        self.left, self.since, self.gait = (np.zeros(characters, dtype=np.int64) for _ in range(3))
-        self.speed, self.direction, self.facing = (np.zeros(characters) for _ in range(3))
+        self.ticks_left = np.zeros(characters, dtype=np.int64)
+        self.since = np.zeros(characters, dtype=np.int64)
+        self.gait = np.zeros(characters, dtype=np.int64)
+        self.speed = np.zeros(characters)
+        self.direction = np.zeros(characters)
+        self.facing = np.zeros(characters)
 
-    def tell(self) -> None:
-        """Before each tick."""
-        self.left -= 1
+    def control(self) -> None:
+        """Change commands before a tick."""
+        self.ticks_left -= 1
         self.since += 1
-        who = np.flatnonzero(self.left < 0)
-        if not len(who):
-            return
-        rng, count = self.rng, len(who)
-        self.left[who], self.since[who] = np.round(rng.uniform(0.2, 3.0, count) * self.fps) - 1, 0
-        self.gait[who] = rng.integers(len(self.names), size=count)
-        low, high = self.ranges[self.gait[who]].T
-        self.speed[who] = np.where(rng.random(count) < 0.15, 0.0, rng.uniform(low, high))
-        self.direction[who] = rng.uniform(-180, 180, count)
+        changing = np.flatnonzero(self.ticks_left < 0)
+        if len(changing):
+            self._draw(changing)
+            gaits = self.names[self.gait].tolist()
+            self.session.control(gait=gaits, speed=self.speed, direction=self.direction, facing=self.facing)
+            self.speed = np.hypot(*self.session.target[:, :2].T)  # limited to what the gaits can do in that direction
+
+    def _draw(self, changing: NDArray[np.intp]) -> None:
+        """Draw new commands for some figures."""
+        rng = self.rng
+        count = len(changing)
+        # how long the command lasts, and the gait
+        self.ticks_left[changing] = np.round(rng.uniform(0.2, 3.0, count) * self.fps) - 1
+        self.since[changing] = 0
+        self.gait[changing] = rng.integers(len(self.names), size=count)
+
+        # a speed that the gait has, or standing; a direction, and as often as not a facing of its own
+        slowest, fastest = self.ranges[self.gait[changing]].T
+        self.speed[changing] = np.where(rng.random(count) < 0.15, 0.0, rng.uniform(slowest, fastest))
+        self.direction[changing] = rng.uniform(-180, 180, count)
         facing = rng.uniform(-180, 180, count)
-        self.facing[who] = np.where(rng.random(count) < 0.5, self.direction[who], facing)
-        gaits = self.names[self.gait].tolist()
-        self.session.control(gait=gaits, speed=self.speed, direction=self.direction, facing=self.facing)
-        self.speed = np.hypot(*self.session.target[:, :2].T)  # within what gaits can do that way
+        self.facing[changing] = np.where(rng.random(count) < 0.5, self.direction[changing], facing)
+
+    def play(self, ticks: int) -> tuple[list[Pose], Array]:
+        """The poses of some ticks, and (T, 3, B) the speed, the direction and the age of each command in ticks."""
+        poses = []
+        commands = []
+        for _ in range(ticks):
+            self.control()
+            poses.append(self.session.tick())
+            commands.append(np.stack([self.speed, self.direction, self.since]))
+        return poses, np.stack(commands)
 
 
 def watched(
     model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = SEED, chunk: int = 30
 ) -> Watch:
-    """What figures do that are told anything at random, with the foot lock. chunk: ticks looked at together."""
-    teller, ticks = _Teller(model, characters, seed), round(seconds * model.fps)
-    last, parts = [teller.session.tick()], []
+    """Watch figures that get random commands, with the foot lock. chunk: ticks that are measured together."""
+    player = _RandomPlayer(model, characters, seed)
+    ticks = round(seconds * model.fps)
+    last = player.session.tick()
+    parts = []
     for start in range(0, ticks, chunk):
-        poses, asked, ways, since = [], [], [], []
-        for _ in range(min(chunk, ticks - start)):
-            teller.tell()
-            poses.append(teller.session.tick())
-            asked.append(teller.speed.astype(np.float32))
-            ways.append(teller.direction.astype(np.float32))
-            since.append(teller.since.astype(np.int32))
-        track = Track.of([*last, *poses], model.fps)
-        now, last = track[1:], poses[-1:]
-        part = Watch(
-            ground=now.ground,
-            asked=np.stack(asked),
-            way=np.stack(ways),
-            since=np.stack(since),
-            finite=np.asarray(np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)),
-            turn=turns(track).max(axis=2).astype(np.float32),
-            leap=(leaps(track) / np.maximum(limits.leap, 1e-3)).max(axis=2).astype(np.float32),
-            height=now.height,
-            lowest=now.soles[..., 1].min(axis=2),
-        )
-        parts.append(part)
-    return Watch(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)))
+        poses, commands = player.play(min(chunk, ticks - start))
+        track = Track.of([last, *poses], model.fps)
+        parts.append(_watch_of(track, commands, limits))
+        last = poses[-1]
+    return Watch.joined(parts)
+
+
+def _watch_of(track: Track, commands: Array, limits: Limits) -> Watch:
+    """What commands (T, 3, B) make of figures, by a track of T + 1 frames."""
+    # steps need the frame before; all else is of the frame itself
+    now = track[1:]
+    relative_steps = joint_steps(track) / np.maximum(limits.leap, 1e-3)
+    return Watch(
+        ground=now.ground,
+        speed=commands[:, 0].astype(np.float32),
+        direction=commands[:, 1].astype(np.float32),
+        since=commands[:, 2].astype(np.int32),
+        finite=np.asarray(np.isfinite(now.places).all(axis=(2, 3)) & np.isfinite(now.ground).all(axis=2)),
+        turn=turns(track).max(axis=2).astype(np.float32),
+        leap=relative_steps.max(axis=2).astype(np.float32),
+        height=now.height,
+        lowest=now.soles[..., 1].min(axis=2),
+    )
 
 
 def broken(watch: Watch, limits: Limits) -> Flags:
-    """Poses (T, B) that are not finite, or where a bone turned more in a tick than any does in a recording, or whose
-    hips are lower or higher than in any by 5 cm."""
-    inside = (watch.height >= limits.low - 0.05) & (watch.height <= limits.high + 0.05)
-    found: Flags = ~(watch.finite & (watch.turn <= limits.turn.max()) & inside)
-    return found
+    """Poses (T, B) that are not finite, in which a bone turns more in a tick than in any recording, or whose hips are 5
+    cm lower or higher than in any."""
+    above = watch.height >= limits.low - 0.05
+    below = watch.height <= limits.high + 0.05
+    whole = watch.finite & (watch.turn <= limits.turn.max()) & above & below
+    flags: Flags = ~whole
+    return flags
 
 
 def frozen(watch: Watch, fps: float) -> Flags:
     """Ticks (T, B) at which a figure turns out to be frozen.
 
-    It was told the same for 2 s until then, to go at more than 0.4 m/s, and went less than a third as far along its
-    path; or for the first time none of its joints has turned by 0.01 degrees a tick for half a second.
+    For 2 s its command was to go at more than 0.4 m/s, and its path was shorter than a third of that; or for the first
+    time none of its joints has turned by 0.01 degrees a tick for half a second.
     """
-    ticks, stiff_for = round(2.0 * fps), round(0.5 * fps)
-    steps = np.linalg.norm(np.diff(watch.ground[..., :2], axis=0, prepend=watch.ground[:1, :, :2]), axis=2)
-    path, stiff = np.cumsum(steps, axis=0, dtype=np.float64), np.cumsum(watch.turn < 0.01, axis=0)
-    went, still = np.zeros_like(path), np.zeros(path.shape, dtype=bool)
-    went[ticks:] = path[ticks:] - path[:-ticks]
-    still[stiff_for:] = stiff[stiff_for:] - stiff[:-stiff_for] == stiff_for
+    # metres gone in the last two seconds
+    ticks = round(2.0 * fps)
+    ground = watch.ground[..., :2]
+    steps = np.linalg.norm(np.diff(ground, axis=0, prepend=ground[:1]), axis=2)
+    path = np.cumsum(steps, axis=0, dtype=np.float64)
+    gone = np.zeros_like(path)
+    gone[ticks:] = path[ticks:] - path[:-ticks]
+
+    # ticks at which a figure has just been stiff for half a second
+    stiff_ticks = round(0.5 * fps)
+    stiff = np.cumsum(watch.turn < 0.01, axis=0)
+    still = np.zeros(path.shape, dtype=bool)
+    still[stiff_ticks:] = stiff[stiff_ticks:] - stiff[:-stiff_ticks] == stiff_ticks
     still[1:] &= ~still[:-1]
-    found: Flags = still | ((watch.since == ticks) & (watch.asked > 0.4) & (went / 2.0 < watch.asked / 3))
-    return found
+
+    # a third of the way that was commanded
+    too_slow = gone / 2.0 < watch.speed / 3
+    flags: Flags = still | (_long_commanded(watch, ticks) & too_slow)
+    return flags
+
+
+def _long_commanded(watch: Watch, ticks: int) -> Flags:
+    """Ticks (T, B) at which a figure has had one command for ``ticks`` ticks, to go at more than 0.4 m/s."""
+    flags: Flags = (watch.since == ticks) & (watch.speed > 0.4)
+    return flags
 
 
 def astray(watch: Watch, fps: float) -> Array:
-    """Degrees (N,) between where figures went for half a second and where they were told to go, of all that had been
-    told the same for 2 s by then, to go at more than 0.4 m/s."""
-    ticks, last = round(2.0 * fps), round(0.5 * fps)
-    told = (watch.since == ticks) & (watch.asked > 0.4)
-    gone = np.zeros_like(watch.ground[..., :2])
-    gone[last:] = watch.ground[last:, :, :2] - watch.ground[:-last, :, :2]
-    found: Array = np.abs(way_off(gone[told], watch.way[told]))
-    return found
+    """Degrees (N,) between the actual and the commanded direction over half a second, for all figures that have had one
+    command for 2 s, to go at more than 0.4 m/s."""
+    selected = _long_commanded(watch, round(2.0 * fps))
+    half_second = round(0.5 * fps)
+    ground = watch.ground[..., :2]
+    gone = np.zeros_like(ground)
+    gone[half_second:] = ground[half_second:] - ground[:-half_second]
+    errors: Array = np.abs(way_off(gone[selected], watch.direction[selected]))
+    return errors
 
 
 def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int) -> dict[str, float]:
-    """Counts, all ticks of all figures: broken poses, freezes, leaps (a joint goes a tenth farther in a tick, seen from
-    the figure, than in any recording), soles 3 cm or more under the ground; and the most of each. direction: degrees
-    off (:func:`astray`), their mean and 95th percentile; NaN of none."""
+    """Counts over all ticks and figures: broken poses, freezes, leaps (a joint moves a tenth farther in a tick, in the
+    figure's own space, than in any recording), and soles 3 cm or more under the ground; and the largest of each.
+    direction: errors in degrees (:func:`astray`), their mean and 95th percentile; NaN without any."""
     watch = watched(model, limits, seconds, characters)
-    off = astray(watch, model.fps)
-    mean, most = (off.mean(), np.percentile(off, 95)) if len(off) else (np.nan, np.nan)
+    direction, direction_p95 = mean_and_tail(astray(watch, model.fps))
     return {
         "broken": float(broken(watch, limits).sum()),
         "frozen": float(frozen(watch, model.fps).sum()),
@@ -247,98 +306,126 @@ def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int
         "under_ground": float((watch.lowest < -0.03).sum()),
         "largest_turn": float(watch.turn.max()),
         "largest_leap": float(watch.leap.max()),
-        "direction": float(mean),
-        "direction_p95": float(most),
+        "direction": direction,
+        "direction_p95": direction_p95,
         "deepest_cm": 100 * float(max(0.0, -watch.lowest.min())),
     }
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Recordings of gaits, and what they show. held: with their feet held, as a model plays them; plain: without."""
+    """Recordings of gaits, and their tracks. held: with their feet held, as a model plays them; plain: without."""
 
     held: list[tuple[Recording, Track]]
     plain: list[tuple[Recording, Track]]
 
     @staticmethod
     def of(store: Store) -> "Recorded":
-        """Those of a store; DataError where it is not in ``root_sixd``, or a gait has none."""
+        """The recordings of a store; DataError if it is not in ``root_sixd``, or a gait has none."""
         if store.representation != "root_sixd":
-            what = f"in root_sixd (motet prepare --for codes), not {store.representation}"
-            raise DataError(f"figures that are steered are measured beside a store {what}")
-        gaits, shown = gaits_of(store), []
-        for held in (True, False):
-            found = recordings(store, gaits, held)
-            rows = rows_of(found, tuple(gait.name for gait in gaits), SteeringSettings())
-            shown.append(list(zip(found, tracks_of(found, rows), strict=True)))
-        return Recorded(*shown)
+            wanted = f"in root_sixd (motet prepare --for codes), not {store.representation}"
+            raise DataError(f"figures that are steered are measured beside a store {wanted}")
+        return Recorded(held=_with_tracks(store, held=True), plain=_with_tracks(store, held=False))
 
     def standing(self, gait: str, held: bool) -> dict[str, float]:
-        """The figures of :func:`standing`, of stretches of a gait's recordings."""
-        own = [track for one, track in (self.held if held else self.plain) if gait in one.gaits]
-        return standing([part for track in own for part in stretches(track, MEASURED_SPEEDS[gait])])
+        """The figures of :func:`standing` for stretches of a gait's recordings."""
+        parts = []
+        for recording, track in self.held if held else self.plain:
+            if gait in recording.gaits:
+                parts += stretches(track, MEASURED_SPEEDS[gait])
+        return standing(parts)
+
+
+def _with_tracks(store: Store, held: bool) -> list[tuple[Recording, Track]]:
+    gaits = gaits_of(store)
+    recorded = recordings(store, gaits, held)
+    rows = rows_of(recorded, tuple(gait.name for gait in gaits), SteeringSettings())
+    return list(zip(recorded, tracks_of(recorded, rows), strict=True))
 
 
 def steer_report(model: SteerModel, recorded: Recorded, minutes: float = 10.0, characters: int = 100) -> Report:
     """The figures of a model, of recordings and of the rival.
 
-    model: or a net that stands for one (:class:`motet_train.papers.tdbn.steered.Driven`), which has no rival.
-    minutes, characters: how long how many figures are told anything at random.
+    model: may be a net behind the same interface (:class:`motet_train.papers.tdbn.steered.Driven`), without a rival.
+    minutes, characters: duration and number of figures of the random commands.
     DataError for a model without a walk and a run.
     """
     if missing := [gait for gait in MEASURED_SPEEDS if gait not in model.gaits]:
         raise DataError(f"a model that is steered is measured at a walk and a run; this one has no {missing[0]!r}")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ControlWarning)  # speeds that a gait does not have show in the figures
+        warnings.simplefilter("ignore", ControlWarning)  # speeds that a gait lacks show in the figures
         return gathered(_parts(model, recorded, minutes, characters), "steered figures")
+
+
+Measure = Callable[[SteerModel], dict[str, float]]
 
 
 def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: int) -> Iterator[Report]:
     limits = Limits.of([track for _, track in recorded.held])
-    measures: dict[str, Callable[[SteerModel], dict[str, float]]] = {
-        **{gait: partial(gait_figures, gait=gait) for gait in MEASURED_SPEEDS},
-        "speed": speed_errors,
-        **{f"turn_{gait}": partial(turn_errors, gait=gait, pace=pace) for gait, pace in MEASURED_SPEEDS.items()},
-        "aside": aside_errors,
-        "creep": creep_errors,
-        **{f"ways_{gait}": partial(ways_errors, gait=gait) for gait in WAYS_PACES},
-        "reversals": reversal_figures,
-        "stick": stick_figures,
-        "random": partial(wandering, limits=limits, seconds=60 * minutes, characters=characters),
-    }
-    if hasattr(model, "matcher"):
-        acts = said_acts(model)
-        gaits = {"act_standing": None, **{f"act_{gait}": gait for gait in MEASURED_SPEEDS}}
-        measures |= {name: partial(act_figures, acts=acts, leap=limits.leap, gait=of) for name, of in gaits.items()}
-        measures |= {f"going_{gait}": partial(going_figures, gait=gait) for gait in MEASURED_SPEEDS}
-    rivals = {"_seldom": seldom(model)} if hasattr(model, "matcher") else {}  # what stands for one does not search
-    for ending, one in {"": model, **rivals}.items():
-        yield from ({f"{name}{ending}": measure(one)} for name, measure in measures.items())
+    systems = {"": model}
+    measures = _measures(limits, minutes, characters)
+    if hasattr(model, "matcher"):  # a net behind the interface neither acts nor searches
+        measures |= _command_measures(model, limits)
+        systems["_seldom"] = seldom(model)
+    for suffix, system in systems.items():
+        for name, measure in measures.items():
+            yield {f"{name}{suffix}": measure(system)}
     for gait in MEASURED_SPEEDS:
-        yield {f"{gait}_recorded": recorded.standing(gait, False), f"{gait}_held": recorded.standing(gait, True)}
+        yield {
+            f"{gait}_recorded": recorded.standing(gait, held=False),
+            f"{gait}_held": recorded.standing(gait, held=True),
+        }
     yield {"random_held": {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}}
 
 
+def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Measure]:
+    """Group -> its measure, for all steered models."""
+    measures: dict[str, Measure] = {gait: partial(gait_figures, gait=gait) for gait in MEASURED_SPEEDS}
+    measures["speed"] = speed_errors
+    for gait, pace in MEASURED_SPEEDS.items():
+        measures[f"turn_{gait}"] = partial(turn_errors, gait=gait, pace=pace)
+    measures["aside"] = aside_errors
+    measures["creep"] = creep_errors
+    for gait in WAYS_PACES:
+        measures[f"ways_{gait}"] = partial(ways_errors, gait=gait)
+    measures["reversals"] = reversal_figures
+    measures["stick"] = stick_figures
+    measures["random"] = partial(wandering, limits=limits, seconds=60 * minutes, characters=characters)
+    return measures
+
+
+def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
+    """Group -> its measure, for models that act, and go to points."""
+    acts = said_acts(model)
+    measures: dict[str, Measure] = {"act_standing": partial(act_figures, acts=acts, leap=limits.leap, gait=None)}
+    for gait in MEASURED_SPEEDS:
+        measures[f"act_{gait}"] = partial(act_figures, acts=acts, leap=limits.leap, gait=gait)
+    for gait in MEASURED_SPEEDS:
+        measures[f"going_{gait}"] = partial(going_figures, gait=gait)
+    return measures
+
+
 def seldom(model: SteerModel, every: int = 30) -> SteerModel:
-    """The simplest rival: the same model, which searches only every so many ticks, a second, and when something else is
-    told; until then, or until its end, the recording that fits best is played."""
-    own = {**asdict(model.settings(SteeringSettings)), "search_every": every}
-    manifest = replace(model.manifest, settings={**model.manifest.settings, SteeringSettings.FEATURE: own})
+    """The simplest rival: the same model, which searches only every ``every`` ticks, a second, and when a command
+    changes; in between, the best recording is played on, or to its end."""
+    settings = {**asdict(model.settings(SteeringSettings)), "search_every": every}
+    manifest = replace(model.manifest, settings={**model.manifest.settings, SteeringSettings.FEATURE: settings})
     return SteerModel(manifest, {}, model.tables)
 
 
 def steer_text(reports: Mapping[str, Report]) -> str:
-    """A table of the figures of each model, with recordings and the rival of the first one beside them, and goals."""
-    own = {name: _of(report, "") for name, report in reports.items()}
+    """A table of the figures of each model with the goals, and those of recordings and of the first model's rival."""
     first = next(iter(reports.values()))
-    return report_table(own, STEER_GOALS, {head: _of(first, f"_{kind}") for kind, head in BESIDE_COLUMNS.items()})
+    beside = {head: _groups(first, f"_{suffix}") for suffix, head in BESIDE_COLUMNS.items()}
+    return report_table({name: _model_groups(report) for name, report in reports.items()}, STEER_GOALS, beside)
 
 
-def _of(report: Report, ending: str) -> Report:
-    """The groups of a kind, without the ending that says which."""
-    endings = tuple(f"_{kind}" for kind in BESIDE_COLUMNS)
-    return {
-        group.removesuffix(ending): found
-        for group, found in report.items()
-        if (group.endswith(ending) if ending else not group.endswith(endings))
-    }
+def _groups(report: Report, suffix: str) -> Report:
+    """The groups with a suffix, named without it."""
+    return {group.removesuffix(suffix): figures for group, figures in report.items() if group.endswith(suffix)}
+
+
+def _model_groups(report: Report) -> Report:
+    """The groups of the model itself."""
+    suffixes = tuple(f"_{suffix}" for suffix in BESIDE_COLUMNS)
+    return {group: figures for group, figures in report.items() if not group.endswith(suffixes)}

@@ -1,4 +1,4 @@
-"""Sentences that ask for several things in a row: whether they are split as meant, and each part is shown in turn."""
+"""Sentences that ask for several actions in a row: whether they are split correctly, and each part is shown in turn."""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from motet.generate.model import CodesModel, Story
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
-from motet_train.evaluate.text_adherence.track import track_of
+from motet_train.evaluate.text_adherence.track import Track, track_of
 
 
 @cache
@@ -22,32 +22,47 @@ def table() -> Mapping[str, Any]:
 
 
 def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
-    """Shares from 0 to 1. split: of composed texts in as many parts as meant; whole: of the others left whole; order:
-    of motions of composed texts in which every part is shown, in this order; parts: of all these parts."""
-    rows, whole = table()["composed"], table()["whole"]
-    split = {row["text"]: len(model.parts(row["text"])) == len(row["parts"]) for row in rows}
-    shown = {row["text"]: [_shown(model, row, seed) for seed in seeds] for row in rows}
-    each = [motion for motions in shown.values() for motion in motions]
+    """Shares from 0 to 1. split: of composed texts with the right number of parts; whole: of the others that are left
+    whole; order: of motions of composed texts that show every part, in order; parts: of all these parts."""
+    split = []
+    all_parts: list[list[bool]] = []
+    orders = {}
+    for row in table()["composed"]:
+        split.append(len(model.parts(row["text"])) == len(row["parts"]))
+        motions = [_shown(model, row, seed) for seed in seeds]
+        orders[row["text"]] = float(np.mean([all(parts) for parts in motions]))
+        all_parts += motions
+    # texts that must not be split
+    whole = [len(model.parts(text)) == 1 for text in table()["whole"]]
     return {
         "composed": {
-            "split": float(np.mean(list(split.values()))),
-            "whole": float(np.mean([len(model.parts(text)) == 1 for text in whole])),
-            "order": float(np.mean([all(parts) for parts in each])),
-            "parts": float(np.mean([part for parts in each for part in parts])),
+            "split": float(np.mean(split)),
+            "whole": float(np.mean(whole)),
+            "order": float(np.mean([all(parts) for parts in all_parts])),
+            "parts": float(np.mean([part for parts in all_parts for part in parts])),
         },
-        "composed_order": {text: float(np.mean(list(map(all, motions)))) for text, motions in shown.items()},
+        "composed_order": orders,
     }
 
 
 def _shown(model: CodesModel, row: Mapping[str, Any], seed: int) -> list[bool]:
-    """Whether each part of a composed text is shown in its passage; in a motion of other passages, in its part of the
-    cut into parts that shows most, at tenths of the motion."""
-    (made,) = model.generate(row["text"], seed=seed)
-    track, count = track_of(made.motion), len(row["parts"])
-    if isinstance(made, Story) and len(made.passages) == count:
-        cuts = [[one.stop / made.passages[-1].stop for one in made.passages[:-1]]]
+    """Whether each part of a composed text is shown in its passage. A motion with another number of passages is cut at
+    tenths of its duration where most parts are shown."""
+    (generated,) = model.generate(row["text"], seed=seed)
+    track = track_of(generated.motion)
+    count = len(row["parts"])
+    # the passages if they are the parts, else all ways to cut
+    if isinstance(generated, Story) and len(generated.passages) == count:
+        end = generated.passages[-1].stop
+        cuts = [[passage.stop / end for passage in generated.passages[:-1]]]
     else:
-        cuts = [[cut / 10 for cut in chosen] for chosen in combinations(range(1, 10), count - 1)]
-    parts = ([track.part(*edges) for edges in pairwise((0.0, *cut, 1.0))] for cut in cuts)
-    found = ([holds(part, rules) for part, rules in zip(own, row["parts"], strict=True)] for own in parts)
-    return max(found, key=sum)
+        cuts = [[tenth / 10 for tenth in tenths] for tenths in combinations(range(1, 10), count - 1)]
+    return max((_shown_between(track, row["parts"], cut) for cut in cuts), key=sum)
+
+
+def _shown_between(track: Track, parts: Sequence[Any], cuts: Sequence[float]) -> list[bool]:
+    """Whether each part is shown between its cuts, shares of the duration."""
+    flags = []
+    for (start, stop), rules in zip(pairwise((0.0, *cuts, 1.0)), parts, strict=True):
+        flags.append(holds(track.part(start, stop), rules))
+    return flags

@@ -1,4 +1,4 @@
-"""Sentences with numbers: whether a motion turns, goes, steps, repeats and lasts as much as was asked."""
+"""Sentences with numbers: whether a motion turns, goes, steps, repeats and lasts as much as the sentence says."""
 
 import tomllib
 import warnings
@@ -18,48 +18,58 @@ from motet_train.evaluate.text_adherence.table import slide
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, pair, swings, track_of
 
 BARS = {"degrees": (0.1, 0.0), "metres": (0.1, 0.0), "steps": (0.0, 1.0), "times": (0.0, 0.0), "seconds": (0.0, 0.1)}
-"""By how much a motion may be off: a share of what was asked, and an amount."""
+"""Kind of number -> tolerances: a share of the number, and an amount."""
 
 
 @cache
 def table() -> Sequence[Mapping[str, Any]]:
     """The rows of numbers.toml."""
-    rows: Sequence[Mapping[str, Any]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))[
-        "number"
-    ]
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    rows: Sequence[Mapping[str, Any]] = tomllib.loads(text)["number"]
     return rows
 
 
 def numbers_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
-    """Shares from 0 to 1 of motions that are as asked, of all and by what is asked; and how fast feet slide in them,
-    m/s (the mean over motions)."""
-    made: dict[str, list[Track]] = {}
+    """Shares from 0 to 1 of motions with the right number, of all and by kind; and how fast their feet slide, m/s (the
+    mean over motions)."""
+    shares = {}
+    kind_shares: dict[str, list[float]] = {kind: [] for kind in BARS}
+    slides = []
+    for row in table():
+        tracks = _tracks(model, row["text"], seeds)
+        share = float(np.mean([met(track, row) for track in tracks]))
+        shares[row["text"]] = share
+        for kind in BARS:
+            if kind in row:
+                kind_shares[kind].append(share)
+        slides += [slide(track) for track in tracks]
+    # all sentences, each kind, and how clean the motions are
+    numbers = {"all": float(np.mean(list(shares.values())))}
+    for kind, values in kind_shares.items():
+        numbers[kind] = float(np.mean(values))
+    numbers["slide"] = float(np.nanmean(slides))
+    return {"numbers": numbers, "number": shares}
+
+
+def _tracks(model: GenerateModel, text: str, seeds: Sequence[int]) -> list[Track]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TextWarning)
-        for row in table():
-            made[row["text"]] = [track_of(model.generate(row["text"], seed=seed)[0].motion) for seed in seeds]
-    kept = {row["text"]: float(np.mean([met(track, row) for track in made[row["text"]]])) for row in table()}
-    kinds = {kind: [kept[row["text"]] for row in table() if kind in row] for kind in BARS}
-    found = {kind: float(np.mean(shares)) for kind, shares in kinds.items()}
-    slides = [slide(track) for tracks in made.values() for track in tracks]
-    return {
-        "numbers": {"all": float(np.mean([*kept.values()])), **found, "slide": float(np.nanmean(slides))},
-        "number": kept,
-    }
+        return [track_of(model.generate(text, seed=seed)[0].motion) for seed in seeds]
 
 
 def met(track: Track, row: Mapping[str, Any]) -> bool:
-    """Whether a motion is what a row of the table asks, within the bars."""
+    """Whether a motion has the number of a row of the table, within the tolerances."""
     kind = next(kind for kind in BARS if kind in row)
-    found, asked = measured(track, kind, row.get("act", "")), float(row[kind])
+    value = measured(track, kind, row.get("act", ""))
+    wanted = float(row[kind])
     if row.get("either"):
-        found = abs(found)
+        value = abs(value)
     share, amount = BARS[kind]
-    return abs(found - asked) <= share * abs(asked) + amount + 1e-9
+    return abs(value - wanted) <= share * abs(wanted) + amount + 1e-9
 
 
 def measured(track: Track, kind: str, act: str = "") -> float:
-    """How much of a kind a motion has, or how often it does an act."""
+    """The number of a kind in a motion, or how often it does an act."""
     if kind == "degrees":
         return float(track.heading[-1] - track.heading[0])  # of the hips, from the first to the last frame
     if kind == "metres":
@@ -70,19 +80,23 @@ def measured(track: Track, kind: str, act: str = "") -> float:
 
 
 def steps(track: Track) -> int:
-    """How often a foot is moved by 15 cm or more over the ground: while it is faster than 0.4 m/s."""
+    """How often a foot moves over the ground by at least 15 cm while it is faster than 0.4 m/s."""
     count = 0
     for name in pair("Foot"):
-        place = track.joint(name)[:, [0, 2]]
-        fast = np.concatenate([[False], calm(length(np.diff(place, axis=0)) * RATE, 0.1) > 0.4])
-        count += sum(bool(length(place[b - 1] - place[a - 1]) >= 0.15) for a, b in spells(fast))
+        places = track.joint(name)[:, [0, 2]]
+        # while the foot is fast
+        speeds = calm(length(np.diff(places, axis=0)) * RATE, 0.1)
+        fast = np.concatenate([[False], speeds > 0.4])
+        for start, stop in spells(fast):
+            if length(places[stop - 1] - places[start - 1]) >= 0.15:
+                count += 1
     return count
 
 
 def jumps(track: Track) -> int:
     """How often both feet are off the ground for 0.1 to 0.9 s."""
-    found = spells(track.soles.min(axis=1) > 0.05)
-    return sum(0.1 <= (stop - start) / RATE <= 0.9 for start, stop in found)
+    flights = spells(track.soles.min(axis=1) > 0.05)
+    return sum(0.1 <= (stop - start) / RATE <= 0.9 for start, stop in flights)
 
 
 def jumping_jacks(track: Track) -> int:
@@ -103,17 +117,22 @@ def dips(track: Track) -> int:
 
 def punches(track: Track) -> int:
     """How often a hand shoots forward from the chest at 2 m/s."""
-    out = [np.diff(track.body(hand)[:, 2] - track.body("chest")[:, 2]) * RATE for hand in HANDS]
-    return sum(len(spells(calm(one, 0.1) >= 2.0)) for one in out)
+    chest = track.body("chest")[:, 2]
+    count = 0
+    for hand in HANDS:
+        forward_speeds = np.diff(track.body(hand)[:, 2] - chest) * RATE
+        count += len(spells(calm(forward_speeds, 0.1) >= 2.0))
+    return count
 
 
 def bows(track: Track) -> int:
-    """How often the trunk comes to lean forward by 25 degrees."""
+    """How often the trunk leans forward by 25 degrees."""
     trunk = track.body("neck") - track.body("hips")
-    return len(spells(calm(np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1])), 0.2) >= 25))
+    lean = np.degrees(np.arctan2(trunk[:, 2], trunk[:, 1]))
+    return len(spells(calm(lean, 0.2) >= 25))
 
 
-ACTS: Mapping[str, Callable[[Track], int]] = {
-    one.__name__: one for one in (jumps, jumping_jacks, kicks, dips, punches, bows)
-}
-"""Acts that are counted."""
+COUNTED = (jumps, jumping_jacks, kicks, dips, punches, bows)
+
+ACTS: Mapping[str, Callable[[Track], int]] = {act.__name__: act for act in COUNTED}
+"""Name of an act -> how often a motion shows it."""

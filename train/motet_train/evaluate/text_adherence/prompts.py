@@ -1,4 +1,4 @@
-"""The table of prompts: what is asked, the rules that count as done; and recorded trials, of which some show it."""
+"""The table of prompts, with the rules that a motion has to pass; and recorded trials, with the prompts they show."""
 
 import inspect
 import tomllib
@@ -25,18 +25,18 @@ RULES = {
     for name, rule in inspect.getmembers(rules, inspect.isfunction)
     if rule.__module__ == rules.__name__ and not name.startswith("_")
 }
-"""Name -> rule: a track, and parameters by name, to whether it is so."""
+"""Name -> rule: a function of a track and keyword arguments."""
 
 SHORTEST_MOTION = 0.3
-"""Seconds: a motion that is shorter does nothing that a sentence could say."""
+"""Seconds: a shorter motion passes no prompt."""
 
 
 @dataclass(frozen=True)
 class Prompt:
-    """One prompt. group: "locomotion" or "rest". rules: what must be so, the name of a rule, "is", and its parameters.
+    """One prompt. group: "locomotion" or "rest". rules: the rules to pass, each with its name, "is", and its arguments.
 
-    shown: patterns of the actions whose trials show it. aside: of those that may show it, counted neither way.
-    walk: whether it asks for a walk forward, of which sliding feet are measured.
+    shown: patterns of the actions whose trials show it. aside: of actions that may show it and do not count.
+    walk: whether it is a walk forward, in which the sliding of feet is measured.
     """
 
     text: str
@@ -48,7 +48,7 @@ class Prompt:
 
     @property
     def turns(self) -> bool:
-        """Whether it asks for a turn of a certain angle."""
+        """Whether it specifies the angle of a turn."""
         return any(rule["is"] == "turns" for rule in self.rules)
 
     def passes(self, track: Track) -> bool:
@@ -56,16 +56,24 @@ class Prompt:
         return holds(track, self.rules)
 
     def shows(self, action: str) -> bool | None:
-        """Whether trials of an action show it; None where they may."""
+        """Whether trials of an action show it; None if they may."""
         if any(fnmatchcase(action, pattern) for pattern in self.shown):
             return True
-        return None if any(fnmatchcase(action, pattern) for pattern in self.aside) else False
+        if any(fnmatchcase(action, pattern) for pattern in self.aside):
+            return None
+        return False
 
 
 def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether all of some rules are so."""
-    given = ((rule["is"], {key: value for key, value in rule.items() if key != "is"}) for rule in rules)
-    return track.seconds >= SHORTEST_MOTION and all(RULES[name](track, **more) for name, more in given)
+    """Whether a motion passes all of some rules."""
+    if track.seconds < SHORTEST_MOTION:
+        return False
+    for rule in rules:
+        # all of a rule but its name
+        arguments = {key: value for key, value in rule.items() if key != "is"}
+        if not RULES[rule["is"]](track, **arguments):
+            return False
+    return True
 
 
 @cache
@@ -80,7 +88,7 @@ def prompts() -> tuple[Prompt, ...]:
 
 
 def outside() -> tuple[str, ...]:
-    """Everyday sentences about what none of the recorded trials shows."""
+    """Everyday sentences about actions that no recorded trial shows."""
     return tuple(_table()["outside"])
 
 
@@ -88,12 +96,16 @@ def outside() -> tuple[str, ...]:
 def actions() -> Mapping[str, str]:
     """The name of each recorded trial -> its action."""
     lines = (Path(__file__).parent / "trials.tsv").read_text(encoding="utf-8").splitlines()[1:]
-    return {trial: action for action, trials in (line.split("\t") for line in lines) for trial in trials.split()}
+    trial_actions = {}
+    for line in lines:
+        action, trials = line.split("\t")
+        trial_actions.update(dict.fromkeys(trials.split(), action))
+    return trial_actions
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A motion of any human figure, its name, and what was said about it."""
+    """A motion of any human figure, its name, and the sentences about it."""
 
     name: str
     sentences: tuple[str, ...]
@@ -101,16 +113,16 @@ class Trial:
 
     @property
     def action(self) -> str | None:
-        """What it shows, None for a trial that the table of trials does not have."""
+        """The action that it shows, None for a trial that is not in the table of trials."""
         return actions().get(self.name)
 
     def shows(self, prompt: Prompt) -> bool | None:
-        """Whether it shows what a prompt asks; None where it may, and where nothing is known of it."""
+        """Whether it shows a prompt; None if it may, and for a trial of unknown action."""
         return None if self.action is None else prompt.shows(self.action)
 
     @cached_property
     def track(self) -> Track:
-        """The track of its motion; DataError for a motion that is none of a human figure."""
+        """The track of its motion; DataError for a figure that is not human."""
         try:
             return track_of(self.motion)
         except MotionError as error:
@@ -118,47 +130,56 @@ class Trial:
 
 
 def read_trials(path: Path, unit: str | float | None = None) -> Iterator[Trial]:
-    """The trials in a store, at its frame rate, the figure moving over the ground as its root block says; or in a
-    folder or zip of motion files with a table of sentences, but for those that cannot be read or have no sentence.
-    DataError where it is neither.
+    """The trials in a store, at its frame rate and with the path of its root block; or in a folder or zip of motion
+    files with a table of sentences, except those that cannot be read or have no sentence. DataError for anything else.
 
     unit: the length unit of files that do not state theirs, as in :func:`motet.read`.
     """
     if (path / INDEX).is_file():
         store = Store.open(path)
-        whole = named(store.representation).motion
-        yield from (Trial(one.name, one.sentences, whole(store.motion(i))) for i, one in enumerate(store.records))
+        playable = named(store.representation).motion
+        for number, entry in enumerate(store.records):
+            yield Trial(entry.name, entry.sentences, playable(store.motion(number)))
     else:
-        records = (item for item in read_corpus(path, unit=unit) if isinstance(item, Record))
-        yield from (Trial(record.name, record.sentences, record.motion) for record in records)
+        for record in read_corpus(path, unit=unit):
+            if isinstance(record, Record):
+                yield Trial(record.name, record.sentences, record.motion)
 
 
 class LookUp:
-    """Plays the trial whose sentences share most words with what is asked, the floor of every generator.
+    """Plays the trial whose sentences share most words with the prompt, the floor of every generator.
 
-    Trials without a sentence are never found; DataError if none has one.
+    Trials without a sentence do not count; DataError if none has one.
     """
 
     def __init__(self, trials: Sequence[Trial]) -> None:
-        known = [(trial, frozenset(TEXT_RULES.words(said))) for trial in trials for said in trial.sentences]
-        self._known = sorted(((trial, words) for trial, words in known if words), key=lambda pair: pair[0].name)
-        if not self._known:
+        self._sentences: list[tuple[Trial, frozenset[str]]] = []
+        for trial in sorted(trials, key=lambda trial: trial.name):
+            for sentence in trial.sentences:
+                words = frozenset(TEXT_RULES.words(sentence))
+                if words:
+                    self._sentences.append((trial, words))
+        if not self._sentences:
             raise DataError("no trial to look up has a sentence")
 
     def generate(self, text: str, seed: int) -> Motion:
-        """The motion of :meth:`found`, the same for every seed."""
-        return self.found(text).motion
+        """The motion of :meth:`nearest`, the same for every seed."""
+        return self.nearest(text).motion
 
-    def found(self, text: str) -> Trial:
-        """The trial with the sentence that shares most different words with the text; of several such sentences the one
-        with the fewest different words, and where they are as many, of the first trial by name."""
-        asked = frozenset(TEXT_RULES.words(text))
-        return max(self._known, key=lambda pair: (len(asked & pair[1]), -len(pair[1])))[0]
+    def nearest(self, text: str) -> Trial:
+        """The trial with the sentence that shares most different words with the text; of several such sentences the
+        one with the fewest different words, then the first trial by name."""
+        # most words in common, then fewest words
+        text_words = frozenset(TEXT_RULES.words(text))
+        nearest, _ = max(self._sentences, key=lambda pair: (len(text_words & pair[1]), -len(pair[1])))
+        return nearest
 
 
 def trained_on(manifest: Manifest, trials: Sequence[Trial]) -> set[str]:
-    """The names of the trials that are neither validation nor test motions of a model; all, where it does not say, and
-    where nothing was kept back: then its validation motions were trained on, too."""
+    """The names of the trials that are neither validation nor test motions of a model; all of them if it does not say,
+    or if it was trained on these, too (split "none")."""
     split = manifest.training.get("split", {})
-    parts = () if split.get("by") == "none" else ("validation", "test")
-    return {trial.name for trial in trials} - {name for part in parts for name in split.get(part, ())}
+    names = {trial.name for trial in trials}
+    if split.get("by") == "none":
+        return names
+    return names.difference(split.get("validation", ()), split.get("test", ()))

@@ -1,5 +1,5 @@
-"""Does what it says: every prompt asked with several seeds, beside recorded trials and the look-up; whose prompt is
-found in the space of a search model, and how far from recorded motions those made are."""
+"""Whether motions do what prompts say, with several seeds each, next to recorded trials and the look-up; and, in the
+space of a search model, R-precision and the distance of generated from recorded motions."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -34,24 +34,22 @@ SAYS_GOALS: Goals = {
     "quality.jerk_ratio": (0.85, 1.15),
     "quality.spread_ratio": (0.7, None),
 }
-"""Figure -> (least, most) that the models that come with motet are to reach."""
+"""Figure -> (least, most): the goals of the bundles that ship with motet."""
 
 CHOICES = 32
-"""Prompts among which a motion's own is to be found."""
+"""Prompts among which a motion has to find its own."""
 
 Vectors = Mapping[str, Floats]
-"""The text of a prompt -> vectors (N, E) of motions, as :func:`embedded` gives them."""
+"""The text of a prompt -> vectors (N, E) of motions from :func:`embedded`."""
 
 Figures = dict[str, float]
 
-
 Generator = Callable[[str, int], Motion]
-"""Whatever makes a motion of a human figure from a sentence and a seed; TextError for a sentence that it cannot
-take."""
+"""Makes a motion of a human figure from a sentence and a seed; TextError for a sentence that it does not accept."""
 
 
 def best_of(model: GenerateModel) -> Generator:
-    """A model as users get it: the first of its motions, with its default settings, its feet planted."""
+    """A model in its default use: the first of its motions, with default settings, its feet planted."""
     return lambda text, seed: model.generate(text, seed=seed)[0].motion
 
 
@@ -62,42 +60,54 @@ def says_table(
     seeds: int = 10,
     search: SearchModel | None = None,
 ) -> Report:
-    """The shares of motions that do what prompts say, by prompt and as means over groups of prompts, and how good the
-    motions are.
+    """The shares of motions that do what prompts say, by prompt and as means over groups of prompts, and the quality of
+    the motions.
 
-    trials: recorded trials; with them come "real", the share of those that pass whose action the prompt asks for,
-        "others", of those that show something else, and the look-up among the trials named in ``training`` (by default
-        all). "known" is the mean over the prompts whose action a training trial shows.
-    search: a model in whose space motions and prompts are compared (:func:`space_report`); without one they are not.
+    trials: recorded trials; they add "real", the share that passes of those whose action is the prompt's, "others", of
+        those with other actions, and the look-up among the trials named in ``training`` (by default all). "known" is
+        the mean over the prompts whose action a training trial shows.
+    search: a model in whose space motions and prompts are compared (:func:`space_report`); None for no comparison.
     """
-    own = [trial for trial in trials if training is None or trial.name in set(training)]
-    if trials and not own:
+    names = None if training is None else set(training)
+    train_trials = [trial for trial in trials if names is None or trial.name in names]
+    if trials and not train_trials:
         raise DataError("none of the trials is one of the training motions to be looked up")
-    sources: dict[str, tuple[Generator, int]] = {"": (generator, seeds)}
-    sources |= {"_lookup": (LookUp(own).generate, 1)} if own else {}
-    rows: dict[str, dict[str, Figures]] = {kind: {} for kind in (*sources, *(["_real"] if own else []))}
-    others: Figures = {}
-    seen: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
+    sources = {"": (generator, seeds)}
+    if train_trials:
+        sources["_lookup"] = (LookUp(train_trials).generate, 1)
+
+    # the motions of every source for every prompt
+    rows: dict[str, dict[str, Figures]] = {kind: {} for kind in sources}
+    vectors: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
     for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
         for kind, (source, count) in sources.items():
-            motions = _asked(source, prompt, count)
+            motions = _motions(source, prompt, count)
             rows[kind][prompt.text] = _figures(prompt, [track_of(motion) for motion in motions])
             if search is not None:
-                seen[kind][prompt.text] = embedded(search, motions)
-        if own:
-            rows["_real"][prompt.text] = _real(prompt, trials)
-            unlike = [trial.track for trial in trials if trial.shows(prompt) is False]
-            others[prompt.text] = _mean([prompt.passes(track) for track in unlike])
-    known = [prompt.text for prompt in prompts() if any(trial.shows(prompt) for trial in own)]
-    report = {group: row for kind, found in rows.items() for group, row in _groups(kind, found, known).items()}
-    if own:
-        report["prompt_others"] = others
+                vectors[kind][prompt.text] = embedded(search, motions)
+
+    # next to recorded trials
+    if train_trials:
+        rows["_real"] = {prompt.text: _real(prompt, trials) for prompt in prompts()}
+    known = [prompt.text for prompt in prompts() if any(trial.shows(prompt) for trial in train_trials)]
+    report: Report = {}
+    for kind, figures in rows.items():
+        report |= _groups(kind, figures, known)
+    if train_trials:
+        report["prompt_others"] = {prompt.text: _passed_by_others(prompt, trials) for prompt in prompts()}
         report["quality"] |= _ratios(rows[""], rows["_real"])
-    return report if search is None else report | space_report(search, prompts(), seen, trials)
+    if search is not None:
+        report |= space_report(search, prompts(), vectors, trials)
+    return report
 
 
-def _asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
-    """The motions for a prompt, one for each seed; none where the generator cannot take the prompt."""
+def _passed_by_others(prompt: Prompt, trials: Sequence[Trial]) -> float:
+    """The share of the trials of other actions that pass a prompt."""
+    return _mean([prompt.passes(trial.track) for trial in trials if trial.shows(prompt) is False])
+
+
+def _motions(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
+    """The motions for a prompt, one for each seed; none if the generator does not accept the prompt."""
     with unknown_words_allowed():
         try:
             return [generator(prompt.text, seed) for seed in range(seeds)]
@@ -106,7 +116,7 @@ def _asked(generator: Generator, prompt: Prompt, seeds: int) -> list[Motion]:
 
 
 def _figures(prompt: Prompt, tracks: Sequence[Track]) -> Figures:
-    """What is measured of the motions for a prompt: means, NaN for what is not asked of it. No motions do nothing."""
+    """The means over the motions for a prompt, NaN for measures that it does not ask for; share 0 of none."""
     return {
         "share": _mean([prompt.passes(track) for track in tracks]) if tracks else 0.0,
         "turn": _mean([track.turn for track in tracks]) if prompt.turns else np.nan,
@@ -119,219 +129,288 @@ def _figures(prompt: Prompt, tracks: Sequence[Track]) -> Figures:
 
 
 def _real(prompt: Prompt, trials: Sequence[Trial]) -> Figures:
-    """The same of the trials that show what is asked; the spread is that between takes of the same action, of which ten
-    are compared at most."""
+    """The same for the trials that show a prompt; the spread is between takes of one action, of at most ten each."""
+    # the trials that show the prompt, and their takes of each action
+    tracks = []
     takes: dict[str | None, list[Track]] = {}
     for trial in trials:
         if trial.shows(prompt):
+            tracks.append(trial.track)
             takes.setdefault(trial.action, []).append(trial.track)
-    found = _figures(prompt, [trial.track for trial in trials if trial.shows(prompt)])
-    apart = _mean([spread(tracks[:: -(-len(tracks) // 10)]) for tracks in takes.values()])
-    return found | {"share": found["share"] if takes else np.nan, "spread": apart}
+    figures = _figures(prompt, tracks)
+    if not tracks:
+        figures["share"] = np.nan
+    # how different takes of one action are
+    spreads = []
+    for same_action in takes.values():
+        every = -(-len(same_action) // 10)
+        spreads.append(spread(same_action[::every]))
+    figures["spread"] = _mean(spreads)
+    return figures
 
 
 def slide(track: Track) -> float:
-    """How fast the balls of the feet slide, m/s, while they stand: while they are no higher than 2 cm above where they
-    are in standing. NaN where none ever does."""
+    """How fast the balls of the feet slide, m/s, while they stand: while they are at most 2 cm above their height in
+    standing. NaN if they never are."""
     balls = track.points[:, BALLS]
-    return skate(balls, balls[..., 1] - ground_of(track.points[:, feet_of(HUMANOID), 1]), 0.04, RATE)
+    ground = ground_of(track.points[:, feet_of(HUMANOID), 1])
+    return skate(balls, balls[..., 1] - ground, 0.04, RATE)
 
 
 def depth(track: Track) -> float:
-    """How deep the lowest joint is under y = 0, metres: the mean over all frames, 0 where it is above."""
-    return float(np.maximum(-track.points[..., 1].min(axis=1), 0).mean())
+    """How deep the lowest joint is below y = 0, metres: the mean over all frames, with 0 for those above."""
+    lowest = track.points[..., 1].min(axis=1)
+    return float(np.maximum(-lowest, 0).mean())
 
 
 def poses(track: Track, count: int = 32) -> Array:
-    """Poses (count, J, 3), evenly spaced in time: what is in front, to the left and how high, each seen from the hips,
-    so that neither the place nor the heading nor how long it takes makes a difference."""
-    part = track.frames(np.round(np.linspace(0, len(track) - 1, count)).astype(np.intp))
+    """Poses (count, J, 3) at even times in the figure's space (:meth:`Track.body`), so that place, facing and duration
+    make no difference."""
+    # evenly spaced frames
+    frames = np.linspace(0, len(track) - 1, count)
+    part = track.frames(np.round(frames).astype(np.intp))
     return np.stack([part.body(name) for name in HUMANOID.names], axis=1)
 
 
 def spread(tracks: Sequence[Track]) -> float:
-    """The mean distance of joints, metres, between the :func:`poses` of two of several motions; NaN for less than
+    """The mean distance of joints, metres, between the :func:`poses` of two of several motions; NaN for fewer than
     two."""
-    seen = [poses(track) for track in tracks]
-    pairs = [length(one - other).mean() for i, one in enumerate(seen) for other in seen[:i]]
-    return float(np.mean(pairs)) if pairs else np.nan
+    track_poses = [poses(track) for track in tracks]
+    distances = []
+    for number, first in enumerate(track_poses):
+        for second in track_poses[:number]:
+            distances.append(length(first - second).mean())
+    return float(np.mean(distances)) if distances else np.nan
 
 
-def _groups(kind: str, found: Mapping[str, Figures], known: list[str]) -> Report:
-    """The means over groups of prompts, the figures of each, and the quality of all."""
-    shares = {text: row["share"] for text, row in found.items()}
-    groups = {"all": [prompt.text for prompt in prompts()]}
-    groups |= {name: [p.text for p in prompts() if p.group == name] for name in ("locomotion", "rest")}
-    groups |= {"known": known} if known else {}
+def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
+    """The means over groups of prompts, the mean quality, and the turns and shares of each prompt."""
+    # the prompts of each group
+    shares = {text: row["share"] for text, row in rows.items()}
+    groups: dict[str, list[str]] = {"all": [], "locomotion": [], "rest": []}
+    turns = {}
+    for prompt in prompts():
+        groups["all"].append(prompt.text)
+        groups[prompt.group].append(prompt.text)
+        if prompt.turns:
+            turns[prompt.text] = rows[prompt.text]["turn"]
+    if known:
+        groups["known"] = known
     keys = ("slide", "jerk", "depth", "spread", "seconds")
     return {
         f"says{kind}": {name: _mean([shares[text] for text in texts]) for name, texts in groups.items()},
-        f"quality{kind}": {key: _mean([row[key] for row in found.values()]) for key in keys},
-        f"turn{kind}": {prompt.text: found[prompt.text]["turn"] for prompt in prompts() if prompt.turns},
+        f"quality{kind}": {key: _mean([row[key] for row in rows.values()]) for key in keys},
+        f"turn{kind}": turns,
         f"prompt{kind}": shares,
     }
 
 
-def _ratios(found: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Figures:
-    """Jerk and spread over those of recorded trials, of the prompts that have both."""
+def _ratios(generated: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Figures:
+    """Jerk and spread relative to recorded trials, over the prompts that have both."""
     ratios = {}
     for key in ("jerk", "spread"):
-        pairs = np.array([(found[text][key], recorded[text][key]) for text in found])
-        own, data = pairs[np.isfinite(pairs).all(axis=1)].sum(axis=0)
-        ratios[f"{key}_ratio"] = float(own / data) if data else np.nan
+        pairs = np.array([(generated[text][key], recorded[text][key]) for text in generated])
+        both_known = np.isfinite(pairs).all(axis=1)
+        generated_sum, recorded_sum = pairs[both_known].sum(axis=0)
+        ratios[f"{key}_ratio"] = float(generated_sum / recorded_sum) if recorded_sum else np.nan
     return ratios
 
 
 def _mean(values: Sequence[float]) -> float:
-    """The mean of the values that are numbers; NaN where none is."""
-    kept = [value for value in values if np.isfinite(value)]
-    return float(np.mean(kept)) if kept else np.nan
+    """The mean of the finite values; NaN without any."""
+    known = [value for value in values if np.isfinite(value)]
+    return float(np.mean(known)) if known else np.nan
 
 
 def space_report(
-    model: SearchModel, asked: Sequence[Prompt], made: Mapping[str, Vectors], trials: Sequence[Trial]
+    model: SearchModel, candidates: Sequence[Prompt], made: Mapping[str, Vectors], trials: Sequence[Trial]
 ) -> Report:
-    """The two measures of text-to-motion (Guo et al. 2022, "Generating diverse and natural 3D human motions from text",
-    section 5), in the space of a search model in the place of theirs: R-precision, and with trials the Frechet
+    """The two measures of text-to-motion of Guo et al. 2022 ("Generating diverse and natural 3D human motions from
+    text", section 5) in the space of a search model instead of theirs: R-precision, and with trials the Frechet
     distances from them.
 
-    made: "" for the generator and "_lookup" for the look-up -> the motions for every prompt.
-    "r_precision": the share of motions whose own prompt is the nearest, among the two, the three nearest, of
-        :data:`CHOICES`; the mean over prompts, 0 for a prompt without motions. "_lookup" the same of the look-up,
-        "_real" of the trials that show the prompt.
-    "frechet": between the trials that show any of the prompts and the generator's motions for prompts that a trial
-        shows; the same for the look-up; and between two halves of these trials, drawn at random. "_motions" are how
-        many of each there are.
+    made: "" for the generator and "_lookup" for the look-up -> the vectors of the motions for every prompt.
+    "r_precision": the share of motions whose own prompt is the nearest, or among the two or three nearest, of
+        :data:`CHOICES`; the mean over prompts, 0 for a prompt without motions. "_lookup" the same for the look-up,
+        "_real" for the trials that show the prompt.
+    "frechet": between the trials that show any of the prompts and the generator's motions for the prompts that a trial
+        shows; the same for the look-up; and between two random halves of these trials. "_motions" are the numbers of
+        motions in each.
     """
     with unknown_words_allowed():
-        texts = model.embed_text([prompt.text for prompt in asked])
-    seen = embedded(model, [trial.motion for trial in trials])
-    shown = {prompt.text: [i for i, trial in enumerate(trials) if trial.shows(prompt)] for prompt in asked}
-    shown = {text: rows for text, rows in shown.items() if rows}
-    real = {"_real": {text: seen[rows] for text, rows in shown.items()}} if shown else {}
-    report = {f"r_precision{kind}": _precisions(found, asked, texts) for kind, found in (*made.items(), *real.items())}
+        texts = model.embed_text([prompt.text for prompt in candidates])
+    trial_vectors = embedded(model, [trial.motion for trial in trials])
+    shown = _trials_shown(candidates, trials)
+    sets = dict(made)
     if shown:
-        sets = {
-            kind.strip("_") or "generated": np.concatenate([vectors[text] for text in shown])
-            for kind, vectors in made.items()
-        }
-        sets["trials"] = seen[sorted({row for rows in shown.values() for row in rows})]
-        usable = {name: vectors[np.isfinite(vectors).all(axis=1)] for name, vectors in sets.items()}
-        trials_seen = usable["trials"]
-        order = np.random.default_rng(0).permutation(len(trials_seen))
-        report["frechet"] = {
-            **{name: frechet(vectors, trials_seen) for name, vectors in usable.items() if name != "trials"},
-            "halves": frechet(trials_seen[order[::2]], trials_seen[order[1::2]]),
-            **{f"{name}_motions": float(len(vectors)) for name, vectors in usable.items()},
-        }
+        sets["_real"] = {text: trial_vectors[rows] for text, rows in shown.items()}
+    report = {f"r_precision{kind}": _precisions(vectors, candidates, texts) for kind, vectors in sets.items()}
+    if shown:
+        all_rows = sorted({row for rows in shown.values() for row in rows})
+        report["frechet"] = _frechet_figures(made, list(shown), trial_vectors[all_rows])
     return report
 
 
+def _trials_shown(candidates: Sequence[Prompt], trials: Sequence[Trial]) -> dict[str, list[int]]:
+    """The text of each prompt that trials show -> their indices."""
+    shown = {}
+    for prompt in candidates:
+        rows = [row for row, trial in enumerate(trials) if trial.shows(prompt)]
+        if rows:
+            shown[prompt.text] = rows
+    return shown
+
+
+def _frechet_figures(made: Mapping[str, Vectors], texts: list[str], trial_vectors: Floats) -> Figures:
+    """The distances from trials (N, E) of the motions for some prompts, and the numbers of motions."""
+    # the motions for prompts that a trial shows
+    sets = {}
+    for kind, vectors in made.items():
+        name = kind.strip("_") or "generated"
+        sets[name] = _known_rows(np.concatenate([vectors[text] for text in texts]))
+    trials = _known_rows(trial_vectors)
+    figures = {name: frechet(rows, trials) for name, rows in sets.items()}
+
+    # how far apart two samples of the same distribution are
+    order = np.random.default_rng(0).permutation(len(trials))
+    figures["halves"] = frechet(trials[order[::2]], trials[order[1::2]])
+    for name, rows in {**sets, "trials": trials}.items():
+        figures[f"{name}_motions"] = float(len(rows))
+    return figures
+
+
+def _known_rows(vectors: Floats) -> Floats:
+    """The vectors (N, E) without NaN."""
+    return vectors[np.isfinite(vectors).all(axis=1)]
+
+
 def embedded(model: SearchModel, motions: Sequence[Motion]) -> Floats:
-    """The directions (N, E) of motions, NaN for one that is shorter than :data:`SHORTEST_MOTION`; MotionError as
-    :func:`direction` for others that the model cannot take."""
-    nothing = np.full(model.sizes["E"], np.nan, np.float32)
-    found = [direction(model, motion) if motion.duration >= SHORTEST_MOTION else nothing for motion in motions]
-    return np.array(found, np.float32).reshape(-1, len(nothing))
+    """The directions (N, E) of motions, NaN for those shorter than :data:`SHORTEST_MOTION`; MotionError as in
+    :func:`direction` for others that the model does not accept."""
+    vectors = np.full((len(motions), model.sizes["E"]), np.nan, np.float32)
+    for row, motion in enumerate(motions):
+        if motion.duration >= SHORTEST_MOTION:
+            vectors[row] = direction(model, motion)
+    return vectors
 
 
-def rivals(asked: Sequence[Prompt]) -> list[list[int]]:
+def rivals(candidates: Sequence[Prompt]) -> list[list[int]]:
     """For each prompt the indices of those that ask for something else: no recorded action shows one of the two and
     may show the other."""
+    # which recorded actions show a prompt, and which may
     names = set(actions().values())
-    shown = [{name for name in names if prompt.shows(name)} for prompt in asked]
-    may = [{name for name in names if prompt.shows(name) is not False} for prompt in asked]
+    shown = [{name for name in names if prompt.shows(name)} for prompt in candidates]
+    maybe_shown = [{name for name in names if prompt.shows(name) is not False} for prompt in candidates]
+    every = range(len(candidates))
+    rows = []
+    for first in every:
+        row = []
+        for second in every:
+            differ = shown[first].isdisjoint(maybe_shown[second]) and shown[second].isdisjoint(maybe_shown[first])
+            if differ and first != second:
+                row.append(second)
+        rows.append(row)
+    return rows
 
-    def differ(one: int, other: int) -> bool:
-        return one != other and shown[one].isdisjoint(may[other]) and shown[other].isdisjoint(may[one])
 
-    return [[other for other in range(len(asked)) if differ(one, other)] for one in range(len(asked))]
-
-
-def r_precision(own: Array, others: Array) -> dict[str, float]:
+def r_precision(similarity: Array, rival_similarity: Array) -> dict[str, float]:
     """R-precision by the similarity of motions to their own prompt (N,) and to each of its rivals (N, K).
 
-    Guo et al. draw 31 rivals for each motion. This is the mean over all draws, so nothing depends on a seed: with b of
-    K rivals nearer than the own prompt, or as near, the number of those that are drawn is hypergeometric. With fewer
-    rivals all are drawn; NaN with none. Motions without a vector (NaN) find nothing, nor do no motions.
+    Guo et al. draw 31 rivals for each motion. This is the mean over all draws, so nothing depends on a seed: if b of K
+    rivals are at least as near as the own prompt, the number of those that are drawn is hypergeometric. Fewer rivals
+    are all drawn; NaN without any. Motions without a vector (NaN) find nothing, nor do no motions.
     """
-    tops, count = (1, 2, 3), others.shape[1]
-    if not count:
+    tops = (1, 2, 3)
+    rivals = rival_similarity.shape[1]
+    if not rivals:
         return {str(top): np.nan for top in tops}
-    nearer = (~(own[:, None] > others)).sum(axis=1)
-    drawn = hypergeom(count, nearer, min(CHOICES - 1, count))
+    # how many of the drawn rivals are nearer, over all draws
+    nearer = (~(similarity[:, None] > rival_similarity)).sum(axis=1)
+    drawn = hypergeom(rivals, nearer, min(CHOICES - 1, rivals))
     return {str(top): float(drawn.cdf(top - 1).mean()) if len(nearer) else 0.0 for top in tops}
 
 
-def frechet(one: Floats, other: Floats) -> float:
+def frechet(first: Floats, second: Floats) -> float:
     """The squared Frechet distance between Gaussians of the mean and covariance of vectors (N, E) and (M, E).
 
     |m - n|^2 + tr S + tr T - 2 tr (S T)^1/2 (Dowson and Landau 1982; Heusel et al. 2017). With S = A'A and T = B'B of
-    the centred vectors, the last trace is the sum of the singular values of A B', so no root of a matrix is needed and
-    the plain definition holds for fewer vectors than dimensions, too: nothing is shrunk. Fewer vectors make it larger:
-    compare distances of about as many. NaN for less than two vectors.
+    the centred vectors, the last trace is the sum of the singular values of A B', so no matrix root is needed and the
+    definition also holds, without shrinkage, for fewer vectors than dimensions. Fewer vectors make it larger: compare
+    distances of about equal numbers. NaN for fewer than two vectors.
     """
-    if min(len(one), len(other)) < 2:
+    if min(len(first), len(second)) < 2:
         return np.nan
-    m, n = (vectors.mean(axis=0, dtype=np.float64) for vectors in (one, other))
-    a, b = (one - m) / np.sqrt(len(one) - 1), (other - n) / np.sqrt(len(other) - 1)
-    return float(((m - n) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * np.linalg.norm(a @ b.T, "nuc"))
+    # means, and centred vectors scaled so that products are covariances
+    m = first.mean(axis=0, dtype=np.float64)
+    n = second.mean(axis=0, dtype=np.float64)
+    a = (first - m) / np.sqrt(len(first) - 1)
+    b = (second - n) / np.sqrt(len(second) - 1)
+    cross_trace = np.linalg.norm(a @ b.T, "nuc")
+    return float(((m - n) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * cross_trace)
 
 
-def _precisions(vectors: Vectors, asked: Sequence[Prompt], texts: Floats) -> dict[str, float]:
-    """The means over the prompts that there are vectors for."""
+def _precisions(vectors: Vectors, candidates: Sequence[Prompt], texts: Floats) -> dict[str, float]:
+    """The means over the prompts that have vectors."""
     rows = []
-    for own, (prompt, others) in enumerate(zip(asked, rivals(asked), strict=True)):
+    for column, (prompt, others) in enumerate(zip(candidates, rivals(candidates), strict=True)):
         if prompt.text in vectors:
-            scores = (vectors[prompt.text] @ texts.T).astype(np.float64)
-            rows.append(r_precision(scores[:, own], scores[:, others]))
-    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
+            similarity = (vectors[prompt.text] @ texts.T).astype(np.float64)
+            rows.append(r_precision(similarity[:, column], similarity[:, others]))
+    return {top: float(np.mean([row[top] for row in rows])) for top in rows[0]}
 
 
 def said_to_be_outside(model: GenerateModel, sentences: Sequence[str]) -> float:
-    """The share of sentences that are refused, or said to be outside the model's training data."""
-
-    def outside(sentence: str) -> bool:
+    """The share of sentences that a model rejects, or reports as outside its training data."""
+    outside = 0
+    for sentence in sentences:
         try:
             model.check(sentence)
         except TextError:
-            return True
-        return False
-
-    return sum(map(outside, sentences)) / len(sentences)
+            outside += 1
+    return outside / len(sentences)
 
 
 def says_text(reports: Mapping[str, Report]) -> str:
-    """The shares of each prompt in per cent, of every generator and beside them those of the look-up, of real trials
-    and of trials of other actions; then all other figures with the goals."""
-    columns = dict(zip(short_names(list(reports)), (report["prompt"] for report in reports.values()), strict=True))
+    """The shares of each prompt in per cent, for every generator and next to them the look-up, real trials and trials
+    of other actions; then all other figures with the goals."""
+    # a column for each generator, then what stands next to the first one
+    names = short_names(list(reports))
+    columns = dict(zip(names, [report["prompt"] for report in reports.values()], strict=True))
     first = next(iter(reports.values()))
-    columns |= {key: first[f"prompt_{key}"] for key in ("lookup", "real", "others") if f"prompt_{key}" in first}
+    for key in ("lookup", "real", "others"):
+        if f"prompt_{key}" in first:
+            columns[key] = first[f"prompt_{key}"]
+
     rows = [["%", *columns]]
     for prompt in prompts():
-        values = [shares[prompt.text] for shares in columns.values()]
-        rows.append([prompt.text, *("" if np.isnan(value) else f"{100 * value:.0f}" for value in values)])
-    rest = {
-        name: {group: found for group, found in report.items() if not group.startswith("prompt")}
-        for name, report in reports.items()
-    }
+        rows.append([prompt.text, *(_per_cent(shares[prompt.text]) for shares in columns.values())])
+
+    # all other figures
+    rest = {}
+    for name, report in reports.items():
+        rest[name] = {group: figures for group, figures in report.items() if not group.startswith("prompt")}
     return f"{aligned(rows)}\n\n{report_table(rest, SAYS_GOALS)}"
 
 
+def _per_cent(share: float) -> str:
+    return "" if np.isnan(share) else f"{100 * share:.0f}"
+
+
 def says_drawings(generator: Generator, every: int = 8) -> Drawings:
-    """Every eighth prompt with a motion of seed 0 that does what it says, else the next that is done before the eighth
-    after it; how many were passed over so is said above them."""
+    """Every eighth prompt whose motion of seed 0 passes, or else the next one that passes before the eighth after it;
+    the title has the number of prompts that were passed over."""
+    return {"says": lambda: _strips_of_passed(generator, every)}
 
-    def draw() -> Figure:
-        shown, failed = dict[str, Motion](), 0
-        for start in range(0, len(prompts()), every):
-            for prompt in prompts()[start : start + every]:
-                motion = generator(prompt.text, 0)
-                if prompt.passes(track_of(motion)):
-                    shown[prompt.text] = motion
-                    break
-                failed += 1
-        title = f"every eighth prompt; {failed} whose motions did not do what they say are passed over for the next"
-        return strips(list(shown.values()), list(shown), title)
 
-    return {"says": draw}
+def _strips_of_passed(generator: Generator, every: int) -> Figure:
+    motions: dict[str, Motion] = {}
+    failed = 0
+    for start in range(0, len(prompts()), every):
+        for prompt in prompts()[start : start + every]:
+            motion = generator(prompt.text, 0)
+            if prompt.passes(track_of(motion)):
+                motions[prompt.text] = motion
+                break
+            failed += 1
+    title = f"every eighth prompt; {failed} whose motions did not do what they say are passed over for the next"
+    return strips(list(motions.values()), list(motions), title)

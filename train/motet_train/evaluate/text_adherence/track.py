@@ -1,4 +1,4 @@
-"""A figure as a camera would see it: the positions of its joints, and what follows from them."""
+"""A figure as a camera would see it: the positions of its joints, and measures of them."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,12 +14,12 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.positions import Flags, length, running_mean, spells
 
 RATE = 30.0
-"""Frames per second at which rules look at a motion, whatever its own rate is."""
+"""Frames per second of tracks, whatever the rate of the motion."""
 
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """points: positions (T, J, 3) of the humanoid's joints in metres, y up, :data:`RATE` frames a second."""
+    """Joints of the humanoid. points: positions (T, J, 3) in metres, y up, :data:`RATE` frames a second."""
 
     points: Array
 
@@ -33,23 +33,24 @@ class Track:
 
     @property
     def seconds(self) -> float:
-        """How long it takes."""
+        """Its duration."""
         return len(self) / RATE
 
     def frames(self, which: slice | NDArray[np.intp]) -> "Track":
         """Some of the frames, above the same ground."""
-        found = Track(self.points[which])
-        found.__dict__["ground"] = self.ground
-        return found
+        part = Track(self.points[which])
+        part.__dict__["ground"] = self.ground
+        return part
 
     def part(self, start: float, stop: float) -> "Track":
-        """The part between two times, each a share of the whole; one frame at least."""
+        """The part between two shares of its duration, at least one frame."""
         first = min(int(start * len(self)), len(self) - 1)
-        return self.frames(slice(first, max(first + 1, round(stop * len(self)))))
+        last = max(first + 1, round(stop * len(self)))
+        return self.frames(slice(first, last))
 
     @cached_property
     def ground(self) -> float:
-        """The height under which the lowest joint is in one frame of twenty: single bad frames do not matter."""
+        """The 5th percentile of the height of the lowest joint, robust against single bad frames."""
         return float(np.percentile(self.points[..., 1].min(axis=1), 5))
 
     def joint(self, name: str) -> Array:
@@ -68,50 +69,56 @@ class Track:
     @cached_property
     def soles(self) -> Array:
         """Height (T, 2) of the lowest joint of the left and of the right foot above the ground."""
-        found: Array = np.min([self.heights(part) for part in ("Foot", "Toes", "Toes_end")], axis=0).T
-        return found
+        # the lowest of ankle, ball and tip
+        heights = [self.heights(part) for part in ("Foot", "Toes", "Toes_end")]
+        lowest: Array = np.min(heights, axis=0).T
+        return lowest
 
     @cached_property
     def path(self) -> Array:
-        """Where the hips are over the ground (T, 2)."""
+        """The place (T, 2) of the hips over the ground."""
         return self.joint("hips")[:, [0, 2]]
 
     @cached_property
     def facing(self) -> Array:
         """The angle (T,) about y that hips and shoulders face, in degrees, unwrapped; 0 is along z, 90 along x."""
-        pairs = [[self.joint(name)[:, [0, 2]] for name in pair(part)] for part in ("UpperLeg", "UpperArm")]
-        across = np.sum([direction(left - right) for left, right in pairs], axis=0)
-        found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))
-        return found
+        # hips and shoulders count the same
+        hips = direction(self._across("UpperLeg"))
+        shoulders = direction(self._across("UpperArm"))
+        return _unwrapped_angles(np.sum([hips, shoulders], axis=0))
 
     @cached_property
     def heading(self) -> Array:
         """The angle (T,) about y that the hips alone face, in degrees, unwrapped; 0 is along z, 90 along x."""
-        left, right = map(self.joint, pair("UpperLeg"))
-        across = left - right
-        found: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
-        return found
+        return _unwrapped_angles(self._across("UpperLeg"))
+
+    def _across(self, part: str) -> Array:
+        """The line (T, 2) over the ground from the right to the left joint of a part."""
+        left, right = map(self.joint, pair(part))
+        return left[:, [0, 2]] - right[:, [0, 2]]
 
     @property
     def turn(self) -> float:
-        """Degrees that the figure turns to the left, negative to the right, from its first to its last 0.3 s; more than
-        a whole turn where it continues."""
+        """Degrees that the figure turns from its first to its last 0.3 s, positive to the left; whole turns add up."""
         count = max(1, min(round(0.3 * RATE), len(self) // 2))
         return float(self.facing[-count:].mean() - self.facing[:count].mean())
 
     @cached_property
     def velocity(self) -> Array:
-        """How the hips move over the ground (T, 2), m/s: forward and to the left of where the figure faces.
+        """Velocity (T, 2) of the hips over the ground, m/s: forward and to the left of the figure's facing.
 
-        Means over 0.3 s, in which the sway within a step falls away.
+        Averaged over 0.3 s, which removes the sway within a step.
         """
         steps = np.diff(self.path, axis=0) * RATE
         if not len(steps):
             return np.zeros((1, 2))
-        (east, north), angle = calm(steps, 0.3).T, np.radians(self.facing[1:])
-        sin, cos = np.sin(angle), np.cos(angle)
-        moved = np.stack([east * sin + north * cos, east * cos - north * sin], axis=1)
-        return np.concatenate([moved[:1], moved])
+        x, z = calm(steps, 0.3).T
+        # turned into the figure's own directions
+        angle = np.radians(self.facing[1:])
+        sin = np.sin(angle)
+        cos = np.cos(angle)
+        velocity = np.stack([x * sin + z * cos, x * cos - z * sin], axis=1)
+        return np.concatenate([velocity[:1], velocity])
 
     @cached_property
     def pace(self) -> Array:
@@ -119,9 +126,14 @@ class Track:
         return length(self.velocity)
 
     def body(self, name: str) -> Array:
-        """A joint (T, 3) as the figure sees it: to its left and in front of its hips, and above the ground (y)."""
-        (x, _, z), angle = (self.joint(name) - self.joint("hips")).T, np.radians(self.facing)
-        left, front = x * np.cos(angle) - z * np.sin(angle), x * np.sin(angle) + z * np.cos(angle)
+        """A joint (T, 3) in the figure's space: to the left of the hips, above the ground, and in front of the hips."""
+        # relative to the hips, turned by the facing
+        x, _, z = (self.joint(name) - self.joint("hips")).T
+        angle = np.radians(self.facing)
+        sin = np.sin(angle)
+        cos = np.cos(angle)
+        left = x * cos - z * sin
+        front = x * sin + z * cos
         return np.stack([left, self.height(name), front], axis=1)
 
     def bodies(self, part: str) -> tuple[Array, Array]:
@@ -130,15 +142,16 @@ class Track:
         return left, right
 
     def motion_of(self, name: str, beside: str = "hips") -> Array:
-        """Speed (T,) of a joint relative to another one, m/s, over a tenth of a second."""
-        steps = length(np.diff(self.joint(name) - self.joint(beside), axis=0)) * RATE
-        return np.concatenate([[0.0], calm(steps, 0.1)])
+        """Speed (T,) of a joint relative to another one, m/s, averaged over a tenth of a second."""
+        offsets = self.joint(name) - self.joint(beside)
+        speeds = length(np.diff(offsets, axis=0)) * RATE
+        return np.concatenate([[0.0], calm(speeds, 0.1)])
 
 
 def track_of(motion: Motion) -> Track:
-    """The track of a motion of any human figure; MotionError for a figure that is none, or no frames."""
-    own = on_humanoid(motion)
-    return Track(resampled(positions(own), own.fps / RATE))
+    """The track of a motion of any human figure; MotionError for another figure, or without frames."""
+    humanoid = on_humanoid(motion)
+    return Track(resampled(positions(humanoid), humanoid.fps / RATE))
 
 
 def pair(part: str) -> tuple[str, str]:
@@ -148,26 +161,41 @@ def pair(part: str) -> tuple[str, str]:
 
 
 def direction(vectors: Array) -> Array:
-    """Vectors (T, N) at length 1."""
+    """Vectors (T, N), normalised."""
     return vectors / np.maximum(length(vectors), 1e-9)[:, None]
 
 
+def _unwrapped_angles(across: Array) -> Array:
+    """The facing (T,) in degrees, unwrapped, perpendicular to lines (T, 2) from right to left."""
+    angles: Array = np.degrees(np.unwrap(np.arctan2(-across[:, 1], across[:, 0])))
+    return angles
+
+
 def calm(values: Array, seconds: float) -> Array:
-    """Values (T, ...) averaged over a window of so many seconds; at the ends over the part of it that there is."""
+    """Values (T, ...) averaged over a window in seconds, or over its part in range at both ends."""
     return running_mean(values, 2 * (round(seconds * RATE) // 2) + 1)
 
 
 def longest(flags: Flags) -> float:
-    """Seconds of the longest stretch over which flags (T,) are true."""
+    """Seconds of the longest run of true flags (T,)."""
     return max((stop - start for start, stop in spells(flags)), default=0) / RATE
 
 
 def swings(values: Array, least: float) -> int:
-    """How many times values (T,) rise or fall by at least ``least``; what goes back by less is part of the same."""
-    count, rising, low, high = 0, None, np.inf, -np.inf
+    """How many times values (T,) rise or fall by at least ``least``; smaller reversals do not count."""
+    count = 0
+    rising = None
+    low = np.inf
+    high = -np.inf
     for value in values.tolist():
-        low, high = min(low, value), max(high, value)
-        up, down = value - low >= least and rising is not True, high - value >= least and rising is not False
-        if up or down:
-            count, rising, low, high = count + 1, up, value, value
+        low = min(low, value)
+        high = max(high, value)
+        # a turn back by ``least`` begins the next swing
+        rises = value - low >= least and rising is not True
+        falls = high - value >= least and rising is not False
+        if rises or falls:
+            count += 1
+            rising = rises
+            low = value
+            high = value
     return count

@@ -11,7 +11,7 @@ from motet.figures.humanoid.bones import BONES
 from motet.steering.acts import Act, ActSettings
 from motet.steering.pose import Pose
 from motet_train.evaluate.steer import following
-from motet_train.evaluate.steer.told import act_figures, begins, from_path, going_figures
+from motet_train.evaluate.steer.commands import act_figures, begins, from_path, going_figures
 
 ARM = BONES.index("leftUpperArm")
 
@@ -94,8 +94,8 @@ def test_an_act_has_begun_half_way() -> None:
     act = act_of(np.full(40, 80.0))
     shown = np.concatenate([raised(0.0), raised(np.arange(1, 81, 4.0), 20), raised(80.0, 20)])
     # more than 40 of 80 degrees are turned in the eleventh tick, and frames before the first one do not count
-    assert begins(act, shown, np.arange(1, 35)) == 11
-    assert begins(act, np.repeat(shown[:1], 41, axis=0), np.arange(1, 35)) == np.inf
+    assert begins(act, shown, range(1, 35)) == 11
+    assert begins(act, np.repeat(shown[:1], 41, axis=0), range(1, 35)) == np.inf
 
 
 @pytest.fixture(autouse=True)
