@@ -2,7 +2,6 @@ import json
 import os
 import pickle
 import shutil
-import time
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -289,8 +288,9 @@ def test_a_model_of_a_relative_path_pickles_to_another_folder(
     assert model._source == (folder, SessionOptions(threads=2))
 
 
-def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
-    started = time.process_time()
+def test_bombs_are_refused_before_a_member_is_read(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     zeros = tmp_path / "zeros.zip"
     with zipfile.ZipFile(zeros, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("manifest.json", "w") as member:
         for _ in range(30):
@@ -299,7 +299,7 @@ def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(many, "w") as archive:
         for number in range(3_000):
             archive.writestr(f"{number}", b"")
-    written = time.process_time() - started
+    monkeypatch.setattr(zipfile.ZipFile, "open", lambda *_: pytest.fail("a member was read"))
     for path, reason in ((zeros, "unpacks to more than 100 times"), (many, "too many files")):
         with pytest.raises(BundleError, match=reason):
             load(path)
@@ -307,7 +307,6 @@ def test_bombs_are_refused_at_once(folder: Path, tmp_path: Path) -> None:
         (folder / f"{number}").touch()
     with pytest.raises(BundleError, match="it holds 74 files; a bundle has at most 64"):
         load(folder)
-    assert time.process_time() - started - written < 0.5
 
 
 def test_a_member_longer_than_declared_is_not_read_to_its_end(folder: Path) -> None:
