@@ -31,19 +31,18 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def entry(name: str, found: Any, first: dict[Any, str]) -> str:
+def entry(name: str, member: Any, first: dict[Any, str]) -> str:
     """A public name: a class with its public methods and properties, a function, a module or a constant.
 
     first: the class under which each member of a private base is described, which this adds to.
     """
-    if inspect.isclass(found):
-        code = "\n".join([f"class {name}", *fields(found)])
-        return f"### {name}\n\n{described(code, found)}{''.join(members(found, first))}"
-    if inspect.isfunction(found):
-        return f"### {name}\n\n{described(signature(found, name), found)}"
-    return (
-        f"### {name}\n\n{prose(inspect.getdoc(found)) if inspect.ismodule(found) else f'A {type(found).__name__}.'}\n"
-    )
+    if inspect.isclass(member):
+        code = "\n".join([f"class {name}", *fields(member)])
+        return f"### {name}\n\n{described(code, member)}{''.join(members(member, first))}"
+    if inspect.isfunction(member):
+        return f"### {name}\n\n{described(signature(member, name), member)}"
+    text = prose(inspect.getdoc(member)) if inspect.ismodule(member) else f"A {type(member).__name__}."
+    return f"### {name}\n\n{text}\n"
 
 
 def fields(kind: type) -> Iterator[str]:
@@ -60,19 +59,19 @@ def members(kind: type, first: dict[Any, str]) -> Iterator[str]:
     """What a class gives its users, but for what it has from another class of this page; what several have from a
     private base is described once."""
     elsewhere: dict[str, list[str]] = {}
-    for name, found in inspect.getmembers_static(kind):
-        owner = next(one for one in kind.__mro__ if name in vars(one))
+    for name, member in inspect.getmembers_static(kind):
+        owner = next(base for base in kind.__mro__ if name in vars(base))
         if name.startswith("_") or not owner.__module__.startswith("motet") or (owner is not kind and public(owner)):
             continue
         place = first.setdefault((owner, name), kind.__name__)
         if place != kind.__name__:
             elsewhere.setdefault(place, []).append(f"`{name}`")
             continue
-        if isinstance(found, property | cached_property):
-            getter = found.fget if isinstance(found, property) else found.func
+        if isinstance(member, property | cached_property):
+            getter = member.fget if isinstance(member, property) else member.func
             yield described(f"{kind.__name__}.{name}: {ast.unparse(tree(getter).returns)}", getter)
-        elif inspect.isroutine(found):
-            call = getattr(found, "__func__", found)
+        elif inspect.isroutine(member):
+            call = getattr(member, "__func__", member)
             if not (call.__doc__ or "").startswith("See :"):  # what it overrides is described
                 yield described(signature(call, f"{kind.__name__}.{name}"), call)
     for place, names in elsewhere.items():
@@ -84,20 +83,20 @@ def public(kind: type) -> bool:
     return getattr(motet, kind.__name__, None) is kind
 
 
-def described(code: str, found: Any) -> str:
+def described(code: str, member: Any) -> str:
     """Code with its docstring; "py", as blocks of "python" in the docs are run."""
-    return f"```py\n{code}\n```\n{prose(inspect.getdoc(found))}\n"
+    return f"```py\n{code}\n```\n{prose(inspect.getdoc(member))}\n"
 
 
-def tree(found: Any) -> Any:
+def tree(member: Any) -> Any:
     """The definition of a class or function as it is written."""
-    return ast.parse(textwrap.dedent(inspect.getsource(found))).body[0]
+    return ast.parse(textwrap.dedent(inspect.getsource(member))).body[0]
 
 
 def signature(call: Any, name: str) -> str:
     """The name and parameters of a function, a line for each where one line is too long."""
     node = tree(call)
-    node.args.args = [one for one in node.args.args if one.arg not in ("self", "cls")]
+    node.args.args = [parameter for parameter in node.args.args if parameter.arg not in ("self", "cls")]
     text = f"{name}({ast.unparse(node.args)}) -> {ast.unparse(node.returns)}"
     return text if len(text) <= 110 else re.sub(r", (?=(\*\*?)?\w+:|\*,)", ",\n    ", text.replace("(", "(\n    ", 1))
 
