@@ -42,7 +42,8 @@ function wanted({ point, turn }: Look, pose: Played, seen: Quaternion[], now: [l
   if (!point) return [0, 0];
   const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
   if (!(size(aim) > LOOKING.NEAR)) return [0, 0];
-  let [left, up] = angles(aim);
+  const [toSide, up] = angles(aim);
+  let left = toSide;
   if (Math.abs(left) > LOOKING.BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
   left *= Math.min(Math.hypot(aim[0], aim[2]) / LOOKING.UNDER, 1);
   return [clamp(left, -LOOKING.MOST[0], LOOKING.MOST[0]) - now[0], clamp(up, -LOOKING.MOST[1], LOOKING.MOST[1]) - now[1]];
