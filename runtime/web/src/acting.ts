@@ -5,7 +5,16 @@ import type { ControlModel } from "./control.js";
 import { BONES, LEG, SIDES } from "./humanoid.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
-import { inverse, nearestTurn, ofVector, product, type Quaternion, size, type Vector, vectorOf } from "./rotations.js";
+import {
+  inverse,
+  nearestTurn,
+  ofVector,
+  product,
+  type Quaternion,
+  size,
+  type Vector,
+  vectorOf,
+} from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
 import type { Played } from "./steering.js";
 import type { Settings } from "./settings.js";
@@ -55,7 +64,17 @@ export function noAct({ steerer }: ControlModel, playback: Playback): Acting {
   const base = steerer.body(playback);
   const none = () => Array<number>(3 * BONES.length + 1).fill(0);
   const body = { base, shown: base, before: base };
-  return { playing: null, asked: null, ...body, led: false, offset: none(), offsetRate: none(), damping: 0, going: [0, 0, 0], drift: [0, 0, 0] };
+  return {
+    playing: null,
+    asked: null,
+    ...body,
+    led: false,
+    offset: none(),
+    offsetRate: none(),
+    damping: 0,
+    going: [0, 0, 0],
+    drift: [0, 0, 0],
+  };
 }
 
 /** What a figure does, and the seconds that are left of it. */
@@ -70,11 +89,19 @@ export function doing({ playing, asked }: Acting, fps: number): Doing | null {
 }
 
 /** Before a tick: go on by a frame, begin what is asked, end what is over. Whether something else is shown from now on. */
-export function begin(model: ControlModel, acting: Acting, playback: Playback, target: Target, gait: number): boolean {
+export function begin(
+  model: ControlModel,
+  acting: Acting,
+  playback: Playback,
+  target: Target,
+  gait: number,
+): boolean {
   const { playing: now, asked } = acting;
   if (!now && !asked) return false;
   const goes = Math.hypot(target[0], target[1]) > 0;
-  const after = !asked ? next(now!, goes) : asked.act && entered(model, acting, asked.act, asked.upper, playback, goes);
+  const after = !asked
+    ? next(now!, goes)
+    : asked.act && entered(model, acting, asked.act, asked.upper, playback, goes);
   [acting.playing, acting.asked] = [after, null];
   if (now?.whole && !after?.whole) {
     const { steerer } = model;
@@ -90,12 +117,22 @@ function next(now: Playing, goes: boolean): Playing | null {
 }
 
 /** The act that is asked for, at the frame after the one that is most like the figure. */
-function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playing }: Acting, act: Act, upper: boolean | undefined, playback: Playback, goes: boolean): Playing {
+function entered(
+  { steerer: { matcher }, acts: how, fps }: ControlModel,
+  { playing }: Acting,
+  act: Act,
+  upper: boolean | undefined,
+  playback: Playback,
+  goes: boolean,
+): Playing {
   const moves = goes || Math.hypot(playback.spring[0], playback.spring[1]) > matcher.how.idle;
   const stays = moves && act.legs; // its legs go on as it ends
   const whole = upper === undefined ? stays || !moves : !upper;
   const isNow = matcher.now(playback);
-  if (playing) matcher.scaled(playing.act.features[playing.frame]!).forEach((value, i) => (playing.whole || i >= HANDS) && (isNow[i] = value));
+  if (playing)
+    matcher
+      .scaled(playing.act.features[playing.frame]!)
+      .forEach((value, i) => (playing.whole || i >= HANDS) && (isNow[i] = value));
   const entries = Math.min(Math.round(how.entry * fps), Math.floor((act.height.length - 1) / 3)) + 1;
   let [best, least] = [0, Infinity];
   for (let frame = 0; frame < entries; frame++) {
@@ -107,7 +144,14 @@ function entered({ steerer: { matcher }, acts: how, fps }: ControlModel, { playi
 }
 
 /** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */
-export function laid({ acts: how, steerer: { matcher } }: ControlModel, acting: Acting, pose: Played, playback: Playback, root: Ground, changed: boolean): Played {
+export function laid(
+  { acts: how, steerer: { matcher } }: ControlModel,
+  acting: Acting,
+  pose: Played,
+  playback: Playback,
+  root: Ground,
+  changed: boolean,
+): Played {
   const { dt } = matcher;
   const { playing, base } = acting;
   acting.base = { rotations: pose.rotations, height: pose.height };
@@ -126,12 +170,20 @@ export function laid({ acts: how, steerer: { matcher } }: ControlModel, acting: 
   acting.shown = plus(source(acting, acting.base, 0), acting.offset);
   acting.going = each((i) => step[i]! / dt + acting.drift[i]!);
   const to = playing?.whole ? each((i) => root[i]! + step[i]!) : playback.root;
-  playback.root = [to[0] + acting.drift[0] * dt, to[1] + acting.drift[1] * dt, wrapped(to[2] + acting.drift[2] * dt)];
+  playback.root = [
+    to[0] + acting.drift[0] * dt,
+    to[1] + acting.drift[1] * dt,
+    wrapped(to[2] + acting.drift[2] * dt),
+  ];
   if (playing?.whole) {
     playback.spring = [acting.going[0], acting.going[1], playback.root[2]];
     playback.springRate = [0, 0, 0];
   }
-  return { ...acting.shown, ground: playback.root, contacts: playing?.whole ? playing.act.contacts[playing.frame]! : pose.contacts };
+  return {
+    ...acting.shown,
+    ground: playback.root,
+    contacts: playing?.whole ? playing.act.contacts[playing.frame]! : pose.contacts,
+  };
 }
 
 function each(value: (i: number) => number): Ground {
@@ -142,16 +194,27 @@ function each(value: (i: number) => number): Ground {
  * What is lost from the last tick to this one is added: of the upper body, and where an act leads the whole body, or led it, of
  * all of it and of the velocity. base: of the last tick without acts.
  */
-function lose(acting: Acting, { blend, far }: Settings<typeof actSettings>, base: Body, step: Ground, dt: number): void {
+function lose(
+  acting: Acting,
+  { blend, far }: Settings<typeof actSettings>,
+  base: Body,
+  step: Ground,
+  dt: number,
+): void {
   const { shown, before } = acting;
   const ahead = since(plus(shown, since(shown, before)), source(acting, acting.base, 0));
   const off = since(shown, source(acting, base, 1));
-  BONES.forEach((_, bone) => off.splice(3 * bone, 3, ...nearestTurn(vectorAt(off, bone), vectorAt(ahead, bone))));
+  BONES.forEach((_, bone) =>
+    off.splice(3 * bone, 3, ...nearestTurn(vectorAt(off, bone), vectorAt(ahead, bone))),
+  );
   const leads = acting.led || acting.playing?.whole;
   const isNew = (i: number) => leads || UPPER[Math.floor(i / 3)];
   acting.offsetRate = ahead.map((value, i) => (isNew(i) ? (value - off[i]!) / dt : acting.offsetRate[i]!));
   acting.offset = off.map((value, i) => (isNew(i) ? value : acting.offset[i]!));
-  const farthest = Math.max(...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))), ACTING.METRE * Math.abs(acting.offset.at(-1)!));
+  const farthest = Math.max(
+    ...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))),
+    ACTING.METRE * Math.abs(acting.offset.at(-1)!),
+  );
   acting.damping = dampingOf(blend) / clamp(farthest / far, 1, ACTING.LONGER);
   if (leads) acting.drift = each((i) => acting.going[i]! - step[i]! / dt);
 }

@@ -7,7 +7,20 @@ import { contacts } from "./hold.js";
 import { BONES, groundUnder, HUMANOID, SIDES, solePoints } from "./humanoid.js";
 import { type Motion, type World, worldOf } from "./motion.js";
 import { moved, type Pose as Ground } from "./planar.js";
-import { about, minus, normalised, product, type Quaternion, quaternionOf, rotated, rotationOf, size, STILL, type Vector, Y } from "./rotations.js";
+import {
+  about,
+  minus,
+  normalised,
+  product,
+  type Quaternion,
+  quaternionOf,
+  rotated,
+  rotationOf,
+  size,
+  STILL,
+  type Vector,
+  Y,
+} from "./rotations.js";
 import { wrapped } from "./springs.js";
 import type { Played } from "./steering.js";
 
@@ -33,9 +46,15 @@ export interface Act {
 export function actOf({ fps, acts: { rest } }: ControlModel, name: string, numbers: ArrayLike<number>): Act {
   const values = Array.from(numbers);
   const frames = values.length / ACTS.WIDTH;
-  if (!Number.isInteger(frames) || frames < ACTS.SHORTEST) throw new ControlError(`an act needs ${ACTS.SHORTEST} or more frames of ${ACTS.WIDTH} numbers, not ${values.length} numbers`);
-  if (!values.every((value) => Math.abs(value) <= ACTS.LARGEST)) throw new ControlError(`an act must be finite numbers, no larger than ${ACTS.LARGEST}`);
-  const rows = Array.from({ length: frames }, (_, at) => values.slice(at * ACTS.WIDTH, (at + 1) * ACTS.WIDTH));
+  if (!Number.isInteger(frames) || frames < ACTS.SHORTEST)
+    throw new ControlError(
+      `an act needs ${ACTS.SHORTEST} or more frames of ${ACTS.WIDTH} numbers, not ${values.length} numbers`,
+    );
+  if (!values.every((value) => Math.abs(value) <= ACTS.LARGEST))
+    throw new ControlError(`an act must be finite numbers, no larger than ${ACTS.LARGEST}`);
+  const rows = Array.from({ length: frames }, (_, at) =>
+    values.slice(at * ACTS.WIDTH, (at + 1) * ACTS.WIDTH),
+  );
   const poses = rows.map((row): Played => ({
     ground: [row[ACTS.WIDTH - 4]!, row[ACTS.WIDTH - 3]!, row[ACTS.WIDTH - 2]!],
     rotations: BONES.map((_, bone) => unitOf(row.slice(4 * bone, 4 * bone + 4) as Quaternion)),
@@ -44,21 +63,46 @@ export function actOf({ fps, acts: { rest } }: ControlModel, name: string, numbe
   }));
   const world = worldOf(motionOf(poses, fps));
   const places = (at: number) => world.places[at]!.flat();
-  const fast = rows.map((_, at) => Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) > rest);
+  const fast = rows.map(
+    (_, at) =>
+      Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) > rest,
+  );
   const [first, last] = [fast.indexOf(true), fast.lastIndexOf(true)];
-  const within = <T>(all: T[]): T[] => (first >= 0 && last - first >= Math.round(ACTS.MOVES * fps) ? all.slice(first, last + 1) : all);
-  const [height, ground] = [within(poses.map(({ height }) => height)), within(poses.map(({ ground }) => ground))];
-  const features = within(poseFeatures(world, poses.map(({ ground }) => ground), fps));
+  const within = <T>(all: T[]): T[] =>
+    first >= 0 && last - first >= Math.round(ACTS.MOVES * fps) ? all.slice(first, last + 1) : all;
+  const [height, ground] = [
+    within(poses.map(({ height }) => height)),
+    within(poses.map(({ ground }) => ground)),
+  ];
+  const features = within(
+    poseFeatures(
+      world,
+      poses.map(({ ground }) => ground),
+      fps,
+    ),
+  );
   const contacts = within(footContacts(world, fps));
   const legs = byLegs(height, ground, features);
-  return { name, rotations: within(poses.map(({ rotations }) => rotations)), height, ground, contacts, legs, features };
+  return {
+    name,
+    rotations: within(poses.map(({ rotations }) => rotations)),
+    height,
+    ground,
+    contacts,
+    legs,
+    features,
+  };
 }
 
 function byLegs(height: number[], ground: Ground[], features: number[][]): boolean {
   const range = (values: number[]) => Math.max(...values) - Math.min(...values);
   let facing = 0;
   const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
-  return range([ACTS.STANDS, ...height]) > ACTS.BENT || Math.max(...features.map((one) => Math.max(one[1]!, one[4]!))) > ACTS.RAISED || range(turned) > ACTS.TURNED;
+  return (
+    range([ACTS.STANDS, ...height]) > ACTS.BENT ||
+    Math.max(...features.map((one) => Math.max(one[1]!, one[4]!))) > ACTS.RAISED ||
+    range(turned) > ACTS.TURNED
+  );
 }
 
 /** Metres from where an act begins to where it ends. */
@@ -92,7 +136,9 @@ export function motionOf(poses: Pick<Played, "ground" | "rotations" | "height">[
     own[0] = product(about(Y, pose.ground[2]), own[0]!);
     return own;
   });
-  const translations = poses.map(({ ground: [x, z], height }) => HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [x, height, z])));
+  const translations = poses.map(({ ground: [x, z], height }) =>
+    HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [x, height, z])),
+  );
   return { skeleton: HUMANOID, fps, rotations, translations, travels: true };
 }
 
@@ -104,14 +150,18 @@ function rate(values: (at: number) => number[], at: number, frames: number, fps:
 }
 
 /** Joints of which the features tell. */
-const [TOES, HANDS] = ["Toes", "Hand"].map((part) => SIDES.map((side) => HUMANOID.index(side + part))) as [number[], number[]];
+const [TOES, HANDS] = ["Toes", "Hand"].map((part) => SIDES.map((side) => HUMANOID.index(side + part))) as [
+  number[],
+  number[],
+];
 
 function poseFeatures({ places }: World, way: Ground[], fps: number): number[][] {
   return places.map((now, at) => {
     const [x, z, facing] = way[at]!;
     const seen = (vector: Vector) => rotated(about(Y, -facing), vector);
     const place = (joint: number) => seen(minus(now[joint]!, [x, 0, z]));
-    const speed = (joint: number) => seen(rate((frame) => places[frame]![joint]!, at, places.length, fps) as Vector);
+    const speed = (joint: number) =>
+      seen(rate((frame) => places[frame]![joint]!, at, places.length, fps) as Vector);
     return [...TOES.map(place), ...TOES.map(speed), speed(0), ...HANDS.map(place)].flat();
   });
 }
@@ -120,7 +170,10 @@ function footContacts(world: World, fps: number): [number, number][] {
   const soles = solePoints(world);
   const ground = groundUnder(soles);
   const points = soles.map((frame) => frame.map(([x, y, z]): Vector => [x, y - ground, z]));
-  const touch = contacts(points, fps).map((row): [number, number] => [Math.max(...row.slice(0, 3)), Math.max(...row.slice(3))]);
+  const touch = contacts(points, fps).map((row): [number, number] => [
+    Math.max(...row.slice(0, 3)),
+    Math.max(...row.slice(3)),
+  ]);
   return [touch[0]!, ...touch];
 }
 

@@ -6,8 +6,26 @@ import type { Body } from "./body.js";
 import { ARM, directionOf, LEG, SIDES } from "./humanoid.js";
 import { carrierOf, LIMBS } from "./jointMap.js";
 import {
-  cross, dot, inverse, minus, ofVector, plus, product, type Quaternion, quaternionOf, rotated, size, STILL, swing, times, unit,
-  type Vector, vectorOf, X, Y, Z,
+  cross,
+  dot,
+  inverse,
+  minus,
+  ofVector,
+  plus,
+  product,
+  type Quaternion,
+  quaternionOf,
+  rotated,
+  size,
+  STILL,
+  swing,
+  times,
+  unit,
+  type Vector,
+  vectorOf,
+  X,
+  Y,
+  Z,
 } from "./rotations.js";
 import type { World } from "./motion.js";
 
@@ -22,7 +40,9 @@ export function frame(left: Vector, up: Vector, upright = true): Quaternion {
 }
 
 const AXES: Vector[] = [X, Y, Z].flatMap((axis) => [axis, times(axis, -1)]);
-const AXES_TURNS = AXES.flatMap((x) => AXES.filter((y) => !dot(x, y)).map((y) => quaternionOf([x, y, cross(x, y)])));
+const AXES_TURNS = AXES.flatMap((x) =>
+  AXES.filter((y) => !dot(x, y)).map((y) => quaternionOf([x, y, cross(x, y)])),
+);
 
 /** The nearest rotation that turns axes into axes where it is within some degrees, else the rotation itself. */
 export function nearAxes(turn: Quaternion, degrees: number): Quaternion {
@@ -38,7 +58,8 @@ export function bodyFrame(pose: Vector[], body: Body, exact = false): Quaternion
   const found = frame(across, up);
   const own = exact ? found : nearAxes(found, 15);
   const seen = (vector: Vector) => rotated(inverse(own), vector);
-  const bones = (parts: string[]) => SIDES.flatMap((side) => parts.map((part) => side + part)).filter((bone) => body.aimed(bone));
+  const bones = (parts: string[]) =>
+    SIDES.flatMap((side) => parts.map((part) => side + part)).filter((bone) => body.aimed(bone));
   const legs = bones(LEG.slice(0, 2)).every((bone) => seen(body.direction(pose, bone))[1] < -0.75);
   const stands = legs && dot(body.trunkUp(pose), rotated(own, Y)) > 0.85;
   const feet = bones(["Foot"]).every((bone) => seen(body.direction(pose, bone))[2] > 0.2);
@@ -51,7 +72,10 @@ export function restsInMotion(body: Body): boolean {
   const { rest } = body.skeleton;
   const own = frame(body.toLeft(rest, "UpperLeg"), body.trunkUp(rest));
   const parts = [...LEG.slice(0, 2), ...ARM.slice(1, 3)].filter((part) => body.aimed(`left${part}`));
-  const [left, right] = SIDES.map((side) => parts.map((part) => body.direction(rest, side + part))) as [Vector[], Vector[]];
+  const [left, right] = SIDES.map((side) => parts.map((part) => body.direction(rest, side + part))) as [
+    Vector[],
+    Vector[],
+  ];
   const seen = (vector: Vector) => rotated(inverse(own), vector);
   const mirrored = ([x, y, z]: Vector): Vector => [-x, y, z];
   const alike = left.map((one, at) => dot(seen(one), mirrored(seen(right[at]!))));
@@ -60,11 +84,18 @@ export function restsInMotion(body: Body): boolean {
 }
 
 /** A of all joints that are bones, no turn for others, from the joints' rotations in a standing pose and its frame. */
-export function alignmentsOfPose(body: Body, turns: Quaternion[], pose: Vector[], own: Quaternion): Quaternion[] {
+export function alignmentsOfPose(
+  body: Body,
+  turns: Quaternion[],
+  pose: Vector[],
+  own: Quaternion,
+): Quaternion[] {
   const { map, skeleton } = body;
   const bones = [...Object.keys(map.joints), "spine", "neck"];
   const known = (bone: string) => product(own, ofVector(times(map.rest![bone] ?? [0, 0, 0], RADIANS)));
-  const found = map.rest ? Object.fromEntries(bones.map((bone) => [bone, known(bone)])) : foundTurns(body, pose, own);
+  const found = map.rest
+    ? Object.fromEntries(bones.map((bone) => [bone, known(bone)]))
+    : foundTurns(body, pose, own);
   const wanted = new Map(Object.entries(map.joints).map(([bone, joint]) => [joint, found[bone]!]));
   wanted.set(carrierOf(map, skeleton), found.hips!);
   for (const joint of map.spine) wanted.set(joint, found.spine ?? own);
@@ -81,7 +112,8 @@ function foundTurns(body: Body, pose: Vector[], own: Quaternion): Record<string,
       if (body.aimed(bone) && !bone.endsWith("Toes")) {
         const [target, start] = [body.direction(pose, bone), rotated(carried, directionOf(bone))];
         if (bone.endsWith("Foot")) carried = footTurn(target, own, carried);
-        else if (!bone.endsWith("Hand") || dot(start, target) > 0.8) carried = product(swing(start, target), carried);
+        else if (!bone.endsWith("Hand") || dot(start, target) > 0.8)
+          carried = product(swing(start, target), carried);
       }
       found[bone] = carried;
     }
@@ -94,32 +126,45 @@ function footTurn(target: Vector, body: Quaternion, leg: Quaternion): Quaternion
   const aside = (turn: Quaternion) => Math.abs(dot(rotated(turn, X), target));
   const base = aside(leg) < aside(body) - 1e-3 ? leg : body;
   const [x, y, z] = rotated(inverse(base), target);
-  if (z < 0.5 * Math.hypot(x, y) && z < 0.5) return product(swing(rotated(base, directionOf("leftFoot")), target), base);
+  if (z < 0.5 * Math.hypot(x, y) && z < 0.5)
+    return product(swing(rotated(base, directionOf("leftFoot")), target), base);
   return product(base, swing(Z, [x, 0, z]));
 }
 
 /** Whether the axes that a convention says fit a skeleton, as its bones point in the frames. */
 export function axesAgree(body: Body, { turns, places }: World): boolean {
   const { map } = body;
-  const seen = Object.keys(body.aims).filter((bone) => body.aimed(bone)).map((bone) => {
-    return [map.joints[bone]!, directionOf(bone), places.map((pose) => body.along(pose, bone))] as const;
-  });
+  const seen = Object.keys(body.aims)
+    .filter((bone) => body.aimed(bone))
+    .map((bone) => {
+      return [map.joints[bone]!, directionOf(bone), places.map((pose) => body.along(pose, bone))] as const;
+    });
   const left = (part: string) => places.map((pose) => body.toLeft(pose, part));
   seen.push([map.joints.hips!, X, left("UpperLeg")], [map.spine.at(-1)!, X, left("UpperArm")]);
   const known = seen.filter(([joint]) => map.axes[joint]);
-  return known.length > 0 && known.every(([joint, direction, along]) => {
-    const own = meanDirection(turns.map((turned) => turned[joint]!), along);
-    return dot(own, rotated(knownAxes(map.axes[joint]!), direction)) > 0.7;
-  });
+  return (
+    known.length > 0 &&
+    known.every(([joint, direction, along]) => {
+      const own = meanDirection(
+        turns.map((turned) => turned[joint]!),
+        along,
+      );
+      return dot(own, rotated(knownAxes(map.axes[joint]!), direction)) > 0.7;
+    })
+  );
 }
 
 /** The mean direction of vectors by frame, in the frames of a joint with these rotations. */
 export function meanDirection(turns: Quaternion[], along: Vector[]): Vector {
-  return unit(along.reduce((sum, vector, at) => plus(sum, rotated(inverse(turns[at]!), unit(vector))), [0, 0, 0]));
+  return unit(
+    along.reduce((sum, vector, at) => plus(sum, rotated(inverse(turns[at]!), unit(vector))), [0, 0, 0]),
+  );
 }
 
 /** The rotation with columns such as "-z x -y". */
 export function knownAxes(axes: string): Quaternion {
-  const columns = axes.split(" ").map((word) => times([X, Y, Z]["xyz".indexOf(word.at(-1)!)]!, word[0] === "-" ? -1 : 1));
+  const columns = axes
+    .split(" ")
+    .map((word) => times([X, Y, Z]["xyz".indexOf(word.at(-1)!)]!, word[0] === "-" ? -1 : 1));
   return quaternionOf(columns as [Vector, Vector, Vector]);
 }

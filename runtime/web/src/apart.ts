@@ -18,7 +18,10 @@ export function keptApart(figure: Walker, others: readonly Walker[], room: numbe
     const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), APART.SOON);
     const [nearX, nearZ] = [x + soon * u, z + soon * v];
     if (nearX * nearX + nearZ * nearZ >= room * room) continue;
-    const by = APART.STRENGTH * Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) * (1 - soon / APART.SOON);
+    const by =
+      APART.STRENGTH *
+      Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) *
+      (1 - soon / APART.SOON);
     // head on there is no way away from the other: to the right of the way there
     const [rightX, rightZ] = unit(z, -x);
     const [awayX, awayZ] = unit(nearX + 0.1 * room * rightX, nearZ + 0.1 * room * rightZ);

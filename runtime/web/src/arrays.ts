@@ -48,16 +48,22 @@ const LONGEST = 1000;
 
 /** A .npy file of version 1.0 in C order, little-endian; float16 becomes float32. BundleError for any other. */
 export function readNpy(name: string, bytes: Uint8Array): NumberArray & { descr: string } {
-  if (MAGIC.some((byte, at) => bytes[at] !== byte)) throw new BundleError(`${name} is not a .npy file of version 1.0`);
+  if (MAGIC.some((byte, at) => bytes[at] !== byte))
+    throw new BundleError(`${name} is not a .npy file of version 1.0`);
   const start = 10 + bytes[8]! + 256 * bytes[9]!;
   const text = String.fromCharCode(...bytes.subarray(10, Math.min(start, 10 + LONGEST)));
   const found = /^\{'descr': '([^']+)', 'fortran_order': False, 'shape': \(([0-9, ]*)\), \}\s*$/.exec(text);
   if (!found) throw new BundleError(`${name}: its header is not one that motet writes`);
   const descr = found[1]!;
-  const shape = found[2]!.split(",").map((size) => size.trim()).filter(Boolean).map(Number);
+  const shape = found[2]!
+    .split(",")
+    .map((size) => size.trim())
+    .filter(Boolean)
+    .map(Number);
   const count = shape.reduce((product, size) => product * size, 1);
   const width = Number(descr[2]);
-  if (bytes.length - start !== count * width) throw new BundleError(`${name}: its size does not fit its shape`);
+  if (bytes.length - start !== count * width)
+    throw new BundleError(`${name}: its size does not fit its shape`);
   const raw = bytes.slice(start).buffer;
   if (descr === "<f2") return { data: halves(new Uint16Array(raw)), shape, descr };
   const type = TYPES[descr as keyof typeof TYPES];
@@ -69,7 +75,8 @@ export function readNpy(name: string, bytes: Uint8Array): NumberArray & { descr:
 export async function readNpz(bytes: Uint8Array, limit: number): Promise<Map<string, NumberArray>> {
   const zip = openZip(bytes);
   const found = new Map<string, NumberArray>();
-  for (const name of zip.names) found.set(name.replace(/\.npy$/, ""), readNpy(name, await zip.read(name, limit)));
+  for (const name of zip.names)
+    found.set(name.replace(/\.npy$/, ""), readNpy(name, await zip.read(name, limit)));
   return found;
 }
 
@@ -80,8 +87,11 @@ export function halves(bits: Uint16Array): Float32Array {
   for (let at = 0; at < bits.length; at++) {
     const half = bits[at]!;
     const exponent = half & 0x7c00;
-    if (exponent && exponent < 0x7c00) words[at] = ((half & 0x8000) << 16) | (((half & 0x7fff) + 0x1c000) << 13);
-    else found[at] = (half & 0x8000 ? -1 : 1) * (exponent ? (half & 1023 ? NaN : Infinity) : (half & 1023) * 2 ** -24);
+    if (exponent && exponent < 0x7c00)
+      words[at] = ((half & 0x8000) << 16) | (((half & 0x7fff) + 0x1c000) << 13);
+    else
+      found[at] =
+        (half & 0x8000 ? -1 : 1) * (exponent ? (half & 1023 ? NaN : Infinity) : (half & 1023) * 2 ** -24);
   }
   return found;
 }

@@ -23,7 +23,8 @@ export interface Going {
 /** On a path of two points or more. */
 export function sent(points: Point[], told: Pick<Going, "gait" | "speed" | "facing">): Going {
   const along = [0];
-  for (let at = 1; at < points.length; at++) along.push(along[at - 1]! + distance(points[at - 1]!, points[at]!));
+  for (let at = 1; at < points.length; at++)
+    along.push(along[at - 1]! + distance(points[at - 1]!, points[at]!));
   return { points, along, gone: 0, stops: false, arrived: false, ...told };
 }
 
@@ -57,12 +58,18 @@ export function faces({ points, facing }: Going, { root, spring }: Playback, [x,
 }
 
 /** Move a figure that comes to rest to where it is to stand. */
-export function settle({ points, stops }: Going, playback: Playback, halfLife: number, seconds: number): void {
+export function settle(
+  { points, stops }: Going,
+  playback: Playback,
+  halfLife: number,
+  seconds: number,
+): void {
   const [x, z, facing] = playback.root;
   const off = minus(minus(points.at(-1)!, [x, z]), rolling(playback, halfLife));
   const far = Math.hypot(...off);
   if (!stops || far >= ARRIVING.GLIDES_FROM) return;
-  const most = (ARRIVING.GLIDES[0] + ARRIVING.GLIDES[1] * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
+  const most =
+    (ARRIVING.GLIDES[0] + ARRIVING.GLIDES[1] * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
   const share = Math.min(seconds / ARRIVING.SETTLES, most / Math.max(far, 1e-9));
   playback.root = [x + off[0] * share, z + off[1] * share, facing];
 }

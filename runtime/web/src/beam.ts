@@ -23,14 +23,22 @@ export interface Limits {
 }
 
 /** The most probable sequences for a context (1, C), best first: docs/reference/bundle.md, the loop `beam`. */
-export async function beamSearch(step: Graph, context: NumberArray<Float32Array>, limits: Limits, beams: number): Promise<Hypothesis[]> {
+export async function beamSearch(
+  step: Graph,
+  context: NumberArray<Float32Array>,
+  limits: Limits,
+  beams: number,
+): Promise<Hypothesis[]> {
   const { start, end, banned, longest } = limits;
   let kept: Open[] = [{ ids: [], score: 0, ended: false }];
   let states = step.zeroState(1);
   for (let length = 0; length <= longest && kept.some((one) => !one.ended); length++) {
     const open = kept.filter((one) => !one.ended);
     const word = integers(open.map((one) => one.ids.at(-1) ?? start));
-    const repeated = taken({ context }, open.map(() => 0));
+    const repeated = taken(
+      { context },
+      open.map(() => 0),
+    );
     const { outputs, states: next } = await step.step({ word, context: repeated.context! }, states);
     const { data, shape } = outputs.log_probabilities!;
     const words = shape[1]!;
@@ -58,7 +66,12 @@ export async function beamSearch(step: Graph, context: NumberArray<Float32Array>
 }
 
 /** The log-probability of a sequence of ids, and of its end, for a context (1, C). */
-export async function scoreWords(step: Graph, context: NumberArray<Float32Array>, { start, end }: Limits, ids: number[]): Promise<number> {
+export async function scoreWords(
+  step: Graph,
+  context: NumberArray<Float32Array>,
+  { start, end }: Limits,
+  ids: number[],
+): Promise<number> {
   let states = step.zeroState(1);
   let sum = 0;
   for (const [at, id] of [...ids, end].entries()) {

@@ -8,12 +8,19 @@ import { cross, dot, type Rotation, rotationOf, unit, type Vector } from "./rota
 const STEPS = 3;
 
 /** What fills a gap of so many frames (frames, E) between frames before it (P, E) and after it (A, E). */
-export async function between(filler: Graph, past: ArrayLike<number>[], after: ArrayLike<number>[], frames: number) {
+export async function between(
+  filler: Graph,
+  past: ArrayLike<number>[],
+  after: ArrayLike<number>[],
+  frames: number,
+) {
   const pose = poseOf(past.at(-1)!);
   const [before, behind] = [past, after].map((given) => given.map((frame) => seenFrom(frame, pose)));
   const plain = bridge(before!, behind!, frames);
   const batch = (given: ArrayLike<number>[]) => stacked(given, 1, given.length, given[0]!.length);
-  const { data, shape } = (await filler.run({ past: batch(before!), plain: batch(plain), after: batch(behind!) })).filled!;
+  const { data, shape } = (
+    await filler.run({ past: batch(before!), plain: batch(plain), after: batch(behind!) })
+  ).filled!;
   const width = shape[2]!;
   return Array.from({ length: frames }, (_, at) => putAt(data.subarray(at * width, (at + 1) * width), pose));
 }
@@ -59,8 +66,10 @@ function bridge(past: Float64Array[], after: Float64Array[], frames: number): Fl
     const found = new Float64Array(start.length);
     for (let i = 0; i < PLACED.ROOT_PLACE; i++) {
       found[i] =
-        (1 + 2 * s) * (1 - s) ** 2 * start[i]! + s * (1 - s) ** 2 * (frames + 1) * leaves[i]! +
-        s ** 2 * (3 - 2 * s) * end[i]! - s ** 2 * (1 - s) * (frames + 1) * arrives[i]!;
+        (1 + 2 * s) * (1 - s) ** 2 * start[i]! +
+        s * (1 - s) ** 2 * (frames + 1) * leaves[i]! +
+        s ** 2 * (3 - 2 * s) * end[i]! -
+        s ** 2 * (1 - s) * (frames + 1) * arrives[i]!;
     }
     for (let bone = PLACED.ROOT_PLACE; bone < start.length; bone += 6) {
       const [x, y] = partOfTheWay(rotationOf(start, bone), rotationOf(end, bone), s);
@@ -85,8 +94,12 @@ function partOfTheWay(from: Rotation, to: Rotation, share: number): Rotation {
   const sine = Math.hypot(...axis) / 2;
   const angle = Math.atan2(sine, (turn[0][0] + turn[1][1] + turn[2][2] - 1) / 2);
   const about: Vector = sine > 1e-9 ? unit(axis) : [1, 0, 0];
-  const done = [0, 1, 2].map((i) => rotated([+(i === 0), +(i === 1), +(i === 2)], about, share * angle)) as Rotation;
-  return done.map((column) => [0, 1, 2].map((i) => from[0][i]! * column[0] + from[1][i]! * column[1] + from[2][i]! * column[2])) as Rotation;
+  const done = [0, 1, 2].map((i) =>
+    rotated([+(i === 0), +(i === 1), +(i === 2)], about, share * angle),
+  ) as Rotation;
+  return done.map((column) =>
+    [0, 1, 2].map((i) => from[0][i]! * column[0] + from[1][i]! * column[1] + from[2][i]! * column[2]),
+  ) as Rotation;
 }
 
 /** A vector turned about a unit axis (Rodrigues). */

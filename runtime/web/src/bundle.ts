@@ -62,7 +62,8 @@ export class Bundle {
     const listed = Object.keys(manifest.files);
     const extra = zip.names.filter((name) => name !== "manifest.json" && !listed.includes(name));
     if (extra.length) throw new BundleError(`not in its manifest: ${extra.join(", ")}`);
-    if (listed.length > MEMBERS.MAX_FILES) throw new BundleError(`the bundle has more than ${MEMBERS.MAX_FILES} files`);
+    if (listed.length > MEMBERS.MAX_FILES)
+      throw new BundleError(`the bundle has more than ${MEMBERS.MAX_FILES} files`);
     return new Bundle(manifest, zip);
   }
 
@@ -70,11 +71,13 @@ export class Bundle {
   async read(name: string): Promise<Uint8Array> {
     const entry = this.manifest.files[name];
     if (!entry) throw new BundleError(`the file ${JSON.stringify(name)} is not in the manifest`);
-    if (!(entry.size <= MEMBERS.MAX_SIZE)) throw new BundleError(`${name} has ${entry.size} bytes; at most ${MEMBERS.MAX_SIZE} are read`);
+    if (!(entry.size <= MEMBERS.MAX_SIZE))
+      throw new BundleError(`${name} has ${entry.size} bytes; at most ${MEMBERS.MAX_SIZE} are read`);
     const bytes = await this.zip.read(name, entry.size);
     const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes as BufferSource));
     const hex = Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("");
-    if (bytes.length !== entry.size || hex !== entry.sha256) throw new BundleError(`the file ${name} was altered`);
+    if (bytes.length !== entry.size || hex !== entry.sha256)
+      throw new BundleError(`the file ${name} was altered`);
     return bytes;
   }
 
@@ -88,10 +91,13 @@ export class Bundle {
   /** A plain array. */
   async table(name: string): Promise<NumberArray> {
     const entry = this.manifest.tables[name];
-    if (!entry) throw new BundleError(`the bundle ${this.manifest.name} has no table ${JSON.stringify(name)}`);
+    if (!entry)
+      throw new BundleError(`the bundle ${this.manifest.name} has no table ${JSON.stringify(name)}`);
     const found = readNpy(entry.file, await this.read(entry.file));
     if (found.descr !== DTYPES[entry.dtype] || `${found.shape}` !== `${entry.shape}`) {
-      throw new BundleError(`table ${name} is ${found.descr} (${found.shape}), not ${entry.dtype} (${entry.shape})`);
+      throw new BundleError(
+        `table ${name} is ${found.descr} (${found.shape}), not ${entry.dtype} (${entry.shape})`,
+      );
     }
     if (found.data.some((value) => typeof value === "number" && !Number.isFinite(value))) {
       throw new BundleError(`table ${name} has numbers that are not finite`);
@@ -112,8 +118,10 @@ function parse(bytes: Uint8Array): Manifest {
   } catch {
     throw new BundleError("manifest.json is not JSON");
   }
-  if (!isObject(manifest) || !("format" in manifest)) throw new BundleError("manifest.json is not a bundle's manifest");
-  if (manifest.format !== MANIFEST.FORMAT) throw new BundleError(`this is a bundle of format ${manifest.format}; format ${MANIFEST.FORMAT} is read`);
+  if (!isObject(manifest) || !("format" in manifest))
+    throw new BundleError("manifest.json is not a bundle's manifest");
+  if (manifest.format !== MANIFEST.FORMAT)
+    throw new BundleError(`this is a bundle of format ${manifest.format}; format ${MANIFEST.FORMAT} is read`);
   checkManifest(manifest);
   return manifest as unknown as Manifest;
 }

@@ -27,8 +27,12 @@ export function readBVH(content: string | Uint8Array): Motion {
   const channels = nodes.flatMap((node, joint) => node.channels.map((kind) => ({ joint, kind })));
   const values = valuesOf(lines, start, channels.length);
   const count = channels.length ? values.length / channels.length : frames;
-  if (count < frames) throw new FormatError(`line ${start}: the file declares ${frames} frames but holds ${count}: it is cut short`);
-  if (count * nodes.length > 2 ** 25) throw new FormatError(`${count} frames of ${nodes.length} joints are too many`);
+  if (count < frames)
+    throw new FormatError(
+      `line ${start}: the file declares ${frames} frames but holds ${count}: it is cut short`,
+    );
+  if (count * nodes.length > 2 ** 25)
+    throw new FormatError(`${count} frames of ${nodes.length} joints are too many`);
   const skeleton = new Skeleton(nodes.map((node) => node.joint));
   const [rotations, translations]: [Quaternion[][], Vector[][]] = [[], []];
   for (let frame = 0; frame < count; frame++) {
@@ -60,7 +64,10 @@ function hierarchy(lines: string[]): { nodes: Node[]; end: number } {
   const taken = new Set<string>();
   let declared = false; // a joint has been named and its brace must follow
   for (const [at, content] of lines.entries()) {
-    for (const statement of content.split(/([{}])/).map((piece) => piece.trim()).filter(Boolean)) {
+    for (const statement of content
+      .split(/([{}])/)
+      .map((piece) => piece.trim())
+      .filter(Boolean)) {
       const [, word, rest] = /^(\S+)\s*(.*)$/.exec(statement) as unknown as [string, string, string];
       const keyword = word.toLowerCase();
       const line = at + 1;
@@ -72,22 +79,37 @@ function hierarchy(lines: string[]): { nodes: Node[]; end: number } {
       else if (keyword === "}" && inside) open.pop();
       else if (keyword === "offset" && inside) place(nodes[open.at(-1)!]!, rest, line);
       else if (keyword === "channels" && inside) channel(nodes[open.at(-1)!]!, rest, line);
-      else if (keyword === "motion" && nodes.length && !open.length && !declared) return { nodes: whole(nodes), end: at };
-      else if (keyword !== "hierarchy" || nodes.length) throw new FormatError(`line ${line}: ${quoted(statement)} does not belong here`);
+      else if (keyword === "motion" && nodes.length && !open.length && !declared)
+        return { nodes: whole(nodes), end: at };
+      else if (keyword !== "hierarchy" || nodes.length)
+        throw new FormatError(`line ${line}: ${quoted(statement)} does not belong here`);
       declared = names;
     }
   }
   throw new FormatError("not a BVH file, or cut short: the line MOTION is missing");
 }
 
-function nodeOf(keyword: string, name: string, parent: number, nodes: Node[], taken: Set<string>, line: number): Node {
+function nodeOf(
+  keyword: string,
+  name: string,
+  parent: number,
+  nodes: Node[],
+  taken: Set<string>,
+  line: number,
+): Node {
   const wanted = keyword === "end" ? nodes[parent]!.joint.name + SKELETON.END_SUFFIX : name || "joint";
-  return { joint: { name: unique(wanted, taken), parent, offset: [0, 0, 0], order: "zyx" }, line, placed: false, channels: [] };
+  return {
+    joint: { name: unique(wanted, taken), parent, offset: [0, 0, 0], order: "zyx" },
+    line,
+    placed: false,
+    channels: [],
+  };
 }
 
 function place(node: Node, rest: string, line: number): void {
   const values = numbers(rest, line);
-  if (values.length !== 3) throw new FormatError(`line ${line}: expected three numbers, not ${values.length}`);
+  if (values.length !== 3)
+    throw new FormatError(`line ${line}: expected three numbers, not ${values.length}`);
   node.joint.offset = values as Vector;
   node.placed = true;
 }
@@ -96,16 +118,27 @@ function channel(node: Node, rest: string, line: number): void {
   const [count, ...words] = rest.split(/\s+/);
   node.channels = words.map((word) => {
     const found = /^([xyz])(position|rotation)$/i.exec(word);
-    if (!found) throw new FormatError(`line ${line}: channel ${quoted(word)}: expected one of Xposition ... Zrotation`);
+    if (!found)
+      throw new FormatError(`line ${line}: channel ${quoted(word)}: expected one of Xposition ... Zrotation`);
     return (found[2]!.toLowerCase() === "position" ? "t" : "r") + found[1]!.toLowerCase();
   });
   if (count !== `${words.length}` || new Set(node.channels).size < words.length) {
-    throw new FormatError(`line ${line}: CHANNELS needs a count and that many different channels, not ${quoted(rest)}`);
+    throw new FormatError(
+      `line ${line}: CHANNELS needs a count and that many different channels, not ${quoted(rest)}`,
+    );
   }
-  const turns = node.channels.filter((kind) => kind[0] === "r").map((kind) => kind[1]!).join("");
+  const turns = node.channels
+    .filter((kind) => kind[0] === "r")
+    .map((kind) => kind[1]!)
+    .join("");
   // a missing axis does not turn: it comes where z, y and x come first
   const orders = ["zyx", "zxy", "yzx", "yxz", "xzy", "xyz"];
-  node.joint.order = orders.find((order) => Array.from(order).filter((axis) => turns.includes(axis)).join("") === turns)!;
+  node.joint.order = orders.find(
+    (order) =>
+      Array.from(order)
+        .filter((axis) => turns.includes(axis))
+        .join("") === turns,
+  )!;
 }
 
 function whole(nodes: Node[]): Node[] {
@@ -120,9 +153,13 @@ function header(lines: string[], end: number): { start: number; frames: number; 
   for (let at = end + 1; at < lines.length; at++) {
     const content = lines[at]!.trim();
     const found = /^(frames|frame\s+time)\s*:\s*(\S+)$/i.exec(content);
-    if (found && found[1]!.toLowerCase() === "frames" && /^[0-9]{1,15}$/.test(found[2]!)) frames = Number(found[2]);
+    if (found && found[1]!.toLowerCase() === "frames" && /^[0-9]{1,15}$/.test(found[2]!))
+      frames = Number(found[2]);
     else if (found && found[1]!.toLowerCase() !== "frames") fps = rate(found[2]!, at + 1);
-    else if (content) throw new FormatError(`line ${at + 1}: expected 'Frames: N' and 'Frame Time: SECONDS', not ${quoted(content)}`);
+    else if (content)
+      throw new FormatError(
+        `line ${at + 1}: expected 'Frames: N' and 'Frame Time: SECONDS', not ${quoted(content)}`,
+      );
     if (frames !== undefined && fps !== undefined) return { start: at + 1, frames, fps };
   }
   throw new FormatError("cut short: the file ends before 'Frames:' and 'Frame Time:'");
@@ -133,10 +170,13 @@ function rate(word: string, line: number): number {
   const seconds = numbers(word, line)[0]!;
   const fps = 1 / seconds;
   const [low, high] = TEXT.FRAME_RATES;
-  if (!(fps >= low && fps <= high)) throw new FormatError(`line ${line}: frame time ${word} s is out of range`);
+  if (!(fps >= low && fps <= high))
+    throw new FormatError(`line ${line}: frame time ${word} s is out of range`);
   const [, digits = "", power = "0"] = /^[^.e]*(?:\.([0-9]*))?(?:e(.*))?$/i.exec(word) ?? [];
   const precision = 0.51 * 10 ** (Number(power) - digits.length);
-  const near = [-1, 0, 1].map((step) => Math.round(fps) + step).filter((one) => one > 0 && Math.abs(1 / one - seconds) <= precision);
+  const near = [-1, 0, 1]
+    .map((step) => Math.round(fps) + step)
+    .filter((one) => one > 0 && Math.abs(1 / one - seconds) <= precision);
   return near.length === 1 ? near[0]! : fps;
 }
 
@@ -146,17 +186,23 @@ function valuesOf(lines: string[], start: number, width: number): Float64Array {
   for (let at = start; at < lines.length; at++) {
     for (const value of numbers(lines[at]!, at + 1)) found.push(value);
   }
-  if (found.length % width) throw new FormatError(`${found.length} values do not make whole frames of ${width}: the file is cut short`);
+  if (found.length % width)
+    throw new FormatError(
+      `${found.length} values do not make whole frames of ${width}: the file is cut short`,
+    );
   return Float64Array.from(found);
 }
 
 function numbers(content: string, line: number): number[] {
-  return content.split(/\s+/).filter(Boolean).map((word) => {
-    if (!/^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?$/i.test(word) || !Number.isFinite(Number(word))) {
-      throw new FormatError(`line ${line}: ${quoted(word)} is not a finite number`);
-    }
-    return Number(word);
-  });
+  return content
+    .split(/\s+/)
+    .filter(Boolean)
+    .map((word) => {
+      if (!/^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)(e[-+]?[0-9]+)?$/i.test(word) || !Number.isFinite(Number(word))) {
+        throw new FormatError(`line ${line}: ${quoted(word)} is not a finite number`);
+      }
+      return Number(word);
+    });
 }
 
 function quoted(text: string): string {
@@ -166,14 +212,40 @@ function quoted(text: string): string {
 /** The text of a BVH file that every reader accepts: rotations are Z Y X, and the root and joints that move have six channels. */
 export function toBVH(motion: Motion): string {
   const { skeleton, rotations, translations, fps } = checked(motion);
-  const still = skeleton.joints.map((_, at) => translations.every((moves) => same(moves[at]!, translations[0]![at]!)));
-  const moving = (at: number) => at === 0 || !still[at];
-  const { lines, order } = tree(skeleton, moving, (at) => (at && still[at] ? translations[0]![at]! : skeleton.joints[at]!.offset));
-  const angles = new Map(order.map((at) => [at, eulersOf(rotations.map((turns) => turns[at]!), "zyx")]));
-  const rows = rotations.map((_, frame) =>
-    order.flatMap((at) => [...(moving(at) ? translations[frame]![at]! : []), ...angles.get(at)![frame]!.map((angle) => angle / RADIANS)]).map(number).join(" "),
+  const still = skeleton.joints.map((_, at) =>
+    translations.every((moves) => same(moves[at]!, translations[0]![at]!)),
   );
-  return ["HIERARCHY", ...lines, "MOTION", `Frames: ${rows.length}`, `Frame Time: ${1 / fps}`, ...rows, ""].join("\n");
+  const moving = (at: number) => at === 0 || !still[at];
+  const { lines, order } = tree(skeleton, moving, (at) =>
+    at && still[at] ? translations[0]![at]! : skeleton.joints[at]!.offset,
+  );
+  const angles = new Map(
+    order.map((at) => [
+      at,
+      eulersOf(
+        rotations.map((turns) => turns[at]!),
+        "zyx",
+      ),
+    ]),
+  );
+  const rows = rotations.map((_, frame) =>
+    order
+      .flatMap((at) => [
+        ...(moving(at) ? translations[frame]![at]! : []),
+        ...angles.get(at)![frame]!.map((angle) => angle / RADIANS),
+      ])
+      .map(number)
+      .join(" "),
+  );
+  return [
+    "HIERARCHY",
+    ...lines,
+    "MOTION",
+    `Frames: ${rows.length}`,
+    `Frame Time: ${1 / fps}`,
+    ...rows,
+    "",
+  ].join("\n");
 }
 
 function same(a: Vector, b: Vector): boolean {
@@ -192,11 +264,20 @@ function tree(skeleton: Skeleton, moving: (joint: number) => boolean, offset: (j
   const write = (at: number, depth: number): void => {
     const indent = "\t".repeat(Math.min(depth, 40));
     const children = skeleton.children[at]!;
-    const lone = children.length === 1 && skeleton.names[children[0]!]!.endsWith(SKELETON.END_SUFFIX) && !skeleton.children[children[0]!]!.length;
+    const lone =
+      children.length === 1 &&
+      skeleton.names[children[0]!]!.endsWith(SKELETON.END_SUFFIX) &&
+      !skeleton.children[children[0]!]!.length;
     const spaced = (vector: Vector) => vector.map(number).join(" ");
     order.push(at);
-    lines.push(`${indent}${at ? "JOINT" : "ROOT"} ${names[at]}`, `${indent}{`, `${indent}\tOFFSET ${at ? spaced(offset(at)) : "0 0 0"}`);
-    lines.push(`${indent}\tCHANNELS ${moving(at) ? "6 Xposition Yposition Zposition" : "3"} Zrotation Yrotation Xrotation`);
+    lines.push(
+      `${indent}${at ? "JOINT" : "ROOT"} ${names[at]}`,
+      `${indent}{`,
+      `${indent}\tOFFSET ${at ? spaced(offset(at)) : "0 0 0"}`,
+    );
+    lines.push(
+      `${indent}\tCHANNELS ${moving(at) ? "6 Xposition Yposition Zposition" : "3"} Zrotation Yrotation Xrotation`,
+    );
     if (children.length === 0 || lone) {
       const tip = lone ? offset(children[0]!) : ([0, 0, 0] as Vector);
       lines.push(`${indent}\tEnd Site`, `${indent}\t{`, `${indent}\t\tOFFSET ${spaced(tip)}`, `${indent}\t}`);

@@ -5,7 +5,22 @@ import type { Body } from "./body.js";
 import { ARM, directionOf, LEG, SIDES } from "./humanoid.js";
 import type { World } from "./motion.js";
 import {
-  cross, inverse, minus, normalised, plus, product, type Quaternion, rotated, STILL, swing, times, unit, type Vector, X, Y, Z,
+  cross,
+  inverse,
+  minus,
+  normalised,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  STILL,
+  swing,
+  times,
+  unit,
+  type Vector,
+  X,
+  Y,
+  Z,
 } from "./rotations.js";
 
 /** A of all joints that are bones; alongAxes: whether joints have axes along bones and hinges. */
@@ -14,7 +29,10 @@ export function calibrated(body: Body, world: World, alongAxes: boolean): Quater
   found.trunk();
   SIDES.forEach((side, at) => {
     found.leg(LEG.map((part) => side + part));
-    found.arm(ARM.map((part) => side + part), at ? -1 : 1);
+    found.arm(
+      ARM.map((part) => side + part),
+      at ? -1 : 1,
+    );
   });
   return found.aligned;
 }
@@ -46,7 +64,9 @@ class Calibration {
   /** A from estimates of the bone's rotation: what the convention says, or near axes, or the mean. */
   private settle(joint: number, turns: Quaternion[]): void {
     const known = this.body.map.axes[joint];
-    const mean = known ? STILL : meanTurn(this.own(joint).map((turn, at) => product(inverse(turn), turns[at]!)));
+    const mean = known
+      ? STILL
+      : meanTurn(this.own(joint).map((turn, at) => product(inverse(turn), turns[at]!)));
     this.aligned[joint] = known ? knownAxes(known) : this.alongAxes ? nearAxes(mean, 30) : mean;
   }
 
@@ -63,20 +83,30 @@ class Calibration {
 
   /** Hips and back: up towards the arms; the joint that carries the arms and those above: up towards the head. */
   trunk(): void {
-    const { body, world: { places } } = this;
+    const {
+      body,
+      world: { places },
+    } = this;
     const { joints, spine, neck } = body.map;
     const above = joints.head === undefined ? neck : [...neck, joints.head];
     const back = [joints.hips!, ...spine, ...above];
     const chest = spine.length;
     back.forEach((joint, i) => {
       const last = i === back.length - 1;
-      this.settle(joint, places.map((pose) => {
-        const [legs, arms] = [unit(body.toLeft(pose, "UpperLeg")), unit(body.toLeft(pose, "UpperArm"))];
-        const left = i < chest ? plus(times(legs, 1 - i / chest), times(arms, i / chest)) : arms;
-        const start = last ? pose[back[Math.max(i - 1, chest - 1)]!]! : i ? pose[joint]! : body.middle(pose, "UpperLeg");
-        const end = last ? pose[joint]! : i < chest ? body.middle(pose, "UpperArm") : pose[back.at(-1)!]!;
-        return frame(left, minus(end, start));
-      }));
+      this.settle(
+        joint,
+        places.map((pose) => {
+          const [legs, arms] = [unit(body.toLeft(pose, "UpperLeg")), unit(body.toLeft(pose, "UpperArm"))];
+          const left = i < chest ? plus(times(legs, 1 - i / chest), times(arms, i / chest)) : arms;
+          const start = last
+            ? pose[back[Math.max(i - 1, chest - 1)]!]!
+            : i
+              ? pose[joint]!
+              : body.middle(pose, "UpperLeg");
+          const end = last ? pose[joint]! : i < chest ? body.middle(pose, "UpperArm") : pose[back.at(-1)!]!;
+          return frame(left, minus(end, start));
+        }),
+      );
     });
   }
 
@@ -85,9 +115,19 @@ class Calibration {
     const { joints } = this.body.map;
     const [thigh, shin] = [this.directions(bones[0]!), this.directions(bones[1]!)];
     const hips = this.turned(joints.hips!);
-    const hinge = thigh.map((along, at) => plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), ALIGNMENT.HINGE)));
-    this.settleLimb(bones[0]!, thigh, hinge.map((axis, at) => frame(axis, times(thigh[at]!, -1))));
-    this.settleLimb(bones[1]!, shin, hinge.map((axis, at) => frame(axis, times(shin[at]!, -1))));
+    const hinge = thigh.map((along, at) =>
+      plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), ALIGNMENT.HINGE)),
+    );
+    this.settleLimb(
+      bones[0]!,
+      thigh,
+      hinge.map((axis, at) => frame(axis, times(thigh[at]!, -1))),
+    );
+    this.settleLimb(
+      bones[1]!,
+      shin,
+      hinge.map((axis, at) => frame(axis, times(shin[at]!, -1))),
+    );
     const shins = this.turned(joints[bones[1]!]!);
     for (const bone of bones.slice(2).filter((one) => joints[one] !== undefined)) {
       if (!this.body.aimed(bone)) {
@@ -96,10 +136,14 @@ class Calibration {
       }
       const along = this.directions(bone);
       const slope = inverse(swing(Z, directionOf(bone)));
-      this.settleLimb(bone, along, along.map((direction, at) => {
-        const left = rotated(shins[at]!, X);
-        return product(frame(left, cross(direction, left)), slope);
-      }));
+      this.settleLimb(
+        bone,
+        along,
+        along.map((direction, at) => {
+          const left = rotated(shins[at]!, X);
+          return product(frame(left, cross(direction, left)), slope);
+        }),
+      );
     }
   }
 
@@ -115,24 +159,36 @@ class Calibration {
       const plain = product(swing(rotated(chest[at]!, directionOf(upperArm!)), along), chest[at]!);
       return plus(times(cross(along, lower[at]!), -sign), times(rotated(plain, Y), ALIGNMENT.HINGE));
     });
-    const level = (along: Vector[], ups: Vector[]) => along.map((one, at) => frame(times(one, sign), ups[at]!, false));
+    const level = (along: Vector[], ups: Vector[]) =>
+      along.map((one, at) => frame(times(one, sign), ups[at]!, false));
     this.settleLimb(upperArm!, upper, level(upper, up));
     this.settleLimb(lowerArm!, lower, level(lower, up));
     if (joints[hand!] === undefined) return;
     const forearm = this.turned(joints[lowerArm!]!);
     if (!body.aimed(hand!)) return this.settle(joints[hand!]!, forearm);
     const along = this.directions(hand!);
-    this.settleLimb(hand!, along, level(along, forearm.map((turn) => rotated(turn, Y))));
+    this.settleLimb(
+      hand!,
+      along,
+      level(
+        along,
+        forearm.map((turn) => rotated(turn, Y)),
+      ),
+    );
   }
 }
 
 /** The rotation nearest to all: the eigenvector of the sum of q q^T of the largest eigenvalue, found by squaring it. */
 function meanTurn(turns: Quaternion[]): Quaternion {
-  let matrix = [0, 1, 2, 3].map((i) => [0, 1, 2, 3].map((j) => turns.reduce((sum, turn) => sum + turn[i]! * turn[j]!, 0)));
+  let matrix = [0, 1, 2, 3].map((i) =>
+    [0, 1, 2, 3].map((j) => turns.reduce((sum, turn) => sum + turn[i]! * turn[j]!, 0)),
+  );
   for (let round = 0; round < 40; round++) {
     const largest = Math.max(...matrix.flat().map(Math.abs));
     const scaled = matrix.map((row) => row.map((value) => value / largest));
-    matrix = scaled.map((row) => scaled.map((_, j) => row.reduce((sum, value, k) => sum + value * scaled[k]![j]!, 0)));
+    matrix = scaled.map((row) =>
+      scaled.map((_, j) => row.reduce((sum, value, k) => sum + value * scaled[k]![j]!, 0)),
+    );
   }
   const widest = matrix.reduce((best, row) => (Math.hypot(...row) > Math.hypot(...best) ? row : best));
   return normalised(widest as Quaternion);

@@ -53,7 +53,9 @@ async function bookOf({ decoder, moves }: Codec, parts: number): Promise<Pose[]>
 
 /** The move that leads nearest to another. */
 function nearest([forward, left, turn]: Pose, book: Pose[]): number {
-  const off = book.map(([x, z, angle]) => (forward - x) ** 2 + (left - z) ** 2 + (CODEC.REACH * (turn - angle)) ** 2);
+  const off = book.map(
+    ([x, z, angle]) => (forward - x) ** 2 + (left - z) ** 2 + (CODEC.REACH * (turn - angle)) ** 2,
+  );
   return off.indexOf(Math.min(...off));
 }
 
@@ -67,7 +69,10 @@ export class StreamingDecoder {
   private pose: Pose | undefined;
   private join: ((frame: Float32Array) => void) | undefined;
 
-  constructor(private readonly codec: Codec, context?: Context) {
+  constructor(
+    private readonly codec: Codec,
+    context?: Context,
+  ) {
     this.codes = [...(context?.codes ?? [])];
     this.given = context?.frames.slice(-2);
     this.count = Math.max(0, this.codes.length - 1);
@@ -89,12 +94,15 @@ export class StreamingDecoder {
     const { decoder, back, ahead, hop } = this.codec;
     const start = Math.max(0, this.count - back);
     const part = this.codes.slice(start, until + ahead);
-    const { frames, moves } = await decoder.run({ codes: integers(part.flat(), 1, part.length, part[0]!.length) });
+    const { frames, moves } = await decoder.run({
+      codes: integers(part.flat(), 1, part.length, part[0]!.length),
+    });
     const width = frames!.shape[3]!;
     const found: Float32Array[] = [];
     const first = !this.pose;
     for (let step = this.count - start; step < until - start; step++) {
-      for (let at = step * hop; at < (step + 1) * hop; at++) found.push(this.led(frames!.data.slice(at * width, (at + 1) * width)));
+      for (let at = step * hop; at < (step + 1) * hop; at++)
+        found.push(this.led(frames!.data.slice(at * width, (at + 1) * width)));
       this.way = moved(this.way, pose(moves!.data, CODEC.PATH * step));
     }
     if (first) found[0]!.set(found[1]!.subarray(0, CODEC.PATH)); // the first frame has the second one's rates
@@ -127,8 +135,15 @@ export class StreamingDecoder {
  * Adds to each next frame what is left of what a motion's last two frames are beside those found in their place: by a
  * critically damped spring. What the root's rates are off by is a speed already, and has none.
  */
-function inertialized(given: Frames, found: Frames, fps: number, halfLife: number): (frame: Float32Array) => void {
-  const [before, off] = [0, 1].map((row) => Float64Array.from(given[row]!, (value, at) => value - found[row]![at]!)) as [Float64Array, Float64Array];
+function inertialized(
+  given: Frames,
+  found: Frames,
+  fps: number,
+  halfLife: number,
+): (frame: Float32Array) => void {
+  const [before, off] = [0, 1].map((row) =>
+    Float64Array.from(given[row]!, (value, at) => value - found[row]![at]!),
+  ) as [Float64Array, Float64Array];
   const speed = off.map((value, at) => (at < CODEC.PATH ? 0 : (value - before[at]!) * fps));
   const y = (2 * Math.LN2) / halfLife;
   const fading = Math.exp(-y / fps);

@@ -26,9 +26,19 @@ export interface Source {
 }
 
 /** An action for log-probabilities (A), by the first number of a block of noise. */
-export function drawnAction(source: Source, context: ArrayLike<number>, noise: Noise, certainty: number): number {
+export function drawnAction(
+  source: Source,
+  context: ArrayLike<number>,
+  noise: Noise,
+  certainty: number,
+): number {
   const uniform = noise.uniform(source.parts + 2)[0]!;
-  return nucleus(Array.from(context, (value) => certainty * value), uniform, 1, 1);
+  return nucleus(
+    Array.from(context, (value) => certainty * value),
+    uniform,
+    1,
+    1,
+  );
 }
 
 /** What a writer knows of its rows before a step; `last` and `states` twice, told the action and not told. */
@@ -47,12 +57,22 @@ export class Writer {
   private now: Known;
   private before: Known;
 
-  constructor(readonly source: Source, private noise: Noise[], private readonly drawing: Drawing) {
+  constructor(
+    readonly source: Source,
+    private noise: Noise[],
+    private readonly drawing: Drawing,
+  ) {
     const first = [source.end + 1, ...Array<number>(source.parts - 1).fill(0)];
     const rows = noise.length;
     const last = Array<number[]>(2 * rows).fill(first);
     const zeros = noise.map(() => 0);
-    this.now = { age: zeros, done: zeros, last, states: source.step.zeroState(2 * rows), recent: noise.map(() => []) };
+    this.now = {
+      age: zeros,
+      done: zeros,
+      last,
+      states: source.step.zeroState(2 * rows),
+      recent: noise.map(() => []),
+    };
     this.before = this.now;
   }
 
@@ -80,13 +100,29 @@ export class Writer {
     const known = await this.known(actions);
     const uniform = this.noise.map((one) => one.uniform(this.source.parts + 2));
     const { memory } = this.source;
-    const places = actions.map((action, row) => this.remembered(action, row, ends, steps, whole, uniform[row]!));
-    const from = places.map((place, row) => (steps && place !== undefined ? memory.ages[place]! : this.now.age[row]!));
+    const places = actions.map((action, row) =>
+      this.remembered(action, row, ends, steps, whole, uniform[row]!),
+    );
+    const from = places.map((place, row) =>
+      steps && place !== undefined ? memory.ages[place]! : this.now.age[row]!,
+    );
     this.now = { ...this.now, age: from };
-    const after = places.map((place, row) => (place === undefined ? undefined : memory.after(actions[row]!, place, whole)));
-    const given = places.map((place, row) => (place === undefined ? undefined : this.step(place, ends && after[row]!.end)));
-    const begun = actions.map((action, row) => from[row]! < (1 - MEMORY.LEAP) * (memory.shortest.get(action) ?? 0));
-    const { codes, again } = await this.drawn(known, uniform.map((block) => block.slice(2)), given, ends, begun);
+    const after = places.map((place, row) =>
+      place === undefined ? undefined : memory.after(actions[row]!, place, whole),
+    );
+    const given = places.map((place, row) =>
+      place === undefined ? undefined : this.step(place, ends && after[row]!.end),
+    );
+    const begun = actions.map(
+      (action, row) => from[row]! < (1 - MEMORY.LEAP) * (memory.shortest.get(action) ?? 0),
+    );
+    const { codes, again } = await this.drawn(
+      known,
+      uniform.map((block) => block.slice(2)),
+      given,
+      ends,
+      begun,
+    );
     const age = from.map((one, row) => (again[row] ? 0 : one + 1));
     const done = after.map((one, row) => (again[row] ? 0 : (one?.done ?? this.now.done[row]!)));
     this.now = { ...this.now, last: [...codes, ...codes], age, done };
@@ -130,14 +166,21 @@ export class Writer {
     const { data, shape } = outputs.numbers!;
     const row = (at: number) => data.slice(at * shape[1]!, (at + 1) * shape[1]!);
     const started = last[0]![0] !== this.source.end + 1;
-    const latest = started ? recent.map((before, at) => [row(at), ...before].slice(0, MEMORY.PAST.length)) : recent;
+    const latest = started
+      ? recent.map((before, at) => [row(at), ...before].slice(0, MEMORY.PAST.length))
+      : recent;
     this.now = { age, done, last, states: lately(next), recent: latest };
     return outputs.known!;
   }
 
   /** A row of the memory that is gone on with, or none where the net draws the step. */
   private remembered(
-    action: number, row: number, ends: boolean, steps: number, whole: boolean, uniform: number[],
+    action: number,
+    row: number,
+    ends: boolean,
+    steps: number,
+    whole: boolean,
+    uniform: number[],
   ): number | undefined {
     const { memory } = this.source;
     const { age, done, recent } = this.now;
@@ -152,12 +195,18 @@ export class Writer {
    * begun: rows that do not end yet.
    */
   private async drawn(
-    known: NumberArray<Float32Array>, uniform: number[][], given: (number[] | undefined)[], ends: boolean, begun: boolean[],
+    known: NumberArray<Float32Array>,
+    uniform: number[][],
+    given: (number[] | undefined)[],
+    ends: boolean,
+    begun: boolean[],
   ): Promise<{ codes: number[][]; again: boolean[] }> {
     const { source, drawing } = this;
     const again = given.map((step) => step?.[0] === source.end && !ends);
     const drawn = given.flatMap((step, row) => (step && !again[row] ? [] : [row]));
-    const codes = given.map((step, row) => (step && !again[row] ? step : Array<number>(source.parts).fill(0)));
+    const codes = given.map((step, row) =>
+      step && !again[row] ? step : Array<number>(source.parts).fill(0),
+    );
     for (let part = 0; drawn.length && part < source.parts; part++) {
       const chances = await this.chances(known, codes, drawn, part);
       drawn.forEach((row, at) => {
@@ -178,12 +227,23 @@ export class Writer {
   }
 
   /** Of some rows the log-weights of a part, the action followed as far as `guidance` says. */
-  private async chances(known: NumberArray<Float32Array>, codes: number[][], rows: number[], part: number): Promise<number[][]> {
+  private async chances(
+    known: NumberArray<Float32Array>,
+    codes: number[][],
+    rows: number[],
+    part: number,
+  ): Promise<number[][]> {
     const { part: graph, parts } = this.source;
     const both = [...rows, ...rows.map((row) => row + codes.length)];
-    const asked = integers([...rows, ...rows].flatMap((row) => codes[row]!), both.length, parts);
-    const { data, shape } = (await graph.run({ known: taken({ known }, both).known!, codes: asked })).log_probabilities!;
-    const of = (at: number) => data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
+    const asked = integers(
+      [...rows, ...rows].flatMap((row) => codes[row]!),
+      both.length,
+      parts,
+    );
+    const { data, shape } = (await graph.run({ known: taken({ known }, both).known!, codes: asked }))
+      .log_probabilities!;
+    const of = (at: number) =>
+      data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
     return rows.map((_, at) => {
       const [told, plain] = [of(at), of(at + rows.length)];
       return Array.from(told, (value, id) => plain[id]! + this.drawing.guidance * (value - plain[id]!));
@@ -200,7 +260,12 @@ export async function* drawnSteps(writer: Writer, actions: number[], longest: nu
   writer.begin();
   for (let length = 0; length < longest; length++) {
     const steps = exactly && !length ? longest : 0;
-    const codes = await writer.draw(rows.map((row) => actions[row]!), !exactly && length > 0, steps, exactly);
+    const codes = await writer.draw(
+      rows.map((row) => actions[row]!),
+      !exactly && length > 0,
+      steps,
+      exactly,
+    );
     const going = codes.flatMap((step, at) => (step[0] === writer.source.end ? [] : [at]));
     if (!going.length) return writer.takeBack();
     if (going.length < rows.length) writer.keep(going);
@@ -210,7 +275,12 @@ export async function* drawnSteps(writer: Writer, actions: number[], longest: nu
 }
 
 /** Steps of codes for each row, of its own action: to its end, or of `longest` steps. */
-export async function drawCodes(writer: Writer, actions: number[], longest: number, exactly: boolean): Promise<number[][][]> {
+export async function drawCodes(
+  writer: Writer,
+  actions: number[],
+  longest: number,
+  exactly: boolean,
+): Promise<number[][][]> {
   const found: number[][][] = actions.map(() => []);
   for await (const { rows, codes } of drawnSteps(writer, actions, longest, exactly)) {
     rows.forEach((row, at) => found[row]!.push(codes[at]!));
@@ -235,7 +305,9 @@ function nucleus(logWeights: number[], uniform: number, temperature: number, top
 }
 
 /** States that grow, cut to the last steps. */
-function lately(states: Record<string, NumberArray<Float32Array>>): Record<string, NumberArray<Float32Array>> {
+function lately(
+  states: Record<string, NumberArray<Float32Array>>,
+): Record<string, NumberArray<Float32Array>> {
   const found: Record<string, NumberArray<Float32Array>> = {};
   for (const [name, array] of Object.entries(states)) {
     const axis = array.shape.length - 2;

@@ -11,7 +11,11 @@ export const FUNCTION_WORDS: ReadonlySet<string> = new Set(COMPOSITION.FUNCTION_
 /** What the forms of a lower-case word share: "danc" of dance, dances and dancing. */
 export function stem(word: string): string {
   if (word.length <= 3) return word;
-  return word.replace(/ies$/u, "y").replace(/(?:ing|ed|es|s|e)$/u, "").replace(/y$/u, "i").replace(/([^aeiou])\1$/u, "$1");
+  return word
+    .replace(/ies$/u, "y")
+    .replace(/(?:ing|ed|es|s|e)$/u, "")
+    .replace(/y$/u, "i")
+    .replace(/([^aeiou])\1$/u, "$1");
 }
 
 /** The stems of those of some words that have a form in -ing among them. */
@@ -28,7 +32,11 @@ export function sentencesOf(text: string): string[] {
 
 /** The parts of a sentence, in the order in which they are done. */
 export function partsOf(sentence: string, verbs: Set<string>): string[] {
-  const pieces = sentence.replace(/^first(?:ly)?\b,?\s*/iu, "").split(THEN).map(bare).filter(Boolean);
+  const pieces = sentence
+    .replace(/^first(?:ly)?\b,?\s*/iu, "")
+    .split(THEN)
+    .map(bare)
+    .filter(Boolean);
   return pieces.flatMap((piece) => beforeVerbs(piece, verbs));
 }
 
@@ -37,8 +45,17 @@ function beforeVerbs(text: string, verbs: Set<string>): string[] {
   const parts: string[] = [];
   let start = 0;
   for (const { index, 0: found } of text.matchAll(ALSO)) {
-    const done = text.slice(start, index).toLowerCase().match(/[\p{L}\p{N}_]+/gu) ?? [];
-    const opened = /^[\p{L}\p{N}_]+/u.exec(text.slice(index + found.length).replace(OPENING, "").toLowerCase());
+    const done =
+      text
+        .slice(start, index)
+        .toLowerCase()
+        .match(/[\p{L}\p{N}_]+/gu) ?? [];
+    const opened = /^[\p{L}\p{N}_]+/u.exec(
+      text
+        .slice(index + found.length)
+        .replace(OPENING, "")
+        .toLowerCase(),
+    );
     if (!opened || !verbs.has(stem(opened[0])) || !done.some((word) => verbs.has(stem(word)))) continue;
     parts.push(text.slice(start, index));
     start = index + found.length;

@@ -21,33 +21,66 @@ interface Beginning {
 
 /** The sequences drawn for a context (1, C), the one that agrees best with all first; scores are agreements, 0 to 1. */
 export async function consensus(
-  step: Graph, context: NumberArray<Float32Array>, limits: Limits, draws: number, temperature: number, noise: Noise,
+  step: Graph,
+  context: NumberArray<Float32Array>,
+  limits: Limits,
+  draws: number,
+  temperature: number,
+  noise: Noise,
 ): Promise<Hypothesis[]> {
   const drawn = await drawSequences(step, context, limits, draws, temperature, noise);
   const scores = agreement(drawn);
   const equal = scores.map((score) => Math.round(score * 1e9)); // what only rounding tells apart
-  const order = drawn.map((_, at) => at).sort((a, b) => equal[b]! - equal[a]! || drawn[b]!.logProbability - drawn[a]!.logProbability);
-  return order.map((at) => ({ ids: drawn[at]!.ids, logProbability: drawn[at]!.logProbability, score: scores[at]! }));
+  const order = drawn
+    .map((_, at) => at)
+    .sort((a, b) => equal[b]! - equal[a]! || drawn[b]!.logProbability - drawn[a]!.logProbability);
+  return order.map((at) => ({
+    ids: drawn[at]!.ids,
+    logProbability: drawn[at]!.logProbability,
+    score: scores[at]!,
+  }));
 }
 
 async function drawSequences(
-  step: Graph, context: NumberArray<Float32Array>, limits: Limits, draws: number, temperature: number, noise: Noise,
+  step: Graph,
+  context: NumberArray<Float32Array>,
+  limits: Limits,
+  draws: number,
+  temperature: number,
+  noise: Noise,
 ): Promise<Drawn[]> {
   const uniform = Array.from({ length: limits.longest + 1 }, () => noise.uniform(draws));
-  let open: Beginning[] = [{ ids: [], score: 0, draws: Array.from({ length: draws }, (_, at) => at), ended: false }];
+  let open: Beginning[] = [
+    { ids: [], score: 0, draws: Array.from({ length: draws }, (_, at) => at), ended: false },
+  ];
   let states = step.zeroState(1);
   const ended: Beginning[] = [];
   for (let length = 0; open.length; length++) {
     const word = integers(open.map((one) => one.ids.at(-1) ?? limits.start));
-    const { outputs, states: next } = await step.step({ word, context: taken({ context }, open.map(() => 0)).context! }, states);
+    const { outputs, states: next } = await step.step(
+      {
+        word,
+        context: taken(
+          { context },
+          open.map(() => 0),
+        ).context!,
+      },
+      states,
+    );
     const { data, shape } = outputs.log_probabilities!;
     const grown = open.flatMap((one, row) => {
       const gains = data.subarray(row * shape[1]!, (row + 1) * shape[1]!);
-      return spread(one, gains, limits, length, temperature, uniform[length]!).map((own) => ({ ...own, row }));
+      return spread(one, gains, limits, length, temperature, uniform[length]!).map((own) => ({
+        ...own,
+        row,
+      }));
     });
     ended.push(...grown.filter((one) => one.ended));
     const going = grown.filter((one) => !one.ended);
-    states = taken(next, going.map((one) => one.row));
+    states = taken(
+      next,
+      going.map((one) => one.row),
+    );
     open = going;
   }
   ended.sort((a, b) => a.draws[0]! - b.draws[0]!);
@@ -55,9 +88,18 @@ async function drawSequences(
 }
 
 /** What the draws of a beginning go on with: each word as often as its share of them, rounded up or down. */
-function spread(one: Beginning, gains: Float32Array, limits: Limits, length: number, temperature: number, uniform: number[]): Beginning[] {
+function spread(
+  one: Beginning,
+  gains: Float32Array,
+  limits: Limits,
+  length: number,
+  temperature: number,
+  uniform: number[],
+): Beginning[] {
   const { banned, end, longest } = limits;
-  const left = Float64Array.from(gains, (gain, id) => (banned.includes(id) || (length === longest && id !== end) ? -Infinity : gain));
+  const left = Float64Array.from(gains, (gain, id) =>
+    banned.includes(id) || (length === longest && id !== end) ? -Infinity : gain,
+  );
   const most = left.reduce((a, b) => Math.max(a, b));
   let sum = 0;
   const shares = left.map((value) => (sum += Math.exp((value - most) / temperature)));
@@ -80,7 +122,9 @@ function agreement(drawn: Drawn[]): number[] {
   const all = drawn.reduce((sum, { times }) => sum + times, 0);
   const orders = [1, 2].map((order) => drawn.map(({ ids }) => counted(ids, order)));
   return drawn.map((_, at) => {
-    const shared = orders.map((grams) => drawn.reduce((sum, { times }, other) => sum + times * f1(grams[at]!, grams[other]!), 0));
+    const shared = orders.map((grams) =>
+      drawn.reduce((sum, { times }, other) => sum + times * f1(grams[at]!, grams[other]!), 0),
+    );
     return (shared[0]! + shared[1]!) / (2 * all);
   });
 }

@@ -1,5 +1,13 @@
 /* Figures that are steered by motion matching; no ONNX Runtime is needed. */
-import { BASE, FIELDS, MATCHING, STEER, actSettings, footLockSettings, steeringSettings } from "./generated.js";
+import {
+  BASE,
+  FIELDS,
+  MATCHING,
+  STEER,
+  actSettings,
+  footLockSettings,
+  steeringSettings,
+} from "./generated.js";
 import { type Act, actOf, reachOf } from "./acts.js";
 import type { Bundle, Manifest } from "./bundle.js";
 import { ControlSession } from "./controlSession.js";
@@ -45,7 +53,8 @@ export class ControlModel extends Model {
     this.acts = settingsOf("acting", actSettings, manifest.settings.acting);
     const matcher = new Matcher(tables, odd, names.length, steering, this.fps);
     matcher.goals.forEach((goals, gait) => {
-      if (!goals.rows.length) throw new BundleError(`table left: no row of ${JSON.stringify(names[gait])} can be jumped to`);
+      if (!goals.rows.length)
+        throw new BundleError(`table left: no row of ${JSON.stringify(names[gait])} can be jumped to`);
     });
     this.steerer = new Steerer(matcher);
   }
@@ -67,16 +76,35 @@ export class ControlModel extends Model {
   /** The take of a gait that goes nowhere that leads the farthest for a figure that moves, and the least far for others. */
   take(name: string, moves: boolean): Act {
     const found = this.takes.get(name);
-    if (!found) throw new ControlError(`no act ${JSON.stringify(name)}; expected a motion, or one of ${[...this.takes.keys()].join(", ")}`);
+    if (!found)
+      throw new ControlError(
+        `no act ${JSON.stringify(name)}; expected a motion, or one of ${[...this.takes.keys()].join(", ")}`,
+      );
     return [...found].sort((a, b) => reachOf(a) - reachOf(b)).at(moves ? -1 : 0)!;
   }
 
   /** A session of figures that stand still. ControlError for what is out of range. */
-  start({ gait = this.gaits[0]!, characters = 1, places, holdFeet = true, strict = false, phases }: StartSettings = {}): ControlSession {
+  start({
+    gait = this.gaits[0]!,
+    characters = 1,
+    places,
+    holdFeet = true,
+    strict = false,
+    phases,
+  }: StartSettings = {}): ControlSession {
     if (!Number.isInteger(characters) || characters < 1 || characters > BASE.LARGEST_CROWD) {
-      throw new ControlError(`characters must be a whole number from 1 to ${BASE.LARGEST_CROWD}, not ${characters}`);
+      throw new ControlError(
+        `characters must be a whole number from 1 to ${BASE.LARGEST_CROWD}, not ${characters}`,
+      );
     }
-    const session = new ControlSession(this, this.abilities.number(gait), characters, holdFeet, strict, this.phases(characters, phases));
+    const session = new ControlSession(
+      this,
+      this.abilities.number(gait),
+      characters,
+      holdFeet,
+      strict,
+      this.phases(characters, phases),
+    );
     if (places !== undefined) session.put(places);
     return session;
   }
@@ -85,9 +113,16 @@ export class ControlModel extends Model {
   phases(characters: number, given?: number | readonly number[]): number[] | null {
     const every = this.steerer.matcher.how.search_every;
     if (given === undefined && characters < STEER.SPREAD_FROM) return null;
-    const found = Array.from({ length: characters }, (_, at) => (given === undefined ? at % every : Array.isArray(given) ? (given[at] as number) : (given as number)));
-    const fits = (!Array.isArray(given) || given.length === characters) && found.every((phase) => Number.isInteger(phase) && phase >= 0 && phase < every);
-    if (!fits) throw new ControlError(`phases must be whole numbers from 0 to ${every - 1}, for all or for each of ${characters}`);
+    const found = Array.from({ length: characters }, (_, at) =>
+      given === undefined ? at % every : Array.isArray(given) ? (given[at] as number) : (given as number),
+    );
+    const fits =
+      (!Array.isArray(given) || given.length === characters) &&
+      found.every((phase) => Number.isInteger(phase) && phase >= 0 && phase < every);
+    if (!fits)
+      throw new ControlError(
+        `phases must be whole numbers from 0 to ${every - 1}, for all or for each of ${characters}`,
+      );
     return found;
   }
 }
@@ -99,24 +134,36 @@ function takesOf(model: ControlModel): Map<string, Act[]> {
   const rows = (gait: number) => [...left.keys()].filter((row) => steerer.matcher.shows(row, gait));
   const begins = (all: number[]) => all.filter((_, at) => !at || !left[all[at - 1]!]);
   const take = (name: string, first: number) => actOf(model, name, steerer.recorded(first, left[first]! + 1));
-  return new Map(nowhere.map((gait) => [gaits[gait]!, begins(rows(gait)).map((first) => take(gaits[gait]!, first))]));
+  return new Map(
+    nowhere.map((gait) => [gaits[gait]!, begins(rows(gait)).map((first) => take(gaits[gait]!, first))]),
+  );
 }
 
-function configOf({ config, motion: { channels } }: Manifest, codes: number): { names: string[]; speeds: Speeds[]; odd: number } {
+function configOf(
+  { config, motion: { channels } }: Manifest,
+  codes: number,
+): { names: string[]; speeds: Speeds[]; odd: number } {
   const [names, speeds, odd] = [config.gaits as string[], config.speeds as Speeds[], config.odd as number];
   if (!Array.isArray(names) || !names.length || !names.every((name) => typeof name === "string")) {
     throw new BundleError("manifest, config.gaits: must be names");
   }
-  const within = (row: unknown) => Array.isArray(row) && row.length === 5 && row.every((speed) => speed >= 0 && speed <= 100);
+  const within = (row: unknown) =>
+    Array.isArray(row) && row.length === 5 && row.every((speed) => speed >= 0 && speed <= 100);
   if (!Array.isArray(speeds) || speeds.length !== names.length || !speeds.every(within)) {
-    throw new BundleError("manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait");
+    throw new BundleError(
+      "manifest, config.speeds: must hold a row of 5 speeds, 0 to 100 m/s, for each gait",
+    );
   }
   if (!speeds.every(([slowest, usual, forward]) => slowest <= usual && usual <= forward)) {
-    throw new BundleError("manifest, config.speeds: must rise from the slowest to the usual and the fastest forward");
+    throw new BundleError(
+      "manifest, config.speeds: must rise from the slowest to the usual and the fastest forward",
+    );
   }
-  if (!(Number.isInteger(odd) && odd >= 0 && odd <= codes)) throw new BundleError(`manifest, config.odd: must be 0 to ${codes}`);
+  if (!(Number.isInteger(odd) && odd >= 0 && odd <= codes))
+    throw new BundleError(`manifest, config.odd: must be 0 to ${codes}`);
   const bones = channels.filter((name) => name.endsWith(".xx")).map((name) => name.slice(0, -3));
-  if (`${bones}` !== `${BONES}`) throw new BundleError("manifest, motion.channels: must be those of the humanoid, in its order");
+  if (`${bones}` !== `${BONES}`)
+    throw new BundleError("manifest, motion.channels: must be those of the humanoid, in its order");
   return { names, speeds, odd };
 }
 
@@ -129,7 +176,13 @@ async function tablesOf(bundle: Bundle): Promise<Tables> {
   const [rows, codes] = bundle.manifest.tables?.codes?.shape ?? [];
   const gaits = (bundle.manifest.config?.gaits as string[] | undefined)?.length;
   const values = 4 * BONES.length + 1;
-  const table = async (name: string, dtype: string, shape: (number | undefined)[], least = -FIELDS.LARGEST, most: (at: number) => number = () => FIELDS.LARGEST) => {
+  const table = async (
+    name: string,
+    dtype: string,
+    shape: (number | undefined)[],
+    least = -FIELDS.LARGEST,
+    most: (at: number) => number = () => FIELDS.LARGEST,
+  ) => {
     const own = bundle.manifest.tables?.[name];
     if (own && (own.dtype !== dtype || `${own.shape}` !== `${shape}`)) {
       throw new BundleError(`table ${name} is ${own.dtype} (${own.shape}), not ${dtype} (${shape})`);

@@ -97,7 +97,9 @@ export class ControlSession {
     private readonly strict: boolean,
     phases: readonly number[] | null,
   ) {
-    const figures = Array.from({ length: characters }, (_, at) => standing(model, gait, undefined, phases?.[at]));
+    const figures = Array.from({ length: characters }, (_, at) =>
+      standing(model, gait, undefined, phases?.[at]),
+    );
     this.state = { figures, room: 0, shown: null, ahead: 0, late: figures.map(() => []) };
   }
 
@@ -119,7 +121,8 @@ export class ControlSession {
     const speeds = this.each("speed", speed);
     const [directions, facings] = [this.each("direction", direction), this.each("facing", facing)];
     const moves = velocity === undefined ? undefined : this.rows("a velocity", velocity, ["x", "z"]);
-    if (moves && (speeds || directions)) throw new ControlError("give a velocity, or speed and direction, not both");
+    if (moves && (speeds || directions))
+      throw new ControlError("give a velocity, or speed and direction, not both");
     const commands = this.state.figures.map(({ command }, at) => {
       const given: Partial<Command> = {};
       if (gaits) given.gait = gaits[at]!;
@@ -152,11 +155,22 @@ export class ControlSession {
    * soon as it is told to, or where the act is one of the legs, such as a kick, after which a figure that moves goes on.
    * ControlError for figures that are not there and gaits that have no such act, MotionError for what is no human's.
    */
-  act(what: Doable | readonly Doable[], { who, upper }: { who?: readonly number[]; upper?: boolean } = {}): void {
+  act(
+    what: Doable | readonly Doable[],
+    { who, upper }: { who?: readonly number[]; upper?: boolean } = {},
+  ): void {
     const figures = this.who(who);
     const given = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as Doable[];
-    if (given.length !== figures.length) throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
-    const made = new Map([...new Set(given)].map((one) => [one, one && typeof one === "object" && "skeleton" in one ? actOf(this.model, "act", numbersOf(this.model, one)) : one]));
+    if (given.length !== figures.length)
+      throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
+    const made = new Map(
+      [...new Set(given)].map((one) => [
+        one,
+        one && typeof one === "object" && "skeleton" in one
+          ? actOf(this.model, "act", numbersOf(this.model, one))
+          : one,
+      ]),
+    );
     const acts = figures.map((at, i) => {
       const [what, [x, z]] = [made.get(given[i]!)!, this.state.figures[at]!.target];
       return typeof what === "string" ? this.model.take(what, !!(x || z)) : what;
@@ -171,30 +185,56 @@ export class ControlSession {
    */
   goTo(points: readonly number[] | readonly (readonly number[])[] | null, how: Way = {}): void {
     const figures = this.who(how.who);
-    const ends = points === null ? figures.map((at) => this.state.figures[at]!.playback.root.slice(0, 2)) : this.rows("points", points, ["x", "z"], figures.length);
-    this.send(figures, ends.map((end) => [end]), how);
+    const ends =
+      points === null
+        ? figures.map((at) => this.state.figures[at]!.playback.root.slice(0, 2))
+        : this.rows("points", points, ["x", "z"], figures.length);
+    this.send(
+      figures,
+      ends.map((end) => [end]),
+      how,
+    );
   }
 
   /** The same along a path, from where they are to its first point, and so on to its last: of 1 to 10,000 points, for all. */
   goAlong(path: readonly (readonly number[])[], how: Way = {}): void {
-    if (!Array.isArray(path) || path.length < 1 || path.length > GUIDED.LONGEST_PATH) throw new ControlError(`a path needs 1 to ${GUIDED.LONGEST_PATH} points of x and z`);
+    if (!Array.isArray(path) || path.length < 1 || path.length > GUIDED.LONGEST_PATH)
+      throw new ControlError(`a path needs 1 to ${GUIDED.LONGEST_PATH} points of x and z`);
     const points = path.map((point) => this.rows("points", point, ["x", "z"], 1)[0]!);
     const figures = this.who(how.who);
-    this.send(figures, figures.map(() => points), how);
+    this.send(
+      figures,
+      figures.map(() => points),
+      how,
+    );
   }
 
-  private send(figures: number[], paths: (readonly (readonly number[])[])[], { facing, gait, speed }: Way): void {
+  private send(
+    figures: number[],
+    paths: (readonly (readonly number[])[])[],
+    { facing, gait, speed }: Way,
+  ): void {
     const { abilities } = this.model;
     const facings = this.each("facing", facing, figures.length);
     const speeds = this.each("speed", speed, figures.length);
-    if (speeds?.some((one) => !(one > 0))) throw new ControlError("speed must be above 0 m/s; points of null let figures stand");
-    const gaits = figures.map((at) => (gait === undefined ? this.state.figures[at]!.command.gait : abilities.number(gait)));
+    if (speeds?.some((one) => !(one > 0)))
+      throw new ControlError("speed must be above 0 m/s; points of null let figures stand");
+    const gaits = figures.map((at) =>
+      gait === undefined ? this.state.figures[at]!.command.gait : abilities.number(gait),
+    );
     const nowhere = gaits.find((one) => !abilities.speeds[one]![2]);
-    if (nowhere !== undefined) throw new ControlError(`${JSON.stringify(this.model.gaits[nowhere])} goes nowhere: give a gait such as ${JSON.stringify(this.model.gaits[0])}`);
+    if (nowhere !== undefined)
+      throw new ControlError(
+        `${JSON.stringify(this.model.gaits[nowhere])} goes nowhere: give a gait such as ${JSON.stringify(this.model.gaits[0])}`,
+      );
     figures.forEach((at, i) => {
       const figure = this.state.figures[at]!;
       const [x, z] = figure.playback.root;
-      const told = { gait: gaits[i]!, speed: speeds?.[i] ?? abilities.speeds[gaits[i]!]![1], facing: facings ? wrapped(facings[i]! * RADIANS) : null };
+      const told = {
+        gait: gaits[i]!,
+        speed: speeds?.[i] ?? abilities.speeds[gaits[i]!]![1],
+        facing: facings ? wrapped(facings[i]! * RADIANS) : null,
+      };
       figure.going = sent([[x, z], ...(paths[i] as unknown as Point[])], told);
     });
   }
@@ -206,7 +246,8 @@ export class ControlSession {
 
   /** Let figures that move keep `room` metres from all others, 0.1 to 5, by going around them; null: they go through each other. */
   keepApart(room: number | null = 0.8): void {
-    if (room !== null && !(typeof room === "number" && room >= 0.1 && room <= 5)) throw new ControlError(`figures keep 0.1 to 5 m apart, or null, not ${room}`);
+    if (room !== null && !(typeof room === "number" && room >= 0.1 && room <= 5))
+      throw new ControlError(`figures keep 0.1 to 5 m apart, or null, not ${room}`);
     this.state.room = room ?? 0;
   }
 
@@ -215,7 +256,10 @@ export class ControlSession {
    * are recorded. Head, neck and upper spine share the turn, up to 85 degrees aside and 50 up or down; what is nearer to the eyes
    * than 20 cm is not looked at. ControlError for what does not fit; nothing changes then.
    */
-  lookAt(points: readonly number[] | readonly (readonly number[])[] | null, { who }: { who?: readonly number[] } = {}): void {
+  lookAt(
+    points: readonly number[] | readonly (readonly number[])[] | null,
+    { who }: { who?: readonly number[] } = {},
+  ): void {
     this.pointed(points, who).forEach(([at, point]) => (this.state.figures[at]!.look.point = point));
   }
 
@@ -223,7 +267,11 @@ export class ControlSession {
    * Let a hand of figures be at points in the world from now on, for the middle of the hand; null: as it is recorded. Only the arm
    * moves. A hand goes as near as it can to a point that is too far or behind the back, and `outOfReach` tells. Otherwise like `lookAt`.
    */
-  reach(hand: "left" | "right", points: readonly number[] | readonly (readonly number[])[] | null, { who }: { who?: readonly number[] } = {}): void {
+  reach(
+    hand: "left" | "right",
+    points: readonly number[] | readonly (readonly number[])[] | null,
+    { who }: { who?: readonly number[] } = {},
+  ): void {
     const side = SIDES.indexOf(hand);
     if (side < 0) throw new ControlError(`unknown hand ${JSON.stringify(hand)}; expected left or right`);
     this.pointed(points, who).forEach(([at, point]) => (this.state.figures[at]!.hands[side]!.point = point));
@@ -235,7 +283,10 @@ export class ControlSession {
   }
 
   /** Numbers of figures, and a point in the world for each; null for none. */
-  private pointed(points: readonly number[] | readonly (readonly number[])[] | null, who?: readonly number[]): [number, Vector | null][] {
+  private pointed(
+    points: readonly number[] | readonly (readonly number[])[] | null,
+    who?: readonly number[],
+  ): [number, Vector | null][] {
     const figures = this.who(who);
     const rows = points && this.rows("points", points, ["x", "y", "z"], figures.length);
     return figures.map((at, i) => [at, rows && ([...rows[i]!] as Vector)]);
@@ -259,12 +310,23 @@ export class ControlSession {
   private played(targets?: Target[]): Ticked[] {
     const { figures, room } = this.state;
     if (!targets && (room || figures.some(({ going }) => going))) lead(this.model, figures, room);
-    return figures.map((figure, at) => this.happened(figure, tick(this.model, figure, this.holdFeet, targets?.[at])));
+    return figures.map((figure, at) =>
+      this.happened(figure, tick(this.model, figure, this.holdFeet, targets?.[at])),
+    );
   }
 
   private happened(figure: Steered, pose: Played): Ticked {
-    const { gaits, steerer: { matcher } } = this.model;
-    const { happenings: before, command: { gait }, playback: { row }, going, acting: { playing } } = figure;
+    const {
+      gaits,
+      steerer: { matcher },
+    } = this.model;
+    const {
+      happenings: before,
+      command: { gait },
+      playback: { row },
+      going,
+      acting: { playing },
+    } = figure;
     const shows = matcher.tables.shows[row * gaits.length + gait]! > 0;
     const act = playing && { name: playing.act.name, age: playing.age };
     const now = after(before, pose.contacts, gait, shows, going?.arrived ?? false, act);
@@ -274,7 +336,8 @@ export class ControlSession {
 
   /** The poses `seconds` later, 0 to 1, for a display of any frame rate: between two ticks. A command shows within a tick. */
   advance(seconds: number): SteeredPose[] {
-    if (!(seconds >= 0 && seconds <= 1)) throw new ControlError(`a session advances by 0 to 1 s, not ${seconds}`);
+    if (!(seconds >= 0 && seconds <= 1))
+      throw new ControlError(`a session advances by 0 to 1 s, not ${seconds}`);
     const { state } = this;
     const events = state.late;
     state.late = state.figures.map(() => []);
@@ -289,7 +352,9 @@ export class ControlSession {
       state.shown = [state.shown[1], this.played()];
     }
     const [before, next] = state.shown;
-    return before.map((pose, at) => poseOf({ ...between(pose, next[at]!, state.ahead), events: events[at]! }));
+    return before.map((pose, at) =>
+      poseOf({ ...between(pose, next[at]!, state.ahead), events: events[at]! }),
+    );
   }
 
   /** Push the figures by a velocity along x and z, m/s, from which they recover. */
@@ -326,13 +391,26 @@ export class ControlSession {
    * those that there are. Each moves as in a session of its own that starts now. gait, phases: as those of `start`. ControlError
    * for what is out of range; nothing has changed then.
    */
-  add(places: readonly number[] | readonly (readonly number[])[], { gait, phases }: Pick<StartSettings, "gait" | "phases"> = {}): number[] {
-    if (!Array.isArray(places) || !places.length) throw new ControlError("places needs x, z, facing, for each of the characters that are added");
+  add(
+    places: readonly number[] | readonly (readonly number[])[],
+    { gait, phases }: Pick<StartSettings, "gait" | "phases"> = {},
+  ): number[] {
+    if (!Array.isArray(places) || !places.length)
+      throw new ControlError("places needs x, z, facing, for each of the characters that are added");
     const { state, characters, model, holdFeet } = this;
     const count = Array.isArray(places[0]) ? places.length : 1;
-    if (characters + count > BASE.LARGEST_CROWD) throw new ControlError(`a session has up to ${BASE.LARGEST_CROWD} characters, not ${characters + count}`);
+    if (characters + count > BASE.LARGEST_CROWD)
+      throw new ControlError(
+        `a session has up to ${BASE.LARGEST_CROWD} characters, not ${characters + count}`,
+      );
     const turns = phases ?? model.phases(characters + count)?.slice(characters);
-    const more = model.start({ characters: count, places, holdFeet, ...(gait !== undefined && { gait }), ...(turns !== undefined && { phases: turns }) });
+    const more = model.start({
+      characters: count,
+      places,
+      holdFeet,
+      ...(gait !== undefined && { gait }),
+      ...(turns !== undefined && { phases: turns }),
+    });
     if (state.shown) more.advance(0);
     state.shown?.forEach((shown, at) => shown.push(...more.state.shown![at]!));
     state.figures.push(...more.state.figures);
@@ -342,12 +420,17 @@ export class ControlSession {
 
   /** Remove figures by their numbers. Those behind move up. ControlError for figures that are not there, and for all: one stays. */
   remove(who: readonly number[]): void {
-    if (!Array.isArray(who) || !who.length) throw new ControlError("who needs the numbers of the figures that go");
+    if (!Array.isArray(who) || !who.length)
+      throw new ControlError("who needs the numbers of the figures that go");
     const gone = new Set(this.who(who));
     if (gone.size === this.characters) throw new ControlError("a session keeps one figure at least");
     const stay = <One>(all: One[]) => all.filter((_, at) => !gone.has(at));
     const { figures, late, shown } = this.state;
-    Object.assign(this.state, { figures: stay(figures), late: stay(late), shown: shown && [stay(shown[0]), stay(shown[1])] });
+    Object.assign(this.state, {
+      figures: stay(figures),
+      late: stay(late),
+      shown: shown && [stay(shown[0]), stay(shown[1])],
+    });
   }
 
   /** The whole state, to be restored later. */
@@ -358,21 +441,32 @@ export class ControlSession {
   /** Go back to a snapshot of this session or of one like it, with as many figures as there were; ControlError for another. */
   restore(snapshot: ControlSnapshot): void {
     const state = snapshot.state as State;
-    if (snapshot.holdFeet !== this.holdFeet) throw new ControlError("a snapshot with held feet fits no session without them, nor the other way round");
+    if (snapshot.holdFeet !== this.holdFeet)
+      throw new ControlError(
+        "a snapshot with held feet fits no session without them, nor the other way round",
+      );
     this.state = structuredClone(state);
   }
 
   /** The numbers of figures. */
   private who(given?: readonly number[]): number[] {
     const figures = given ? [...given] : this.state.figures.map((_, at) => at);
-    const fits = figures.length === new Set(figures).size && figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters);
-    if (!fits) throw new ControlError(`figures are whole numbers from 0 to ${this.characters - 1}, none twice, not ${figures.join(", ")}`);
+    const fits =
+      figures.length === new Set(figures).size &&
+      figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters);
+    if (!fits)
+      throw new ControlError(
+        `figures are whole numbers from 0 to ${this.characters - 1}, none twice, not ${figures.join(", ")}`,
+      );
     return figures;
   }
 
   private gaits(given: ForAll<string>): number[] {
-    const names = Array.isArray(given) ? (given as string[]) : Array<string>(this.characters).fill(given as string);
-    if (names.length !== this.characters) throw new ControlError(`${names.length} gaits do not fit ${this.characters} characters`);
+    const names = Array.isArray(given)
+      ? (given as string[])
+      : Array<string>(this.characters).fill(given as string);
+    if (names.length !== this.characters)
+      throw new ControlError(`${names.length} gaits do not fit ${this.characters} characters`);
     return names.map((name) => this.model.abilities.number(name));
   }
 
@@ -380,15 +474,35 @@ export class ControlSession {
   private each(name: string, given?: ForAll<number>, count = this.characters): number[] | undefined {
     if (given === undefined) return undefined;
     const values = (Array.isArray(given) ? given : [given]) as number[];
-    return this.rows(name, values.map((value) => [value]), [name], count).map(([value]) => value!);
+    return this.rows(
+      name,
+      values.map((value) => [value]),
+      [name],
+      count,
+    ).map(([value]) => value!);
   }
 
   /** A row of numbers for each figure, of one for all or one for each. */
-  private rows(what: string, given: readonly number[] | readonly (readonly number[])[], columns: string[], count = this.characters): readonly (readonly number[])[] {
+  private rows(
+    what: string,
+    given: readonly number[] | readonly (readonly number[])[],
+    columns: string[],
+    count = this.characters,
+  ): readonly (readonly number[])[] {
     const rows = (Array.isArray(given?.[0]) ? given : [given]) as readonly (readonly number[])[];
-    const fits = rows.every((row) => row?.length === columns.length) && (rows.length === 1 || rows.length === count);
-    if (!fits) throw new ControlError(`${what} needs ${columns.join(", ")}, for all or for each of ${count} characters`);
-    if (!rows.every((row) => Array.from(row).every((value) => typeof value === "number" && Math.abs(value) <= GUIDED.LARGEST_COMMAND))) {
+    const fits =
+      rows.every((row) => row?.length === columns.length) && (rows.length === 1 || rows.length === count);
+    if (!fits)
+      throw new ControlError(
+        `${what} needs ${columns.join(", ")}, for all or for each of ${count} characters`,
+      );
+    if (
+      !rows.every((row) =>
+        Array.from(row).every(
+          (value) => typeof value === "number" && Math.abs(value) <= GUIDED.LARGEST_COMMAND,
+        ),
+      )
+    ) {
       throw new ControlError(`${what} must be finite numbers, no larger than ${GUIDED.LARGEST_COMMAND}`);
     }
     return rows.length === count ? rows : Array<readonly number[]>(count).fill(rows[0]!);
@@ -398,7 +512,11 @@ export class ControlSession {
 /** A command with a velocity; one that stops leaves the direction, and how the figure faces. */
 function byVelocity(command: Command, given: Partial<Command>, [x, z]: readonly number[]): Command {
   const speed = Math.hypot(x!, z!);
-  const found = told(command, { ...given, speed, direction: speed > 0 ? Math.atan2(x!, z!) : command.direction });
+  const found = told(command, {
+    ...given,
+    speed,
+    direction: speed > 0 ? Math.atan2(x!, z!) : command.direction,
+  });
   return given.facing === undefined ? { ...found, facesWay: command.facesWay || speed > 0 } : found;
 }
 

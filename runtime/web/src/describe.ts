@@ -39,9 +39,17 @@ export interface Description {
 
 /** Sentences for a motion. */
 export class DescribeModel extends LanguageModel {
-  private readonly confidence = settingsOf("confidence", confidenceSettings, this.manifest.settings.confidence);
+  private readonly confidence = settingsOf(
+    "confidence",
+    confidenceSettings,
+    this.manifest.settings.confidence,
+  );
 
-  constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>, private readonly known?: Known) {
+  constructor(
+    manifest: Manifest,
+    private readonly graphs: Record<string, Graph>,
+    private readonly known?: Known,
+  ) {
     super(manifest);
   }
 
@@ -51,18 +59,29 @@ export class DescribeModel extends LanguageModel {
     if (decoding === "known") return this.answers(frames, settings);
     const found = await this.hypotheses(frames, settings);
     return found.map(({ ids, logProbability, score }) => {
-      return { text: this.vocabulary.decode(ids), logProbability, score, confident: logProbability >= this.confidence.log_probability };
+      return {
+        text: this.vocabulary.decode(ids),
+        logProbability,
+        score,
+        confident: logProbability >= this.confidence.log_probability,
+      };
     });
   }
 
   /** What known motions answer. */
   private async answers(frames: Frames, settings: DescribeSettings): Promise<Description[]> {
     if (!this.known) throw new DecodingError("no motion is known: choose beam or consensus");
-    if (settings.draws !== undefined) throw new DecodingError("known motions answer without draws: leave them out, or choose consensus");
+    if (settings.draws !== undefined)
+      throw new DecodingError("known motions answer without draws: leave them out, or choose consensus");
     const beams = this.setting("beams", settings.beams);
     const { vector } = await this.graphs.space!.run(this.motion(frames));
     const { known, manifest } = this;
-    const found = known.answers(vector!.data as Float32Array, frames.length / this.fps, pathOf(frames, manifest.motion), beams);
+    const found = known.answers(
+      vector!.data as Float32Array,
+      frames.length / this.fps,
+      pathOf(frames, manifest.motion),
+      beams,
+    );
     return found.map(({ text, probability }) => {
       const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST));
       return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
@@ -73,13 +92,22 @@ export class DescribeModel extends LanguageModel {
   async hypotheses(frames: Frames, settings: DescribeSettings = {}, noise?: Noise): Promise<Hypothesis[]> {
     const limits = this.limits(settings.maxWords);
     const beams = this.setting("beams", settings.beams);
-    const drawing = settings.decoding ? settings.decoding === "consensus" : this.manifest.loop === "consensus";
+    const drawing = settings.decoding
+      ? settings.decoding === "consensus"
+      : this.manifest.loop === "consensus";
     const draws = settings.draws ?? (drawing ? this.setting("draws") : undefined);
     if (draws === undefined) return beamSearch(this.graphs.step!, await this.context(frames), limits, beams);
     const given = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
     const temperature = this.setting("temperature", settings.temperature);
     const context = await this.context(frames);
-    const found = await consensus(this.graphs.step!, context, limits, this.setting("draws", draws), temperature, given);
+    const found = await consensus(
+      this.graphs.step!,
+      context,
+      limits,
+      this.setting("draws", draws),
+      temperature,
+      given,
+    );
     return found.slice(0, beams);
   }
 
@@ -94,6 +122,11 @@ export class DescribeModel extends LanguageModel {
   }
 
   private limits(maxWords?: number): Limits {
-    return { start: Vocabulary.SOS, end: Vocabulary.EOS, banned: Vocabulary.BANNED, longest: this.setting("max_words", maxWords) };
+    return {
+      start: Vocabulary.SOS,
+      end: Vocabulary.EOS,
+      banned: Vocabulary.BANNED,
+      longest: this.setting("max_words", maxWords),
+    };
   }
 }

@@ -3,7 +3,11 @@ import { ROTATIONS } from "./generated.js";
 import { about, product, type Quaternion, rotated, type Vector, X, Y, Z } from "./rotations.js";
 
 export function fromEuler(angles: Vector, order: string): Quaternion {
-  const [a, b, c] = angles.map((angle, at) => about([X, Y, Z]["xyz".indexOf(order[at]!)]!, angle)) as [Quaternion, Quaternion, Quaternion];
+  const [a, b, c] = angles.map((angle, at) => about([X, Y, Z]["xyz".indexOf(order[at]!)]!, angle)) as [
+    Quaternion,
+    Quaternion,
+    Quaternion,
+  ];
   return product(product(a, b), c);
 }
 
@@ -40,7 +44,9 @@ function solution([a, b, c]: Vector, flipped: boolean): Vector {
 }
 
 function near(angles: Vector, to: Vector): Vector {
-  return angles.map((angle, at) => angle - 2 * Math.PI * Math.round((angle - to[at]!) / (2 * Math.PI))) as Vector;
+  return angles.map(
+    (angle, at) => angle - 2 * Math.PI * Math.round((angle - to[at]!) / (2 * Math.PI)),
+  ) as Vector;
 }
 
 function apart(a: Vector, b: Vector): number {

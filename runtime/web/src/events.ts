@@ -25,8 +25,16 @@ export interface Happenings {
 }
 
 /** Those of the next tick; shows: whether the gait that is asked for is played, where it begins. before: null in the first tick. */
-export function after(before: Happenings | null, contacts: readonly [number, number], gait: number, shows: boolean, arrived: boolean, act: Act | null): Happenings {
-  const foot = (side: 0 | 1) => (before?.down[side] ? contacts[side] >= EVENTS.UP : contacts[side] > EVENTS.DOWN);
+export function after(
+  before: Happenings | null,
+  contacts: readonly [number, number],
+  gait: number,
+  shows: boolean,
+  arrived: boolean,
+  act: Act | null,
+): Happenings {
+  const foot = (side: 0 | 1) =>
+    before?.down[side] ? contacts[side] >= EVENTS.UP : contacts[side] > EVENTS.DOWN;
   const down: [boolean, boolean] = [foot(0), foot(1)];
   const flies = !down[0] && !down[1];
   if (!before) return { down, air: flies ? EVENTS.FLIES : 0, gait, arrived, act };
@@ -34,7 +42,11 @@ export function after(before: Happenings | null, contacts: readonly [number, num
 }
 
 /** What has happened since the tick before; null: in the first tick. */
-export function eventsOf(now: Happenings, earlier: Happenings | null, gaits: readonly string[]): FigureEvent[] {
+export function eventsOf(
+  now: Happenings,
+  earlier: Happenings | null,
+  gaits: readonly string[],
+): FigureEvent[] {
   const before = earlier ?? { ...now, act: null };
   const found: FigureEvent[] = [];
   if (now.down[0] && !before.down[0]) found.push({ kind: "left foot" });

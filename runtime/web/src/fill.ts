@@ -6,7 +6,10 @@ import { type Frames, Model } from "./model.js";
 
 /** The frames of a gap. */
 export class FillModel extends Model {
-  constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>) {
+  constructor(
+    manifest: Manifest,
+    private readonly graphs: Record<string, Graph>,
+  ) {
     super(manifest);
   }
 
@@ -17,7 +20,10 @@ export class FillModel extends Model {
     if (!(count >= 1 && count <= this.setting("longest"))) {
       throw new DecodingError(`a gap has 1 to ${this.setting("longest")} frames, not ${count}`);
     }
-    const [before, behind] = [this.checked(past, width, least).slice(-context), this.checked(after, width, least).slice(0, context)];
+    const [before, behind] = [
+      this.checked(past, width, least).slice(-context),
+      this.checked(after, width, least).slice(0, context),
+    ];
     return between(this.graphs.filler!, before, behind, count);
   }
 }

@@ -1,18 +1,36 @@
 import { RETARGET } from "./generated.js";
 import { SIDES } from "./humanoid.js";
 import {
-
-  cross, dot, inverse, mean, minus, ofVector, plus, product, type Quaternion, rotated, times, unit, type Vector,
+  cross,
+  dot,
+  inverse,
+  mean,
+  minus,
+  ofVector,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  times,
+  unit,
+  type Vector,
 } from "./rotations.js";
 import type { Skeleton } from "./skeleton.js";
 
 /** What the names of a finger's joints hold, and how far it is bent in a relaxed hand, times a finger's bend. */
-const SHARES = Object.entries(RETARGET.FINGER_SHARES).map(([words, share]): [RegExp, number] => [new RegExp(words), share]);
+const SHARES = Object.entries(RETARGET.FINGER_SHARES).map(([words, share]): [RegExp, number] => [
+  new RegExp(words),
+  share,
+]);
 const THUMB = 0;
 const INDEX = 1;
 
 /** Local rotations of a pose with its hands relaxed (docs/reference/retargeting.md, "Fingers"); joints: of "leftHand", "rightHand". */
-export function relaxed(skeleton: Skeleton, still: Quaternion[], joints: Record<string, number>): Quaternion[] {
+export function relaxed(
+  skeleton: Skeleton,
+  still: Quaternion[],
+  joints: Record<string, number>,
+): Quaternion[] {
   const bent = [...still];
   const turns: Quaternion[] = [];
   const places: Vector[] = [];
@@ -27,7 +45,14 @@ export function relaxed(skeleton: Skeleton, still: Quaternion[], joints: Record<
   return bent;
 }
 
-function bendFingers(fingers: Map<number, number[]>, hand: number, sign: number, turns: Quaternion[], places: Vector[], bent: Quaternion[]): void {
+function bendFingers(
+  fingers: Map<number, number[]>,
+  hand: number,
+  sign: number,
+  turns: Quaternion[],
+  places: Vector[],
+  bent: Quaternion[],
+): void {
   const knuckles = [...fingers].filter(([finger]) => finger !== THUMB).map(([, chain]) => places[chain[0]!]!);
   if (!fingers.has(INDEX) || knuckles.length < 2) return;
   const along = unit(minus(mean(knuckles), places[hand]!));
@@ -42,8 +67,14 @@ function bendFingers(fingers: Map<number, number[]>, hand: number, sign: number,
     chain.slice(0, Math.min(pointing.length, RETARGET.FINGER_BENDS.length)).forEach((joint, at) => {
       const [before, bone] = [at ? pointing[at - 1]! : start, pointing[at]!];
       const aside = unit(minus(axis, times(bone, dot(axis, bone))));
-      const now = Math.atan2(dot(cross(before, bone), aside), dot(before, bone) - dot(before, aside) * dot(bone, aside));
-      const turn = times(aside, Math.max(0, ((RETARGET.FINGER_BENDS[at]! * Math.PI) / 180) * SHARES[finger]![1] - now));
+      const now = Math.atan2(
+        dot(cross(before, bone), aside),
+        dot(before, bone) - dot(before, aside) * dot(bone, aside),
+      );
+      const turn = times(
+        aside,
+        Math.max(0, ((RETARGET.FINGER_BENDS[at]! * Math.PI) / 180) * SHARES[finger]![1] - now),
+      );
       bent[joint] = product(bent[joint]!, ofVector(rotated(inverse(turns[joint]!), turn)));
     });
   }

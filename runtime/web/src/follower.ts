@@ -20,9 +20,17 @@ export function shownBy({ wanted, off }: Follower): number[] {
 }
 
 /** A tick later: what moves farther than `leap` in a tick is caught up with. */
-export function followed(before: Follower, wanted: number[], leap: number, halfLife: number, seconds: number): Follower {
+export function followed(
+  before: Follower,
+  wanted: number[],
+  leap: number,
+  halfLife: number,
+  seconds: number,
+): Follower {
   const moved = wanted.map((value, i) => value - before.wanted[i]!);
   const leaps = Math.sqrt(moved.reduce((sum, value) => sum + value * value, 0)) > leap;
-  const later = before.off.map((off, i) => damped(leaps ? off - moved[i]! : off, before.rate[i]!, dampingOf(halfLife), seconds));
+  const later = before.off.map((off, i) =>
+    damped(leaps ? off - moved[i]! : off, before.rate[i]!, dampingOf(halfLife), seconds),
+  );
   return { wanted, off: later.map(([off]) => off), rate: later.map(([, rate]) => rate) };
 }

@@ -2,16 +2,31 @@
 import { LOCK, footLockSettings } from "./generated.js";
 import { BONES, HUMANOID, LEG, SIDES, SOLES } from "./humanoid.js";
 import { TwoBones } from "./twoBones.js";
-import { about, inverse, minus, plus, product, type Quaternion, rotated, type Vector, X, Y } from "./rotations.js";
+import {
+  about,
+  inverse,
+  minus,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  type Vector,
+  X,
+  Y,
+} from "./rotations.js";
 import { damped, dampingOf } from "./springs.js";
 import type { Settings } from "./settings.js";
 import type { Played } from "./steering.js";
 
 export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
 /** Where the joints of a leg begin in their parents' frames. */
-export const OFFSETS = LEGS.map((bones) => bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset));
+export const OFFSETS = LEGS.map((bones) =>
+  bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset),
+);
 /** Points of a sole, heel, ball and tip, and which joint of a leg carries each. */
-const POINTS = LEG.flatMap((part, joint) => (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]));
+const POINTS = LEG.flatMap((part, joint) =>
+  (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]),
+);
 const BALL = 1;
 
 /** Of one foot: by how much it is moved along x and z and how high it steps, how fast these change, and where the points of its
@@ -38,17 +53,26 @@ export function held(lock: Lock, pose: Played, how: Settings<typeof footLockSett
   const rotations = [...pose.rotations];
   lock.forEach((foot, side) => {
     const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
-    const soles = POINTS.map(([joint, point]) => plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)));
+    const soles = POINTS.map(([joint, point]) =>
+      plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)),
+    );
     const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
     const bears = soles[lowest]![1] < soles[BALL]![1] - how.bears ? lowest : BALL;
     const contact = pose.contacts[side]!;
-    const moved = shift(foot, minus(soles[bears]!, (foot.soles ?? soles)[bears]!), contact > how.stands, how, dt);
+    const moved = shift(
+      foot,
+      minus(soles[bears]!, (foot.soles ?? soles)[bears]!),
+      contact > how.stands,
+      how,
+      dt,
+    );
     foot.soles = soles;
     const steps = contact * how.steps * Math.min(1, moved / (how.swings * dt));
     const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(LOCK.LIFTS), dt);
     foot.height = [steps + off, rise];
     const lift = Math.max(0, steps + off - soles[lowest]![1]);
-    if (foot.shift[0] || foot.shift[1] || lift) reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
+    if (foot.shift[0] || foot.shift[1] || lift)
+      reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
   });
   return { ...pose, rotations };
 }
@@ -72,7 +96,13 @@ export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, r
 }
 
 /** Move a foot whose point that bears it was moved since the last tick; how far that is then shown to move. */
-function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: Settings<typeof footLockSettings>, dt: number): number {
+function shift(
+  foot: Foot,
+  [x, , z]: Vector,
+  contact: boolean,
+  how: Settings<typeof footLockSettings>,
+  dt: number,
+): number {
   const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
   if (contact && Math.hypot(x, z) < how.swings * dt && Math.hypot(...stay) < how.farthest) {
     [foot.shift, foot.drift] = [stay, [0, 0]];
@@ -81,12 +111,21 @@ function shift(foot: Foot, [x, , z]: Vector, contact: boolean, how: Settings<typ
   const damping = dampingOf(how.fade);
   const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
   const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
-  [foot.shift, foot.drift] = [[offX, offZ], [rateX, rateZ]];
+  [foot.shift, foot.drift] = [
+    [offX, offZ],
+    [rateX, rateZ],
+  ];
   return Math.hypot(offX - stay[0], offZ - stay[1]);
 }
 
 /** Turn thigh, shin and foot of a leg so that the ankle is moved; the foot stays as it is in the world. */
-export function reach(rotations: Quaternion[], side: number, hips: Quaternion, { turned, places }: Limb, move: Vector): void {
+export function reach(
+  rotations: Quaternion[],
+  side: number,
+  hips: Quaternion,
+  { turned, places }: Limb,
+  move: Vector,
+): void {
   const [hip, knee, ankle] = places as [Vector, Vector, Vector];
   const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
   const leg = new TwoBones(hip, knee, ankle, rotated(shin, X));

@@ -13,7 +13,20 @@ import { rounded } from "./numbers.js";
 import { moved, type Pose as Ground, seenFrom } from "./planar.js";
 import { posesOf } from "./poses.js";
 import {
-  about, dot, minus, nearestTurn, ofVector, product, type Quaternion, rotated, size, times, type Vector, vectorOf, X, Y,
+  about,
+  dot,
+  minus,
+  nearestTurn,
+  ofVector,
+  product,
+  type Quaternion,
+  rotated,
+  size,
+  times,
+  type Vector,
+  vectorOf,
+  X,
+  Y,
 } from "./rotations.js";
 import { toHumanoid } from "./retarget.js";
 import { Skeleton } from "./skeleton.js";
@@ -40,21 +53,42 @@ export function framesFor(motion: Motion, manifest: Manifest): number[][] {
   if (representation === "root_sixd") return sixd(root, places, bones.slice(1).map(turns), fps);
   const block = eulersOf(root, "yxz");
   const unit = representation === "root_angles" ? RADIANS : 1;
-  const joints = bones.map((bone) => (representation === "root_angles" ? degrees(turns(bone), bone) : vectors(turns(bone))));
-  const rates = velocities(places, block.map(([heading]) => heading), fps);
+  const joints = bones.map((bone) =>
+    representation === "root_angles" ? degrees(turns(bone), bone) : vectors(turns(bone)),
+  );
+  const rates = velocities(
+    places,
+    block.map(([heading]) => heading),
+    fps,
+  );
   return rates.map(([forward, left, turn], at) => {
     const [, pitch, roll] = block[at]!;
-    return [forward, left, turn / unit, places[at]![1], pitch / unit, roll / unit, ...joints.flatMap((joint) => joint[at]!)];
+    return [
+      forward,
+      left,
+      turn / unit,
+      places[at]![1],
+      pitch / unit,
+      roll / unit,
+      ...joints.flatMap((joint) => joint[at]!),
+    ];
   });
 }
 
 /** The bones that the channels of a model on the humanoid speak of; DecodingError for any other model. */
 function bonesOf({ motion: { representation, channels, skeleton } }: Manifest): string[] {
   const kind = KINDS[representation];
-  const bones = channels.filter((name) => name.endsWith(kind === "x" ? ".xx" : `.${kind}x`)).map((name) => name.slice(0, -3));
+  const bones = channels
+    .filter((name) => name.endsWith(kind === "x" ? ".xx" : `.${kind}x`))
+    .map((name) => name.slice(0, -3));
   const whole = channels.length === (kind === "x" ? 4 + 6 * bones.length : 6 + 3 * bones.length);
-  const own = skeleton?.joints.length === HUMANOID.joints.length && skeleton.joints.every(({ name }, at) => name === HUMANOID.names[at]);
-  if (!kind || !whole || !own) throw new DecodingError(`motions are made into frames of models on the humanoid, not of ${representation}`);
+  const own =
+    skeleton?.joints.length === HUMANOID.joints.length &&
+    skeleton.joints.every(({ name }, at) => name === HUMANOID.names[at]);
+  if (!kind || !whole || !own)
+    throw new DecodingError(
+      `motions are made into frames of models on the humanoid, not of ${representation}`,
+    );
   return bones;
 }
 
@@ -63,10 +97,15 @@ function onFigure(motion: Motion, fps: number): Motion {
   const { skeleton } = motion;
   if (isHumanoid(skeleton)) return motion;
   if (!hasBones(skeleton)) {
-    if (!motion.travels) throw new MotionError("this motion lacks the path of the figure: it has no channels for the root's place");
+    if (!motion.travels)
+      throw new MotionError(
+        "this motion lacks the path of the figure: it has no channels for the root's place",
+      );
     return toHumanoid(motion.fps > fps ? resampled(motion, fps) : motion).motion;
   }
-  const unit = skeleton.metresPerUnit ?? unitOf(skeleton, new Body(skeleton, mapOf(skeleton)).legLength(skeleton.rest)).metres;
+  const unit =
+    skeleton.metresPerUnit ??
+    unitOf(skeleton, new Body(skeleton, mapOf(skeleton)).legLength(skeleton.rest)).metres;
   if (unit === null) throw new MotionError("the unit of lengths is not known");
   return { ...motion, skeleton: new Skeleton(skeleton.joints, unit) };
 }
@@ -74,17 +113,28 @@ function onFigure(motion: Motion, fps: number): Motion {
 /** Whether a skeleton has all bones by the humanoid's names, which point within 45 degrees of the humanoid's. */
 function hasBones(skeleton: Skeleton): boolean {
   const at = (own: Skeleton, name: string) => own.rest[own.names.indexOf(name)]!;
-  return BONES.every((name) => skeleton.names.includes(name)) && HUMANOID.joints.every(({ name, parent }) => {
-    if (parent < 0 || !skeleton.names.includes(name)) return true;
-    const above = HUMANOID.names[parent]!;
-    const [one, two] = [skeleton, HUMANOID].map((own) => minus(at(own, name), at(own, above))) as [Vector, Vector];
-    return Math.min(size(one), size(two)) < 1e-6 || dot(one, two) >= Math.cos(45 * RADIANS) * size(one) * size(two);
-  });
+  return (
+    BONES.every((name) => skeleton.names.includes(name)) &&
+    HUMANOID.joints.every(({ name, parent }) => {
+      if (parent < 0 || !skeleton.names.includes(name)) return true;
+      const above = HUMANOID.names[parent]!;
+      const [one, two] = [skeleton, HUMANOID].map((own) => minus(at(own, name), at(own, above))) as [
+        Vector,
+        Vector,
+      ];
+      return (
+        Math.min(size(one), size(two)) < 1e-6 ||
+        dot(one, two) >= Math.cos(45 * RADIANS) * size(one) * size(two)
+      );
+    })
+  );
 }
 
 function degrees(turns: Quaternion[], bone: string): number[][] {
   const { order } = HUMANOID.joints[HUMANOID.index(bone)]!;
-  return eulersOf(turns, order).map((angles) => Array.from("xyz", (axis) => angles[order.indexOf(axis)]! / RADIANS));
+  return eulersOf(turns, order).map((angles) =>
+    Array.from("xyz", (axis) => angles[order.indexOf(axis)]! / RADIANS),
+  );
 }
 
 /** Rotation vectors that do not leap: from the last frame backwards each is the one nearest to that after it. */
@@ -101,7 +151,11 @@ function velocities(places: Vector[], facing: number[], fps: number): Ground[] {
   if (places.length < 2) return [[0, 0, 0]];
   return places.map((_, at) => {
     const later = Math.max(at, 1);
-    const [from, to] = [later - 1, later].map((one): Ground => [places[one]![0], places[one]![2], facing[one]!]) as [Ground, Ground];
+    const [from, to] = [later - 1, later].map((one): Ground => [
+      places[one]![0],
+      places[one]![2],
+      facing[one]!,
+    ]) as [Ground, Ground];
     return seenFrom(from, to).map((rate) => rate * fps) as Ground;
   });
 }
@@ -135,7 +189,11 @@ function facingOf(root: Quaternion[], fps: number): number[] {
 }
 
 /** A motion of the humanoid from a model's frames, from the origin, facing z; feet of `root_sixd` are held unless `plant` is false. */
-export function motionOf(frames: Frames, manifest: Manifest, { plant = true }: { plant?: boolean } = {}): Motion {
+export function motionOf(
+  frames: Frames,
+  manifest: Manifest,
+  { plant = true }: { plant?: boolean } = {},
+): Motion {
   const { representation, fps } = manifest.motion;
   const bones = bonesOf(manifest);
   if (!frames.length) throw new DecodingError("there are no frames to make a motion of");
@@ -143,10 +201,26 @@ export function motionOf(frames: Frames, manifest: Manifest, { plant = true }: {
   const unit = representation === "root_angles" ? RADIANS : 1;
   let ground: Ground = [0, 0, 0];
   const rows = frames.map((frame, at) => {
-    const [forward, left, turn, height, pitch, roll] = Array.from({ length: 6 }, (_, i) => frame[i]!) as [number, number, number, number, number, number];
+    const [forward, left, turn, height, pitch, roll] = Array.from({ length: 6 }, (_, i) => frame[i]!) as [
+      number,
+      number,
+      number,
+      number,
+      number,
+      number,
+    ];
     if (at) ground = moved(ground, [forward / fps, left / fps, (turn * unit) / fps]);
-    const rotations: Record<string, Quaternion> = { hips: fromEuler([ground[2], pitch * unit, roll * unit], "yxz") };
-    bones.forEach((bone, i) => (rotations[bone] = turnOf([0, 1, 2].map((axis) => frame[6 + 3 * i + axis]! * unit) as Vector, bone, unit === 1)));
+    const rotations: Record<string, Quaternion> = {
+      hips: fromEuler([ground[2], pitch * unit, roll * unit], "yxz"),
+    };
+    bones.forEach(
+      (bone, i) =>
+        (rotations[bone] = turnOf(
+          [0, 1, 2].map((axis) => frame[6 + 3 * i + axis]! * unit) as Vector,
+          bone,
+          unit === 1,
+        )),
+    );
     return { hips: [ground[0], height, ground[1]] as Vector, rotations };
   });
   return posed(rows, fps);
@@ -154,7 +228,9 @@ export function motionOf(frames: Frames, manifest: Manifest, { plant = true }: {
 
 function turnOf(values: Vector, bone: string, isVector: boolean): Quaternion {
   const { order } = HUMANOID.joints[HUMANOID.index(bone)]!;
-  return isVector ? ofVector(values) : fromEuler(Array.from(order, (axis) => values["xyz".indexOf(axis)]!) as Vector, order);
+  return isVector
+    ? ofVector(values)
+    : fromEuler(Array.from(order, (axis) => values["xyz".indexOf(axis)]!) as Vector, order);
 }
 
 /** Frames of `root_sixd` with standing feet held in place: what Python gives for a sentence. */
@@ -168,7 +244,11 @@ function ofSixd(frames: Frames, manifest: Manifest): Motion {
 }
 
 function posed(poses: { hips: Vector; rotations: Record<string, Quaternion> }[], fps: number): Motion {
-  const rotations = poses.map((pose) => HUMANOID.names.map((name): Quaternion => pose.rotations[name] ?? [0, 0, 0, 1]));
-  const translations = poses.map((pose) => HUMANOID.joints.map(({ offset }, at) => (at ? offset : pose.hips)));
+  const rotations = poses.map((pose) =>
+    HUMANOID.names.map((name): Quaternion => pose.rotations[name] ?? [0, 0, 0, 1]),
+  );
+  const translations = poses.map((pose) =>
+    HUMANOID.joints.map(({ offset }, at) => (at ? offset : pose.hips)),
+  );
   return checked({ skeleton: HUMANOID, fps, rotations, translations, travels: true });
 }

@@ -2,7 +2,13 @@ import { type NumberArray, stacked } from "./arrays.js";
 import type { Arrays, Graph } from "./graph.js";
 
 /** The frames that follow seed frames (L, D): docs/reference/bundle.md, the loop `free_run`. */
-export async function freeRun(encoder: Graph, step: Graph, seed: ArrayLike<number>[], frames: number, horizon: number) {
+export async function freeRun(
+  encoder: Graph,
+  step: Graph,
+  seed: ArrayLike<number>[],
+  frames: number,
+  horizon: number,
+) {
   const seen = [...seed];
   const width = seed[0]!.length;
   const takes = (name: string) => step.spec.inputs.some((input) => input.name === name);
@@ -16,7 +22,10 @@ export async function freeRun(encoder: Graph, step: Graph, seed: ArrayLike<numbe
     }
     const given = Object.entries(outputs).filter(([name]) => takes(name));
     const fixed: Arrays = Object.fromEntries(given.filter(([name]) => !(name in step.spec.feedback)));
-    let states: Record<string, NumberArray<Float32Array>> = { ...step.zeroState(1), ...Object.fromEntries(given.filter(([name]) => name in step.spec.feedback)) };
+    let states: Record<string, NumberArray<Float32Array>> = {
+      ...step.zeroState(1),
+      ...Object.fromEntries(given.filter(([name]) => name in step.spec.feedback)),
+    };
     for (let at = 0; at < ahead; at++) {
       const next = await step.step(fixed, states);
       states = next.states;

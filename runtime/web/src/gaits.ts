@@ -6,7 +6,13 @@ import { clamp, wrapped } from "./springs.js";
 import type { Settings } from "./settings.js";
 
 /** The slowest, the usual, and the fastest speed forward, sideways and backwards; 0 where a gait cannot go that way. */
-export type Speeds = readonly [slowest: number, usual: number, forward: number, sideways: number, backwards: number];
+export type Speeds = readonly [
+  slowest: number,
+  usual: number,
+  forward: number,
+  sideways: number,
+  backwards: number,
+];
 
 /** The last command to a figure. */
 export interface Command {
@@ -29,7 +35,10 @@ export class Gaits {
   /** The number of a gait; ControlError for an unknown one. */
   number(name: string): number {
     const found = this.names.indexOf(name);
-    if (found < 0) throw new ControlError(`unknown gait ${JSON.stringify(name)}; expected one of ${this.names.join(", ")}`);
+    if (found < 0)
+      throw new ControlError(
+        `unknown gait ${JSON.stringify(name)}; expected one of ${this.names.join(", ")}`,
+      );
     return found;
   }
 
@@ -66,7 +75,10 @@ export class Gaits {
 
 /** A command with what is told anew. Given a direction but no facing, the figure faces it once it moves. */
 export function told(command: Command, given: Partial<Omit<Command, "facesWay">>): Command {
-  const faces = given.direction !== undefined || given.facing !== undefined ? given.facing === undefined : command.facesWay;
+  const faces =
+    given.direction !== undefined || given.facing !== undefined
+      ? given.facing === undefined
+      : command.facesWay;
   const found = { ...command, ...given, facesWay: faces };
   return { ...found, facing: faces && found.speed > 0 ? found.direction : found.facing };
 }

@@ -103,8 +103,16 @@ function leftOut(sentence: string, { action, lacking }: Shown): string {
 
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
-  private readonly familiarity = settingsOf("familiarity", familiaritySettings, this.manifest.settings.familiarity);
-  private readonly continuation = settingsOf("continuation", continuationSettings, this.manifest.settings.continuation);
+  private readonly familiarity = settingsOf(
+    "familiarity",
+    familiaritySettings,
+    this.manifest.settings.familiarity,
+  );
+  private readonly continuation = settingsOf(
+    "continuation",
+    continuationSettings,
+    this.manifest.settings.continuation,
+  );
   private readonly verbs: ReturnType<typeof verbsOf>;
 
   constructor(
@@ -123,7 +131,8 @@ export class GenerateModel extends LanguageModel {
     const count = this.setting("hypotheses", settings.hypotheses ?? 1);
     if (!settings.whole && (await this.parts(text)).length > 1) {
       const motions: Story[] = [];
-      for (const one of [seed, ...stateOf(seed, count - 1)]) motions.push(await this.story(text, { ...settings, seed: one }));
+      for (const one of [seed, ...stateOf(seed, count - 1)])
+        motions.push(await this.story(text, { ...settings, seed: one }));
       return motions;
     }
     const noise = Array.from({ length: count }, (_, at) => (at ? new Pcg64(seed, at - 1) : new Pcg64(seed)));
@@ -151,7 +160,10 @@ export class GenerateModel extends LanguageModel {
   private lacking(sentence: string, action: number): string[] {
     const have = new Set(this.manifest.actions![action]!.words.map(stem));
     const words = new Set(this.vocabulary.split(sentence).map((word) => this.vocabulary.meant(word)));
-    const lacks = (word: string) => word && !FUNCTION_WORDS.has(word) && ![word, this.vocabulary.near(word)].some((one) => have.has(stem(one)));
+    const lacks = (word: string) =>
+      word &&
+      !FUNCTION_WORDS.has(word) &&
+      ![word, this.vocabulary.near(word)].some((one) => have.has(stem(one)));
     return [...words].filter(lacks).sort();
   }
 
@@ -164,7 +176,11 @@ export class GenerateModel extends LanguageModel {
 
   private shownAs(sentence: string, action: number, context: Float32Array): Shown {
     const taken = this.manifest.actions![action]!.sentence;
-    return { action: taken, lacking: this.lacking(sentence, action), confidence: this.known(sentence, context).confidence };
+    return {
+      action: taken,
+      lacking: this.lacking(sentence, action),
+      confidence: this.known(sentence, context).confidence,
+    };
   }
 
   /** The context of a sentence; strict: without the actions that leave out a word. TextError for what is refused then. */
@@ -172,13 +188,19 @@ export class GenerateModel extends LanguageModel {
     const context = await this.context(sentence);
     if (!strict) return context;
     const { unknown } = this.vocabulary.encode(sentence);
-    if (unknown.length) throw new TextError(`the model does not know ${unknown.join(", ")} (in '${sentence}')`);
+    if (unknown.length)
+      throw new TextError(`the model does not know ${unknown.join(", ")} (in '${sentence}')`);
     const { confidence, confident, nearest } = this.known(sentence, context);
     const near = nearest.map((one) => `'${one}'`).join(", ");
-    if (!confident) throw new TextError(`'${sentence}' is outside the training data (confidence ${confidence.toFixed(2)}); nearest: ${near}`);
+    if (!confident)
+      throw new TextError(
+        `'${sentence}' is outside the training data (confidence ${confidence.toFixed(2)}); nearest: ${near}`,
+      );
     const shown = this.shownAs(sentence, context.indexOf(Math.max(...context)), context);
     if (shown.lacking.length) throw new TextError(leftOut(sentence, shown));
-    return context.map((value, action) => (this.lacking(sentence, action).length ? GENERATE_CODES.NEVER : value));
+    return context.map((value, action) =>
+      this.lacking(sentence, action).length ? GENERATE_CODES.NEVER : value,
+    );
   }
 
   /** The same by noise that is given for each motion. */
@@ -239,7 +261,8 @@ export class GenerateModel extends LanguageModel {
   private known(text: string, context: Float32Array): Understood {
     const actions = this.manifest.actions!;
     const said = new Map<string, number>();
-    for (const { words } of actions) for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
+    for (const { words } of actions)
+      for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
     const rare = (word: string) => Math.log((1 + actions.length) / said.get(word)!);
     const unheard = Math.log(1 + actions.length);
     const asked = [...new Set(this.vocabulary.split(text))];
@@ -274,10 +297,14 @@ export class GenerateModel extends LanguageModel {
 
   private told(sentences: string | string[], given: StorySettings): Told {
     const texts = typeof sentences === "string" ? [sentences] : [...sentences];
-    const each = Array.isArray(given.seconds) ? given.seconds : texts.map(() => (given.seconds as number | undefined) ?? null);
+    const each = Array.isArray(given.seconds)
+      ? given.seconds
+      : texts.map(() => (given.seconds as number | undefined) ?? null);
     if (!texts.length) throw new TextError("a story needs a sentence");
-    if (each.length !== texts.length) throw new DecodingError(`${texts.length} sentences have ${each.length} lengths`);
-    if (![undefined, "start", "end", "both"].includes(given.stand)) throw new DecodingError(`stand is start, end or both, not ${given.stand}`);
+    if (each.length !== texts.length)
+      throw new DecodingError(`${texts.length} sentences have ${each.length} lengths`);
+    if (![undefined, "start", "end", "both"].includes(given.stand))
+      throw new DecodingError(`stand is start, end or both, not ${given.stand}`);
     const seconds = each.map((one) => (one === null ? 0 : this.setting("seconds", one)));
     for (const end of ["start", "end"] as const) {
       if (given.stand !== end && given.stand !== "both") continue;
@@ -286,19 +313,36 @@ export class GenerateModel extends LanguageModel {
     }
     texts.forEach((text) => this.words(text));
     const longest = this.steps(this.setting("max_seconds", given.max_seconds));
-    return { texts, seconds, whole: given.whole ?? false, strict: given.strict ?? false, longest, drawing: this.drawing(given), noise: new Pcg64(this.setting("seed", given.seed ?? 0)) };
+    return {
+      texts,
+      seconds,
+      whole: given.whole ?? false,
+      strict: given.strict ?? false,
+      longest,
+      drawing: this.drawing(given),
+      noise: new Pcg64(this.setting("seed", given.seed ?? 0)),
+    };
   }
 
   /** The story with the parts of its sentences as passages. */
   private async parted(told: Told): Promise<Told> {
-    const parts = told.whole ? told.texts.map((text) => [text]) : await Promise.all(told.texts.map((text) => this.parts(text)));
+    const parts = told.whole
+      ? told.texts.map((text) => [text])
+      : await Promise.all(told.texts.map((text) => this.parts(text)));
     const texts = parts.flat();
     if (told.strict) for (const text of texts) await this.asked(text, true); // refused before anything is drawn
-    return { ...told, texts, seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)) };
+    return {
+      ...told,
+      texts,
+      seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)),
+    };
   }
 
   /** What each sentence is shown as, then for each step of codes the frames that become final with it; at last the remaining frames. */
-  private async *pieces({ texts, strict, seconds, longest, drawing, noise }: Told, after?: Frames): AsyncGenerator<Piece, void> {
+  private async *pieces(
+    { texts, strict, seconds, longest, drawing, noise }: Told,
+    after?: Frames,
+  ): AsyncGenerator<Piece, void> {
     const writer = new Writer(this.source, [noise], drawing);
     const before = after && (await this.continued(after));
     if (before) await writer.see(before.codes);
@@ -311,7 +355,12 @@ export class GenerateModel extends LanguageModel {
       const length = seconds[sentence]!;
       end += length;
       limit = length ? Math.max(1, Math.round(end * this.fps)) : Infinity;
-      for await (const { codes } of drawnSteps(writer, [action], length ? this.steps(end) - done : longest, length > 0)) {
+      for await (const { codes } of drawnSteps(
+        writer,
+        [action],
+        length ? this.steps(end) - done : longest,
+        length > 0,
+      )) {
         done++;
         const frames = (await decoder.push(codes)).slice(0, limit - given);
         given += frames.length;
@@ -319,13 +368,19 @@ export class GenerateModel extends LanguageModel {
       }
       if (!length) end = (done * this.codec.hop) / this.fps;
     }
-    yield { sentence: texts.length - 1, frames: (await decoder.push([], true)).slice(0, limit - given), steps: 0 };
+    yield {
+      sentence: texts.length - 1,
+      frames: (await decoder.push([], true)).slice(0, limit - given),
+      steps: 0,
+    };
   }
 
   /** The last seconds, whole steps of codes, of a motion. */
   private async continued(after: Frames): Promise<Context> {
     const { hop } = this.codec;
-    const frames = this.checked(after, this.manifest.motion.channels.length, 2 * hop).slice(-this.steps(this.continuation.context) * hop);
+    const frames = this.checked(after, this.manifest.motion.channels.length, 2 * hop).slice(
+      -this.steps(this.continuation.context) * hop,
+    );
     const whole = frames.slice(frames.length % hop);
     return { frames: whole, codes: await codesOf(this.codec, whole) };
   }
@@ -334,15 +389,28 @@ export class GenerateModel extends LanguageModel {
 /** What a bundle of the loop `codes` makes. */
 export async function generateModel(bundle: Bundle, graphs: Record<string, Graph>): Promise<GenerateModel> {
   const { manifest } = bundle;
-  const [memory, moves, body] = await Promise.all([bundle.table("memory"), bundle.table("moves"), bundle.table("body")]);
+  const [memory, moves, body] = await Promise.all([
+    bundle.table("memory"),
+    bundle.table("moves"),
+    bundle.table("body"),
+  ]);
   const { step, part, encoder, decoder, tokens } = graphs as Record<string, Graph>;
   const { ahead, hop } = (manifest.config.codec ?? {}) as { ahead: number[]; hop: number };
   const shape = decoder!.spec.outputs.find((output) => output.name === "frames")!.shape;
-  const looks = Array.isArray(ahead) && ahead.length <= 8 && ahead.every((steps) => [0, 1, 2].includes(steps));
-  if (!looks || hop !== shape[2]) throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
+  const looks =
+    Array.isArray(ahead) && ahead.length <= 8 && ahead.every((steps) => [0, 1, 2].includes(steps));
+  if (!looks || hop !== shape[2])
+    throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
   const [actions, end] = [manifest.actions?.length ?? 0, moves.shape[0]!];
   const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
-  const source: Source = { step: step!, part: part!, end, nullAction: actions, parts, memory: new Memory(memory, moves, body, actions) };
+  const source: Source = {
+    step: step!,
+    part: part!,
+    end,
+    nullAction: actions,
+    parts,
+    memory: new Memory(memory, moves, body, actions),
+  };
   const codec: Codec = {
     decoder: decoder!,
     tokens: tokens!,

@@ -28,8 +28,10 @@ class Buffer {
   /** The index of a new accessor of rows of numbers. */
   add(rows: number[][], bounded = false): number {
     const data = Float32Array.from(rows.flat());
-    if (!data.every(Number.isFinite)) throw new MotionError("values of this motion exceed glTF's 32-bit numbers");
-    const of = (end: (...values: number[]) => number) => rows[0]!.map((_, at) => Math.fround(rows.map((row) => row[at]!).reduce((a, b) => end(a, b))));
+    if (!data.every(Number.isFinite))
+      throw new MotionError("values of this motion exceed glTF's 32-bit numbers");
+    const of = (end: (...values: number[]) => number) =>
+      rows[0]!.map((_, at) => Math.fround(rows.map((row) => row[at]!).reduce((a, b) => end(a, b))));
     return this.put(data, rows[0]!.length, bounded ? { min: of(Math.min), max: of(Math.max) } : {});
   }
 
@@ -38,14 +40,24 @@ class Buffer {
     this.bufferViews.push({ buffer: 0, byteOffset: this.length, byteLength: data.byteLength });
     const componentType = data instanceof Float32Array ? 5126 : data instanceof Uint32Array ? 5125 : 5123;
     const type = { 1: "SCALAR", 3: "VEC3", 4: "VEC4", 16: "MAT4" }[width];
-    this.accessors.push({ bufferView: this.bufferViews.length - 1, componentType, count: data.length / width, type, ...more });
+    this.accessors.push({
+      bufferView: this.bufferViews.length - 1,
+      componentType,
+      count: data.length / width,
+      type,
+      ...more,
+    });
     this.parts.push(data);
     this.length += data.byteLength;
     return this.accessors.length - 1;
   }
 
   document(): object {
-    return { bufferViews: this.bufferViews, accessors: this.accessors, buffers: [{ byteLength: this.length }] };
+    return {
+      bufferViews: this.bufferViews,
+      accessors: this.accessors,
+      buffers: [{ byteLength: this.length }],
+    };
   }
 
   bytes(): Uint8Array {
@@ -73,18 +85,38 @@ export function toVRMA(motion: Motion): Uint8Array {
 export function toGLB(motion: Motion, { positions, normals, joints, weights, parts }: Surface): Uint8Array {
   const buffer = new Buffer();
   const attributes = {
-    POSITION: buffer.add(positions, true), NORMAL: buffer.add(normals),
-    JOINTS_0: buffer.put(Uint16Array.from(joints.flat()), 4), WEIGHTS_0: buffer.add(weights),
+    POSITION: buffer.add(positions, true),
+    NORMAL: buffer.add(normals),
+    JOINTS_0: buffer.put(Uint16Array.from(joints.flat()), 4),
+    WEIGHTS_0: buffer.add(weights),
   };
-  const inverseBindMatrices = buffer.add(FINGERED.rest.map((place) => {
-    const [x, y, z] = plus(place, FINGERED.joints[0]!.offset);
-    return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1];
-  }));
-  return fileOf(motion, buffer, {
-    skins: [{ joints: FINGERED.names.map((_, at) => at), skeleton: 0, inverseBindMatrices }],
-    meshes: [{ name: "body", primitives: parts.map(({ triangles }, material) => ({ attributes, indices: buffer.put(triangles, 1), material })) }],
-    materials: parts.map(({ colour }) => ({ pbrMetallicRoughness: { baseColorFactor: [...colour, 1], metallicFactor: 0, roughnessFactor: 0.8 } })),
-  }, [{ name: "body", mesh: 0, skin: 0 }]);
+  const inverseBindMatrices = buffer.add(
+    FINGERED.rest.map((place) => {
+      const [x, y, z] = plus(place, FINGERED.joints[0]!.offset);
+      return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -x, -y, -z, 1];
+    }),
+  );
+  return fileOf(
+    motion,
+    buffer,
+    {
+      skins: [{ joints: FINGERED.names.map((_, at) => at), skeleton: 0, inverseBindMatrices }],
+      meshes: [
+        {
+          name: "body",
+          primitives: parts.map(({ triangles }, material) => ({
+            attributes,
+            indices: buffer.put(triangles, 1),
+            material,
+          })),
+        },
+      ],
+      materials: parts.map(({ colour }) => ({
+        pbrMetallicRoughness: { baseColorFactor: [...colour, 1], metallicFactor: 0, roughnessFactor: 0.8 },
+      })),
+    },
+    [{ name: "body", mesh: 0, skin: 0 }],
+  );
 }
 
 /** bodies: nodes beside the humanoid's. */
@@ -106,26 +138,49 @@ function fileOf(motion: Motion, buffer: Buffer, more: object, bodies: object[] =
 export function grounded(motion: Motion): Motion {
   const ground = groundUnder(solePoints(worldOf(motion)));
   if (!(Math.abs(ground) < 0.1)) return motion;
-  return { ...motion, translations: motion.translations.map(([root, ...rest]) => [minus(root!, [0, ground, 0]), ...rest]) };
+  return {
+    ...motion,
+    translations: motion.translations.map(([root, ...rest]) => [minus(root!, [0, ground, 0]), ...rest]),
+  };
 }
 
 function nodesOf({ joints, children }: Skeleton): object[] {
-  return joints.map(({ name, offset }, at) => ({ name, translation: offset, ...(children[at]!.length ? { children: children[at] } : {}) }));
+  return joints.map(({ name, offset }, at) => ({
+    name,
+    translation: offset,
+    ...(children[at]!.length ? { children: children[at] } : {}),
+  }));
 }
 
 function animation(buffer: Buffer, { fps, rotations, translations }: Motion): object {
-  const times = buffer.add(rotations.map((_, at) => [at / fps]), true);
+  const times = buffer.add(
+    rotations.map((_, at) => [at / fps]),
+    true,
+  );
   const start = buffer.add([[0]], true);
   const [channels, samplers]: [object[], object[]] = [[], []];
   const track = (node: number, path: string, values: number[][]) => {
     channels.push({ sampler: samplers.length, target: { node, path } });
-    samplers.push({ input: values.length === rotations.length ? times : start, output: buffer.add(values), interpolation: "LINEAR" });
+    samplers.push({
+      input: values.length === rotations.length ? times : start,
+      output: buffer.add(values),
+      interpolation: "LINEAR",
+    });
   };
   HUMANOID.names.forEach((name, at) => {
-    if (!name.endsWith(SKELETON.END_SUFFIX)) track(at, "rotation", nearby(rotations.map((turns) => turns[at]!)));
+    if (!name.endsWith(SKELETON.END_SUFFIX))
+      track(at, "rotation", nearby(rotations.map((turns) => turns[at]!)));
   });
-  track(0, "translation", translations.map((moves): Vector => moves[0]!));
-  const hands = relaxed(FINGERED, FINGERED.joints.map(() => STILL), Object.fromEntries(FINGERED.names.map((name, at) => [name, at])));
+  track(
+    0,
+    "translation",
+    translations.map((moves): Vector => moves[0]!),
+  );
+  const hands = relaxed(
+    FINGERED,
+    FINGERED.joints.map(() => STILL),
+    Object.fromEntries(FINGERED.names.map((name, at) => [name, at])),
+  );
   for (let at = HUMANOID.names.length; at < hands.length; at++) track(at, "rotation", [hands[at]!]);
   return { name: "motion", channels, samplers };
 }

@@ -1,7 +1,16 @@
 /* The parts of a glTF 2.0 file (.glb, .vrm, .vrma, .gltf): its JSON object, its nodes as trees, its arrays of numbers. */
 import { GLTF_DATA } from "./generated.js";
 import { FormatError } from "./errors.js";
-import { normalised, plus, product, type Quaternion, quaternionOf, rotated, times, type Vector } from "./rotations.js";
+import {
+  normalised,
+  plus,
+  product,
+  type Quaternion,
+  quaternionOf,
+  rotated,
+  times,
+  type Vector,
+} from "./rotations.js";
 
 export interface Node {
   name?: string;
@@ -46,8 +55,22 @@ export interface Document {
   textures?: { source?: number }[];
   images?: { bufferView?: number; uri?: string; mimeType?: string }[];
   animations?: Animation[];
-  accessors?: { bufferView?: number; byteOffset?: number; componentType: number; count: number; type: string; normalized?: boolean; sparse?: Sparse }[];
-  bufferViews?: { buffer: number; byteOffset?: number; byteLength: number; byteStride?: number; extensions?: object }[];
+  accessors?: {
+    bufferView?: number;
+    byteOffset?: number;
+    componentType: number;
+    count: number;
+    type: string;
+    normalized?: boolean;
+    sparse?: Sparse;
+  }[];
+  bufferViews?: {
+    buffer: number;
+    byteOffset?: number;
+    byteLength: number;
+    byteStride?: number;
+    extensions?: object;
+  }[];
   buffers?: { byteLength: number; uri?: string }[];
   extensions?: Record<string, { humanoid?: { humanBones?: unknown } }>;
 }
@@ -102,25 +125,36 @@ export class Gltf {
     private readonly buffers: Uint8Array[],
   ) {
     this.nodes = document.nodes ?? [];
-    if (this.nodes.length > GLTF_DATA.MAX_NODES) throw new FormatError(`it has ${this.nodes.length} nodes: expected at most ${GLTF_DATA.MAX_NODES}`);
+    if (this.nodes.length > GLTF_DATA.MAX_NODES)
+      throw new FormatError(`it has ${this.nodes.length} nodes: expected at most ${GLTF_DATA.MAX_NODES}`);
     this.parents = this.nodes.map(() => -1);
     this.nodes.forEach(({ children = [] }, at) => {
       for (const child of children) {
-        if (this.parents[child] !== -1 || child === at) throw new FormatError(`its nodes are not a tree: node ${child} below node ${at}`);
+        if (this.parents[child] !== -1 || child === at)
+          throw new FormatError(`its nodes are not a tree: node ${child} below node ${at}`);
         this.parents[child] = at;
       }
     });
-    const waiting = this.nodes.map((_, at) => at).filter((at) => this.parents[at] === -1).reverse();
+    const waiting = this.nodes
+      .map((_, at) => at)
+      .filter((at) => this.parents[at] === -1)
+      .reverse();
     for (let node = waiting.pop(); node !== undefined; node = waiting.pop()) {
       this.order.push(node);
       waiting.push(...[...(this.nodes[node]!.children ?? [])].reverse());
     }
-    if (this.order.length < this.nodes.length) throw new FormatError("its nodes are not a tree: some of them form a cycle");
+    if (this.order.length < this.nodes.length)
+      throw new FormatError("its nodes are not a tree: some of them form a cycle");
   }
 
   /** Parse a file; FormatError where it is not glTF 2.0, is cut short, or needs other files. */
   static parse(content: Uint8Array): Gltf {
-    const isBinary = content.length >= 12 && content[0] === 0x67 && content[1] === 0x6c && content[2] === 0x54 && content[3] === 0x46;
+    const isBinary =
+      content.length >= 12 &&
+      content[0] === 0x67 &&
+      content[1] === 0x6c &&
+      content[2] === 0x54 &&
+      content[3] === 0x46;
     const { json, binary } = isBinary ? chunks(content) : { json: content, binary: new Uint8Array() };
     let document: Document;
     try {
@@ -129,10 +163,14 @@ export class Gltf {
       throw new FormatError("not a glTF file, or cut short: it has no JSON object");
     }
     const version = `${document?.asset?.version}`;
-    if (!version.startsWith("2.")) throw new FormatError(`not a file of glTF 2.0 (its version: ${version.slice(0, 20)})`);
+    if (!version.startsWith("2."))
+      throw new FormatError(`not a file of glTF 2.0 (its version: ${version.slice(0, 20)})`);
     const buffers = (document.buffers ?? []).map(({ uri, byteLength }) => {
       if (uri === undefined) return binary.subarray(0, byteLength);
-      if (!uri.startsWith("data:")) throw new FormatError(`its buffer ${JSON.stringify(uri.slice(0, 60))} is a file of its own: export one .glb`);
+      if (!uri.startsWith("data:"))
+        throw new FormatError(
+          `its buffer ${JSON.stringify(uri.slice(0, 60))} is a file of its own: export one .glb`,
+        );
       return inlined(uri).subarray(0, byteLength);
     });
     return new Gltf(document, buffers);
@@ -146,7 +184,9 @@ export class Gltf {
       return new Map(old.filter(({ node }) => node !== -1).map(({ bone, node }) => [bone, node])); // UniVRM's bones that are not set
     }
     const bones = (VRMC_vrm ?? VRMC_vrm_animation)?.humanoid?.humanBones ?? {};
-    return new Map(Object.entries(bones as Record<string, { node: number }>).map(([bone, { node }]) => [bone, node]));
+    return new Map(
+      Object.entries(bones as Record<string, { node: number }>).map(([bone, { node }]) => [bone, node]),
+    );
   }
 
   name(node: number): string {
@@ -159,7 +199,9 @@ export class Gltf {
     if (!matrix) return { translation, rotation, scale };
     const columns = [0, 4, 8].map((at) => matrix.slice(at, at + 3) as Vector);
     const sizes = columns.map((column) => Math.hypot(...column)) as Vector;
-    const turn = quaternionOf(columns.map((column, at) => times(column, 1 / (sizes[at] || 1))) as [Vector, Vector, Vector]);
+    const turn = quaternionOf(
+      columns.map((column, at) => times(column, 1 / (sizes[at] || 1))) as [Vector, Vector, Vector],
+    );
     return { translation: matrix.slice(12, 15) as Vector, rotation: turn, scale: sizes };
   }
 
@@ -169,22 +211,31 @@ export class Gltf {
     for (const node of this.order.filter((at) => wanted.has(at))) {
       const { translation, rotation, scale } = { ...this.local(node), ...moved?.get(node) };
       const turn = normalised(rotation);
-      const own = [0, 1, 2].map((axis) => times(rotated(turn, [+(axis === 0), +(axis === 1), +(axis === 2)]), scale[axis]!)) as Placed["linear"];
+      const own = [0, 1, 2].map((axis) =>
+        times(rotated(turn, [+(axis === 0), +(axis === 1), +(axis === 2)]), scale[axis]!),
+      ) as Placed["linear"];
       const above = found.get(this.parents[node]!);
-      found.set(node, above ? {
-        turn: product(above.turn, turn),
-        linear: own.map((column) => mapped(above.linear, column)) as Placed["linear"],
-        place: plus(above.place, mapped(above.linear, translation)),
-      } : { turn, linear: own, place: translation });
+      found.set(
+        node,
+        above
+          ? {
+              turn: product(above.turn, turn),
+              linear: own.map((column) => mapped(above.linear, column)) as Placed["linear"],
+              place: plus(above.place, mapped(above.linear, translation)),
+            }
+          : { turn, linear: own, place: translation },
+      );
     }
     return found;
   }
 
   /** The rows of an accessor; FormatError if it is not in the file. */
   array(index: number): number[][] {
-    const { bufferView, byteOffset, componentType, count, type, normalized, sparse } = this.document.accessors![index]!;
+    const { bufferView, byteOffset, componentType, count, type, normalized, sparse } =
+      this.document.accessors![index]!;
     const width = WIDTHS[type]!;
-    if (!Number.isInteger(count)) throw new FormatError(`accessor ${index} is broken: its count is not a whole number`);
+    if (!Number.isInteger(count))
+      throw new FormatError(`accessor ${index} is broken: its count is not a whole number`);
     let rows: number[][];
     if (bufferView === undefined) {
       this.count(count * width);
@@ -204,28 +255,44 @@ export class Gltf {
 
   /** The rows, of some, that a sparse accessor replaces. */
   private sparsePlaces(index: number, { count, indices }: Sparse, rows: number): number[] {
-    if (![5121, 5123, 5125].includes(indices.componentType)) throw new FormatError(`accessor ${index} is broken: its sparse indices are not unsigned integers`);
+    if (![5121, 5123, 5125].includes(indices.componentType))
+      throw new FormatError(`accessor ${index} is broken: its sparse indices are not unsigned integers`);
     const places = this.rows(index, indices, indices.componentType, count, 1).map(([place]) => place!);
     if (places.some((place, at) => place >= rows || (at > 0 && place <= places[at - 1]!))) {
-      throw new FormatError(`accessor ${index} is broken: its sparse indices do not rise, or reach beyond its ${rows} elements`);
+      throw new FormatError(
+        `accessor ${index} is broken: its sparse indices do not rise, or reach beyond its ${rows} elements`,
+      );
     }
     return places;
   }
 
   /** Elements of a part of an accessor, which names a view; FormatError beyond its buffer. */
-  private rows(index: number, { bufferView, byteOffset = 0 }: Part, componentType: number, count: number, width: number): number[][] {
+  private rows(
+    index: number,
+    { bufferView, byteOffset = 0 }: Part,
+    componentType: number,
+    count: number,
+    width: number,
+  ): number[][] {
     const view = this.document.bufferViews![bufferView]!;
-    if (view.extensions && Object.keys(view.extensions).length) throw new FormatError("its animations are packed by meshoptimizer: unpack the file first");
+    if (view.extensions && Object.keys(view.extensions).length)
+      throw new FormatError("its animations are packed by meshoptimizer: unpack the file first");
     const [[size, , read], content] = [READERS[componentType]!, this.buffers[view.buffer]!];
     const [start, stride] = [(view.byteOffset ?? 0) + byteOffset, view.byteStride || size * width];
-    const fits = Number.isInteger(count) && count >= 0 && start >= 0 && stride >= size * width && (!count || start + stride * (count - 1) + size * width <= content.length);
+    const fits =
+      Number.isInteger(count) &&
+      count >= 0 &&
+      start >= 0 &&
+      stride >= size * width &&
+      (!count || start + stride * (count - 1) + size * width <= content.length);
     if (!fits) throw new FormatError(`accessor ${index} extends beyond its buffer: the file is cut short`);
     this.count(count * width);
     const data = new DataView(content.buffer, content.byteOffset, content.byteLength);
     return Array.from({ length: count }, (_, row) =>
       Array.from({ length: width }, (_, column) => {
         const value = read(data, start + row * stride + column * size);
-        if (!Number.isFinite(value)) throw new FormatError(`accessor ${index} holds numbers that are not finite`);
+        if (!Number.isFinite(value))
+          throw new FormatError(`accessor ${index} holds numbers that are not finite`);
         return value;
       }),
     );
@@ -235,7 +302,8 @@ export class Gltf {
   private count(numbers: number): void {
     this.numbers += numbers;
     const bytes = this.buffers.reduce((sum, buffer) => sum + buffer.length, 0);
-    if (!(numbers >= 0 && this.numbers <= 4 * bytes)) throw new FormatError("its arrays overlap: they hold more numbers than the file has bytes");
+    if (!(numbers >= 0 && this.numbers <= 4 * bytes))
+      throw new FormatError("its arrays overlap: they hold more numbers than the file has bytes");
   }
 
   /** The bytes of a view of a buffer. */
@@ -247,7 +315,8 @@ export class Gltf {
   /** Some nodes and all their ancestors. */
   above(nodes: Iterable<number>): Set<number> {
     const found = new Set<number>();
-    for (const node of nodes) for (let at = node; at >= 0 && !found.has(at); at = this.parents[at]!) found.add(at);
+    for (const node of nodes)
+      for (let at = node; at >= 0 && !found.has(at); at = this.parents[at]!) found.add(at);
     return found;
   }
 }
@@ -265,9 +334,10 @@ export function inlined(uri: string): Uint8Array {
 function chunks(content: Uint8Array): { json: Uint8Array; binary: Uint8Array } {
   const view = new DataView(content.buffer, content.byteOffset, content.byteLength);
   const found = new Map<number, Uint8Array>();
-  for (let at = 12; at + 8 <= content.length; ) {
+  for (let at = 12; at + 8 <= content.length;) {
     const [length, kind] = [view.getUint32(at, true), view.getUint32(at + 4, true)];
-    if (at + 8 + length > content.length) throw new FormatError("cut short: the GLB file ends within a chunk");
+    if (at + 8 + length > content.length)
+      throw new FormatError("cut short: the GLB file ends within a chunk");
     if (!found.has(kind)) found.set(kind, content.subarray(at + 8, at + 8 + length));
     at += 8 + length;
   }

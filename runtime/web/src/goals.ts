@@ -30,7 +30,9 @@ export class Goals {
     private readonly lag: number,
   ) {
     this.features = new Int16Array(rows.length * width);
-    rows.forEach((row, at) => this.features.set(features.subarray(row * width, (row + 1) * width), at * width));
+    rows.forEach((row, at) =>
+      this.features.set(features.subarray(row * width, (row + 1) * width), at * width),
+    );
     [this.small, this.large] = [this.boxes(SIZES[0]), this.boxes(SIZES[1])];
   }
 
@@ -54,7 +56,11 @@ export class Goals {
   }
 
   /** The row that costs the least, less than `bound`, as it is or as its mirror image; none if there is none. */
-  nearest(asked: Int16Array, image: Int16Array, bound: number): { row: number; mirror: boolean; cost: number } | null {
+  nearest(
+    asked: Int16Array,
+    image: Int16Array,
+    bound: number,
+  ): { row: number; mirror: boolean; cost: number } | null {
     const own = this.least(asked, bound);
     const other = this.least(image, own.cost);
     const at = other.at < 0 ? own.at : other.at;
@@ -69,7 +75,11 @@ export class Goals {
     const far = Math.hypot(left, forward);
     const [x, z] = [(lag * left) / Math.max(far, 1e-6), (lag * forward) / Math.max(far, 1e-6)];
     const half = (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!;
-    return [2 * Math.round((MATCHING.STEPS * x) / scale[LEFT]!), 2 * Math.round((MATCHING.STEPS * z) / scale[FORWARD]!), 2 * MATCHING.STEPS * Math.round(MATCHING.STEPS * half)];
+    return [
+      2 * Math.round((MATCHING.STEPS * x) / scale[LEFT]!),
+      2 * Math.round((MATCHING.STEPS * z) / scale[FORWARD]!),
+      2 * MATCHING.STEPS * Math.round(MATCHING.STEPS * half),
+    ];
   }
 
   private least(asked: Int16Array, bound: number): { at: number; cost: number } {
@@ -79,7 +89,11 @@ export class Goals {
     for (let first = 0, outer = 0; first < rows.length; first += SIZES[1], outer += width) {
       if (outside(asked, large, outer, width, left, forward, half, cost) >= cost) continue;
       const last = Math.min(first + SIZES[1], rows.length);
-      for (let from = first, inner = (first / SIZES[0]) * width; from < last; from += SIZES[0], inner += width) {
+      for (
+        let from = first, inner = (first / SIZES[0]) * width;
+        from < last;
+        from += SIZES[0], inner += width
+      ) {
         if (outside(asked, small, inner, width, left, forward, half, cost) >= cost) continue;
         const end = Math.min(from + SIZES[0], last);
         for (let at = from, place = from * width; at < end; at++, place += width) {
@@ -102,8 +116,18 @@ export class Goals {
 }
 
 /** What the rows of a box cost at least, or a part of that which is as much as `cost`. */
-function outside(asked: Int16Array, { low, high }: Boxes, at: number, width: number, left: number, forward: number, half: number, cost: number): number {
-  const lag = half - left * (left > 0 ? high : low)[at + LEFT]! - forward * (forward > 0 ? high : low)[at + FORWARD]!;
+function outside(
+  asked: Int16Array,
+  { low, high }: Boxes,
+  at: number,
+  width: number,
+  left: number,
+  forward: number,
+  half: number,
+  cost: number,
+): number {
+  const lag =
+    half - left * (left > 0 ? high : low)[at + LEFT]! - forward * (forward > 0 ? high : low)[at + FORWARD]!;
   let least = lag > 0 ? lag : 0;
   for (let i = 0; i < width && least < cost; i += 2) {
     const under = low[at + i]! - asked[i]!;

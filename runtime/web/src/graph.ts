@@ -35,7 +35,12 @@ export class Graph {
   ) {}
 
   /** Load a graph that is safe and keeps the contract of the manifest; BundleError otherwise. */
-  static async load(role: string, model: Uint8Array, spec: GraphSpec, settings: SessionSettings = {}): Promise<Graph> {
+  static async load(
+    role: string,
+    model: Uint8Array,
+    spec: GraphSpec,
+    settings: SessionSettings = {},
+  ): Promise<Graph> {
     checkGraph(model);
     const runtime = await loaded().catch((error: unknown) => {
       throw new BundleError(`ONNX Runtime cannot be loaded (${String(error)}): npm install onnxruntime-web`);
@@ -43,11 +48,16 @@ export class Graph {
     const session = await runtime.InferenceSession.create(model, settings).catch((error: unknown) => {
       throw new BundleError(`graph ${role}: ONNX Runtime cannot load it: ${String(error)}`);
     });
-    for (const [wanted, given] of [[spec.inputs, session.inputNames], [spec.outputs, session.outputNames]] as const) {
+    for (const [wanted, given] of [
+      [spec.inputs, session.inputNames],
+      [spec.outputs, session.outputNames],
+    ] as const) {
       const names = wanted.map((tensor) => tensor.name);
       if (`${[...names].sort()}` !== `${[...given].sort()}`) {
         await session.release();
-        throw new BundleError(`graph ${role}: it has ${given.join(", ")}, and its manifest ${names.join(", ")}`);
+        throw new BundleError(
+          `graph ${role}: it has ${given.join(", ")}, and its manifest ${names.join(", ")}`,
+        );
       }
     }
     return new Graph(role, spec, session, runtime);
@@ -59,22 +69,30 @@ export class Graph {
     for (const { name, dtype, shape } of this.spec.inputs) {
       const given = inputs[name];
       if (!given) throw new BundleError(`graph ${this.role}: the input ${name} is missing`);
-      const fits = given.shape.length === shape.length && shape.every((size, i) => typeof size === "string" || size === given.shape[i]);
+      const fits =
+        given.shape.length === shape.length &&
+        shape.every((size, i) => typeof size === "string" || size === given.shape[i]);
       if (!fits || (dtype === "int64") !== given.data instanceof BigInt64Array) {
-        throw new BundleError(`graph ${this.role}: ${name} is (${given.shape}), expected ${dtype} (${shape})`);
+        throw new BundleError(
+          `graph ${this.role}: ${name} is (${given.shape}), expected ${dtype} (${shape})`,
+        );
       }
-      feeds[name] = given.data instanceof BigInt64Array
-        ? new this.runtime.Tensor("int64", given.data, given.shape)
-        : new this.runtime.Tensor("float32", singles(given.data), given.shape);
+      feeds[name] =
+        given.data instanceof BigInt64Array
+          ? new this.runtime.Tensor("int64", given.data, given.shape)
+          : new this.runtime.Tensor("float32", singles(given.data), given.shape);
     }
     const outputs = await this.session.run(feeds).catch((error: unknown) => {
-      throw new BundleError(`graph ${this.role}: ONNX Runtime cannot compute it: ${String(error).slice(0, 200)}`);
+      throw new BundleError(
+        `graph ${this.role}: ONNX Runtime cannot compute it: ${String(error).slice(0, 200)}`,
+      );
     });
     const found: Record<string, NumberArray<Float32Array>> = {};
     for (const [name, tensor] of Object.entries(outputs)) {
       const data = tensor.data as Float32Array | BigInt64Array;
       found[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
-      if (!bounded(found[name].data)) throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${FIELDS.LARGEST}`);
+      if (!bounded(found[name].data))
+        throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${FIELDS.LARGEST}`);
     }
     return found;
   }

@@ -27,9 +27,11 @@ export function checkGraph(model: Uint8Array): void {
   let count = 0;
   for (let next = waiting.pop(); next; next = waiting.pop()) {
     const [kind, data, depth] = next;
-    if (depth > GRAPH_SAFETY.MAX_DEPTH) throw new BundleError(`the graph is nested more than ${GRAPH_SAFETY.MAX_DEPTH} messages deep`);
+    if (depth > GRAPH_SAFETY.MAX_DEPTH)
+      throw new BundleError(`the graph is nested more than ${GRAPH_SAFETY.MAX_DEPTH} messages deep`);
     for (const [number, value] of fields(data)) {
-      if (++count > GRAPH_SAFETY.MAX_FIELDS) throw new BundleError(`the graph has more than ${GRAPH_SAFETY.MAX_FIELDS} fields`);
+      if (++count > GRAPH_SAFETY.MAX_FIELDS)
+        throw new BundleError(`the graph has more than ${GRAPH_SAFETY.MAX_FIELDS} fields`);
       const inner = MESSAGES[kind]!.nested[number];
       if (inner) waiting.push([inner, message(value), depth + 1]);
       else checkField(kind, number, value);
@@ -43,7 +45,8 @@ function checkField(kind: string, number: number, value: number | Uint8Array): v
     if (value !== 0) throw new BundleError("a tensor of the graph has its data in another file");
     return;
   }
-  if (!plain.includes(number)) throw new BundleError(`a ${kind} of the graph has the unknown field ${number}`);
+  if (!plain.includes(number))
+    throw new BundleError(`a ${kind} of the graph has the unknown field ${number}`);
   if (kind === "node" && number === OPERATOR && text(message(value)) === "Loop") {
     throw new BundleError("the graph has the operator Loop, which may never end");
   }
@@ -69,13 +72,15 @@ function* fields(data: Uint8Array): Generator<[number, number | Uint8Array]> {
     const tag = varint();
     const wire = tag % 8;
     const number = (tag - wire) / 8;
-    if (number === 0 || tag >= 2 ** 32) throw new BundleError("the graph is not valid ONNX: a field has an invalid number");
+    if (number === 0 || tag >= 2 ** 32)
+      throw new BundleError("the graph is not valid ONNX: a field has an invalid number");
     if (wire === 0) {
       yield [number, varint()];
       continue;
     }
     const size = wire === 2 ? varint() : { 1: 8, 5: 4 }[wire];
-    if (size === undefined) throw new BundleError(`the graph is not valid ONNX: a field has the wire type ${wire}`);
+    if (size === undefined)
+      throw new BundleError(`the graph is not valid ONNX: a field has the wire type ${wire}`);
     if (size > data.length - at) throw new BundleError("the graph is not valid ONNX: it is truncated");
     yield [number, data.subarray(at, at + size)];
     at += size;
@@ -83,7 +88,8 @@ function* fields(data: Uint8Array): Generator<[number, number | Uint8Array]> {
 }
 
 function message(value: number | Uint8Array): Uint8Array {
-  if (typeof value === "number") throw new BundleError("the graph is not valid ONNX: a number where a message belongs");
+  if (typeof value === "number")
+    throw new BundleError("the graph is not valid ONNX: a number where a message belongs");
   return value;
 }
 

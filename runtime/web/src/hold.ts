@@ -9,7 +9,8 @@ import { product, rotated, type Vector, X } from "./rotations.js";
 
 /** The motion of the humanoid with standing feet held in place and never below ground, by turning hips, knees and ankles. */
 export function holdFeet(motion: Motion): Motion {
-  if (!isHumanoid(motion.skeleton)) throw new MotionError("feet are held of the humanoid: convert the motion with toHumanoid first");
+  if (!isHumanoid(motion.skeleton))
+    throw new MotionError("feet are held of the humanoid: convert the motion with toHumanoid first");
   if (motion.rotations.length < 2) return motion;
   const world = worldOf(motion);
   const soles = solePoints(world);
@@ -17,9 +18,18 @@ export function holdFeet(motion: Motion): Motion {
   const turned = world.turns.map((turns) => [...turns]);
   SIDES.forEach((side, at) => {
     const joints = LEG.slice(0, 3).map((part) => HUMANOID.index(side + part));
-    const points = soles.map((frame) => frame.slice(3 * at, 3 * at + 3).map(([x, y, z]): Vector => [x, y - ground, z]));
-    const [hip, knee, ankle] = joints.map((joint) => world.places.map((pose) => pose[joint]!)) as [Vector[], Vector[], Vector[]];
-    const legs = hip.map((place, frame) => new TwoBones(place, knee[frame]!, ankle[frame]!, rotated(world.turns[frame]![joints[1]!]!, X)));
+    const points = soles.map((frame) =>
+      frame.slice(3 * at, 3 * at + 3).map(([x, y, z]): Vector => [x, y - ground, z]),
+    );
+    const [hip, knee, ankle] = joints.map((joint) => world.places.map((pose) => pose[joint]!)) as [
+      Vector[],
+      Vector[],
+      Vector[],
+    ];
+    const legs = hip.map(
+      (place, frame) =>
+        new TwoBones(place, knee[frame]!, ankle[frame]!, rotated(world.turns[frame]![joints[1]!]!, X)),
+    );
     targets(legs, points, motion.fps).forEach((target, frame) => {
       const { thigh, shin } = legs[frame]!.turns(target);
       // the foot keeps its direction
@@ -34,12 +44,19 @@ export function holdFeet(motion: Motion): Motion {
 /** Where the ankle shall be, of points of the sole over ground at 0. */
 function targets(legs: TwoBones[], points: Vector[][], fps: number): Vector[] {
   const shifts = shiftsOf(points, fps);
-  const found = legs.map((leg, at) => leg.eased([leg.ankle[0] + shifts[at]![0], leg.ankle[1], leg.ankle[2] + shifts[at]![1]]));
-  const depth = found.map((target, at) => Math.max(0, -(Math.min(...points[at]!.map((point) => point[1])) + target[1] - legs[at]!.ankle[1])));
+  const found = legs.map((leg, at) =>
+    leg.eased([leg.ankle[0] + shifts[at]![0], leg.ankle[1], leg.ankle[2] + shifts[at]![1]]),
+  );
+  const depth = found.map((target, at) =>
+    Math.max(0, -(Math.min(...points[at]!.map((point) => point[1])) + target[1] - legs[at]!.ankle[1])),
+  );
   // a mean over the window in which each is the deepest is as high as the one in the middle
   const reach = Math.max(1, rounded(holdSettings.soft * fps));
   const deepest = windows(depth, reach).map((window) => Math.max(...window));
-  const bell = Array.from({ length: 2 * reach + 1 }, (_, at) => 0.5 - 0.5 * Math.cos((2 * Math.PI * (at + 1)) / (2 * reach + 2)));
+  const bell = Array.from(
+    { length: 2 * reach + 1 },
+    (_, at) => 0.5 - 0.5 * Math.cos((2 * Math.PI * (at + 1)) / (2 * reach + 2)),
+  );
   const total = bell.reduce((sum, weight) => sum + weight);
   return windows(deepest, reach).map((window, at) => {
     const lift = window.reduce((sum, value, i) => sum + value * bell[i]!, 0) / total;
@@ -52,8 +69,15 @@ function shiftsOf(points: Vector[][], fps: number): [number, number][] {
   const touch = contacts(points, fps);
   const strongest = touch.map((own) => Math.max(...own));
   const undone = touch.map((own, at) => {
-    const total = Math.max(own.reduce((sum, value) => sum + value), 1e-9);
-    const step = (axis: 0 | 2) => own.reduce((sum, value, k) => sum + (value / total) * (points[at + 1]![k]![axis] - points[at]![k]![axis]), 0);
+    const total = Math.max(
+      own.reduce((sum, value) => sum + value),
+      1e-9,
+    );
+    const step = (axis: 0 | 2) =>
+      own.reduce(
+        (sum, value, k) => sum + (value / total) * (points[at + 1]![k]![axis] - points[at]![k]![axis]),
+        0,
+      );
     return [-strongest[at]! * step(0), -strongest[at]! * step(2)];
   });
   const keys = stances(strongest, holdSettings.lifted * fps).map(([start, stop]) => {
@@ -62,20 +86,32 @@ function shiftsOf(points: Vector[][], fps: number): [number, number][] {
     const middle = [0, 1].map((axis) => median(path.map((place) => place[axis]!)));
     return { start, values: path.map((place) => place.map((value, axis) => value - middle[axis]!)) };
   });
-  return smoothed(blended(keys, points.length, holdSettings.blend * fps), CONTACTS.SOLES.calm * fps).map((shift) => {
-    // no longer than the farthest; short ones are as they are within a few per cent
-    const factor = (1 + (Math.hypot(...shift) / holdSettings.farthest) ** 4) ** -0.25;
-    return [shift[0]! * factor, shift[1]! * factor];
-  });
+  return smoothed(blended(keys, points.length, holdSettings.blend * fps), CONTACTS.SOLES.calm * fps).map(
+    (shift) => {
+      // no longer than the farthest; short ones are as they are within a few per cent
+      const factor = (1 + (Math.hypot(...shift) / holdSettings.farthest) ** 4) ** -0.25;
+      return [shift[0]! * factor, shift[1]! * factor];
+    },
+  );
 }
 
 /** Contact of each point from each frame to the next, 0 to 1: low and slow. */
 export function contacts(points: Vector[][], fps: number): number[][] {
-  const calm = smoothed(points.map((frame) => frame.flatMap(([x, , z]) => [x, z])), CONTACTS.SOLES.calm * fps);
+  const calm = smoothed(
+    points.map((frame) => frame.flatMap(([x, , z]) => [x, z])),
+    CONTACTS.SOLES.calm * fps,
+  );
   return points.slice(1).map((frame, at) =>
     frame.map((point, k) => {
-      const speed = Math.hypot(calm[at + 1]![2 * k]! - calm[at]![2 * k]!, calm[at + 1]![2 * k + 1]! - calm[at]![2 * k + 1]!) * fps;
-      return (1 - rise((point[1] + points[at]![k]![1]) / 2, ...CONTACTS.SOLES.heights)) * (1 - rise(speed, ...CONTACTS.SOLES.speeds));
+      const speed =
+        Math.hypot(
+          calm[at + 1]![2 * k]! - calm[at]![2 * k]!,
+          calm[at + 1]![2 * k + 1]! - calm[at]![2 * k + 1]!,
+        ) * fps;
+      return (
+        (1 - rise((point[1] + points[at]![k]![1]) / 2, ...CONTACTS.SOLES.heights)) *
+        (1 - rise(speed, ...CONTACTS.SOLES.speeds))
+      );
     }),
   );
 }
@@ -93,7 +129,11 @@ function stances(contact: number[], lifted: number): [number, number][] {
 }
 
 /** Values that are known in stances, go to 0 between them and come back in so many frames, smoothly. */
-function blended(stances: { start: number; values: number[][] }[], frames: number, blend: number): number[][] {
+function blended(
+  stances: { start: number; values: number[][] }[],
+  frames: number,
+  blend: number,
+): number[][] {
   const keys: [at: number, value: number[]][] = [[-2 * blend, [0, 0]]];
   for (const { start, values } of stances) {
     const last = keys.at(-1)![0];

@@ -8,7 +8,12 @@ import { type Joint, Skeleton } from "./skeleton.js";
 
 type Places = Record<string, [parent: string, offset: Vector, order: string]>;
 
-const { trunk, left, fingers, soles } = tables as { trunk: Places; left: Places; fingers: Places; soles: Record<string, Vector[]> };
+const { trunk, left, fingers, soles } = tables as {
+  trunk: Places;
+  left: Places;
+  fingers: Places;
+  soles: Record<string, Vector[]>;
+};
 
 export const SIDES = ["left", "right"] as const;
 export const SPINE = ["spine", "chest", "upperChest"];
@@ -47,19 +52,29 @@ export function directionOf(bone: string): Vector {
 }
 
 /** Metres of the humanoid's thigh and shin, the measure by which figures are scaled. */
-export const LEG_LENGTH = ["LowerLeg", "Foot"].reduce((sum, part) => sum + size(HUMANOID.joints[HUMANOID.index(`left${part}`)]!.offset), 0);
+export const LEG_LENGTH = ["LowerLeg", "Foot"].reduce(
+  (sum, part) => sum + size(HUMANOID.joints[HUMANOID.index(`left${part}`)]!.offset),
+  0,
+);
 
 /** Points of both soles by frame: of the left foot two, of its toes one, and the same of the right. */
 export function solePoints({ turns, places }: World): Vector[][] {
   const points = SIDES.flatMap((side) =>
-    Object.entries(SOLES).flatMap(([part, own]) => own.map((point): [number, Vector] => [HUMANOID.index(side + part), point])),
+    Object.entries(SOLES).flatMap(([part, own]) =>
+      own.map((point): [number, Vector] => [HUMANOID.index(side + part), point]),
+    ),
   );
-  return turns.map((turned, frame) => points.map(([joint, point]) => plus(places[frame]![joint]!, rotated(turned[joint]!, point))));
+  return turns.map((turned, frame) =>
+    points.map(([joint, point]) => plus(places[frame]![joint]!, rotated(turned[joint]!, point))),
+  );
 }
 
 /** The height of the ground: the lowest point of the soles is deeper in 5 % of the frames. */
 export function groundUnder(points: Vector[][]): number {
-  return quantile(points.map((frame) => Math.min(...frame.map((point) => point[1]))), 0.05);
+  return quantile(
+    points.map((frame) => Math.min(...frame.map((point) => point[1]))),
+    0.05,
+  );
 }
 
 /** The hips' joints of both legs. */
@@ -69,7 +84,11 @@ export const HIPS = SIDES.map((side) => HUMANOID.index(`${side}UpperLeg`));
 export function isHumanoid({ joints, metresPerUnit }: Skeleton): boolean {
   const same = (joint: Joint, at: number) => {
     const own = HUMANOID.joints[at]!;
-    return joint.name === own.name && joint.parent === own.parent && (!at || size(minus(joint.offset, own.offset)) < 1e-6);
+    return (
+      joint.name === own.name &&
+      joint.parent === own.parent &&
+      (!at || size(minus(joint.offset, own.offset)) < 1e-6)
+    );
   };
   return metresPerUnit === 1 && joints.length === HUMANOID.joints.length && joints.every(same);
 }

@@ -32,9 +32,16 @@ export class Known {
   private readonly sets: number[][];
   private readonly named: number[];
 
-  private constructor(private readonly tables: Tables, private readonly shape: number[], private readonly kinds: number, given?: Record<string, number>) {
+  private constructor(
+    private readonly tables: Tables,
+    private readonly shape: number[],
+    private readonly kinds: number,
+    given?: Record<string, number>,
+  ) {
     this.settings = settingsOf("answer", answerSettings, given);
-    const rows = tables.sentences.map((_, row) => tables.names.subarray(row * kinds, (row + 1) * kinds).join());
+    const rows = tables.sentences.map((_, row) =>
+      tables.names.subarray(row * kinds, (row + 1) * kinds).join(),
+    );
     const order = [...new Set(rows)].sort(); // as zeros and ones they sort like numbers
     this.sets = order.map((one) => one.split(",").flatMap((said, kind) => (said === "1" ? [kind] : [])));
     const places = new Map(order.map((one, place) => [one, place]));
@@ -45,7 +52,9 @@ export class Known {
   static async of(bundle: Bundle): Promise<Known | undefined> {
     if (!bundle.manifest.graphs.space) return undefined;
     const [vectors, actions, shown, letters, said, names, ways] = await Promise.all(
-      ["vectors", "actions", "shown", "sentences", "said", "names", "ways"].map((name) => bundle.table(`known_${name}`)),
+      ["vectors", "actions", "shown", "sentences", "said", "names", "ways"].map((name) =>
+        bundle.table(`known_${name}`),
+      ),
     );
     const sentences = new TextDecoder().decode(letters!.data as Uint8Array).split("\n");
     const [count, kinds] = shown!.shape as [number, number];
@@ -54,16 +63,33 @@ export class Known {
         throw new BundleError(`tables of known motions have numbers that are none of ${count} actions`);
       }
     }
-    const fits = [said!, names!, ways!].every((table) => table.shape[0] === sentences.length) && names!.shape[1] === kinds;
-    if (!fits || vectors!.shape[0] !== actions!.shape[0] || !vectors!.data.length) throw new BundleError("tables of known motions do not fit each other");
-    const tables = Object.entries({ vectors, actions, shown, said, names, ways }).map(([name, table]) => [name, table!.data]);
-    return new Known({ ...Object.fromEntries(tables), sentences } as Tables, vectors!.shape, kinds, bundle.manifest.settings.answer);
+    const fits =
+      [said!, names!, ways!].every((table) => table.shape[0] === sentences.length) &&
+      names!.shape[1] === kinds;
+    if (!fits || vectors!.shape[0] !== actions!.shape[0] || !vectors!.data.length)
+      throw new BundleError("tables of known motions do not fit each other");
+    const tables = Object.entries({ vectors, actions, shown, said, names, ways }).map(([name, table]) => [
+      name,
+      table!.data,
+    ]);
+    return new Known(
+      { ...Object.fromEntries(tables), sentences } as Tables,
+      vectors!.shape,
+      kinds,
+      bundle.manifest.settings.answer,
+    );
   }
 
   /** Up to `count` sentences about a motion at a place of the space, of so many seconds, with such a path. */
-  answers(vector: ArrayLike<number>, seconds: number, path: Path, count: number): { text: string; probability: number }[] {
+  answers(
+    vector: ArrayLike<number>,
+    seconds: number,
+    path: Path,
+    count: number,
+  ): { text: string; probability: number }[] {
     const { counted, similarity } = this.near(vector);
-    if (seconds < this.settings.shortest || similarity < this.settings.outside) return [{ text: KNOWN.NOTHING, probability: 0 }];
+    if (seconds < this.settings.shortest || similarity < this.settings.outside)
+      return [{ text: KNOWN.NOTHING, probability: 0 }];
     const shares = this.shares(counted).map((share, set) => ({ share, set }));
     const best = shares.filter(({ share }) => share > 0).sort((a, b) => b.share - a.share || a.set - b.set);
     return best.slice(0, count).map(({ share, set }) => {
@@ -78,7 +104,9 @@ export class Known {
     const alike = Array.from({ length: motions }, (_, motion) => {
       const products = Array.from({ length: views }, (_, view) => {
         const start = (motion * views + view) * size;
-        return this.tables.vectors.subarray(start, start + size).reduce((sum, value, i) => sum + (value / 127) * vector[i]!, 0);
+        return this.tables.vectors
+          .subarray(start, start + size)
+          .reduce((sum, value, i) => sum + (value / 127) * vector[i]!, 0);
       });
       return Math.max(...products);
     });
@@ -87,7 +115,9 @@ export class Known {
     const weights = alike.map((one) => (one >= least ? Math.exp((one - order[0]!) / temperature) : 0));
     const total = weights.reduce((sum, one) => sum + one, 0);
     const counted = new Array<number>(this.tables.shown.length / this.kinds).fill(0);
-    weights.forEach((weight, motion) => { counted[this.tables.actions[motion]!]! += weight / total; });
+    weights.forEach((weight, motion) => {
+      counted[this.tables.actions[motion]!]! += weight / total;
+    });
     return { counted, similarity: order[0]! };
   }
 
@@ -115,7 +145,8 @@ export class Known {
   /** The sentence that names a set of kinds: one whose way fits if there is any, and then the one that counts most. If it is about going, what it lacks of the way is added. */
   private sentence(set: number, counted: number[], { turn, ahead }: Path): string {
     const { said, ways, sentences } = this.tables;
-    const side = turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? KNOWN.LEFT : KNOWN.RIGHT;
+    const side =
+      turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? KNOWN.LEFT : KNOWN.RIGHT;
     const rows = this.named.flatMap((one, row) => (one === set && counted[said[row]!]! > 0 ? [row] : []));
     const [best] = rows
       .map((row) => ({ row, fit: this.fit(row, turn, side), counts: counted[said[row]!]! }))
@@ -123,7 +154,8 @@ export class Known {
     const text = sentences[best!.row]!;
     if (!ways[3 * best!.row + 2]) return text;
     const back = ahead <= -this.settings.backwards && !BACKWARDS.test(text) ? ", backwards" : "";
-    const turning = side && ways[3 * best!.row] !== side ? `, turning ${side === KNOWN.LEFT ? "left" : "right"}` : "";
+    const turning =
+      side && ways[3 * best!.row] !== side ? `, turning ${side === KNOWN.LEFT ? "left" : "right"}` : "";
     return text + back + turning;
   }
 
@@ -134,19 +166,27 @@ export class Known {
     if (degrees! > 0 && Math.abs(degrees! - Math.abs(turn)) > 30) return -1;
     if (side) return way === side ? 1 : way === -side || way === KNOWN.STRAIGHT ? -1 : 0;
     // neither turned nor straight for certain: the other side alone is wrong
-    if (Math.abs(turn) > this.settings.straight) return way === (turn > 0 ? KNOWN.RIGHT : KNOWN.LEFT) ? -1 : 0;
+    if (Math.abs(turn) > this.settings.straight)
+      return way === (turn > 0 ? KNOWN.RIGHT : KNOWN.LEFT) ? -1 : 0;
     return way === KNOWN.STRAIGHT ? 0.5 : way === KNOWN.LEFT || way === KNOWN.RIGHT ? -1 : 0;
   }
 }
 
 /** The path of a figure in frames; nothing is told where its channels are missing, or it does not stay upright. */
 export function pathOf(frames: Frames, motion: Manifest["motion"]): Path {
-  const columns = ["root.forward", "root.turn", "root.pitch", "root.roll"].map((name) => motion.channels.indexOf(name));
+  const columns = ["root.forward", "root.turn", "root.pitch", "root.roll"].map((name) =>
+    motion.channels.indexOf(name),
+  );
   const [forward, turn, pitch, roll] = columns as [number, number, number, number];
   if (Math.min(...columns) < 0) return { turn: undefined, ahead: 0 };
   const factor = motion.units[turn]!.startsWith("rad") ? 180 / Math.PI : 1;
-  const leant = Math.max(...Array.from(frames, (frame) => Math.max(Math.abs(frame[pitch]!), Math.abs(frame[roll]!)))) * factor;
+  const leant =
+    Math.max(...Array.from(frames, (frame) => Math.max(Math.abs(frame[pitch]!), Math.abs(frame[roll]!)))) *
+    factor;
   if (leant >= 70) return { turn: undefined, ahead: 0 };
   const sum = (column: number): number => frames.slice(1).reduce((all, frame) => all + frame[column]!, 0);
-  return { turn: (sum(turn) / motion.fps) * factor, ahead: frames.length > 1 ? sum(forward) / (frames.length - 1) : 0 };
+  return {
+    turn: (sum(turn) / motion.fps) * factor,
+    ahead: frames.length > 1 ? sum(forward) / (frames.length - 1) : 0,
+  };
 }

@@ -35,7 +35,9 @@ function follow(gaits: Gaits, figure: Steered, halfLife: number, seconds: number
 
 /** The gait of a figure that is to go at a speed: the slowest that goes any way, where its own is too fast for it. */
 function slowed({ speeds }: Gaits, gait: number, speed: number): number {
-  const low = speeds.map(([slowest, , , sideways, backwards]) => (Math.min(sideways, backwards) > 0 ? slowest : Infinity));
+  const low = speeds.map(([slowest, , , sideways, backwards]) =>
+    Math.min(sideways, backwards) > 0 ? slowest : Infinity,
+  );
   const slow = low.indexOf(Math.min(...low));
   return speed < speeds[gait]![0] && speeds[slow]![0] < speeds[gait]![0] ? slow : gait;
 }

@@ -2,12 +2,28 @@
 import { LOOKING } from "./generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { BONES, HUMANOID } from "./humanoid.js";
-import { about, inverse, minus, plus, product, type Quaternion, rotated, size, STILL, type Vector, Y, Z } from "./rotations.js";
+import {
+  about,
+  inverse,
+  minus,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  size,
+  STILL,
+  type Vector,
+  Y,
+  Z,
+} from "./rotations.js";
 import { clamp } from "./springs.js";
 import type { Played } from "./steering.js";
 
 /** Bones that turn, and the share of the turn that each and those below it make together. */
-const SHARES = Object.entries(LOOKING.SHARES).map(([name, share]): [bone: number, share: number] => [BONES.indexOf(name), share]);
+const SHARES = Object.entries(LOOKING.SHARES).map(([name, share]): [bone: number, share: number] => [
+  BONES.indexOf(name),
+  share,
+]);
 const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
 const SPINE = BONES.indexOf("spine");
 
@@ -38,7 +54,12 @@ export function looked(look: Look, pose: Played, seconds: number): Played {
 }
 
 /** The turn that is wanted, to the left and up, of bones in the frame of the lower spine, the last of which looks at angles. */
-function wanted({ point, turn }: Look, pose: Played, seen: Quaternion[], now: [left: number, up: number]): number[] {
+function wanted(
+  { point, turn }: Look,
+  pose: Played,
+  seen: Quaternion[],
+  now: [left: number, up: number],
+): number[] {
   if (!point) return [0, 0];
   const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
   if (!(size(aim) > LOOKING.NEAR)) return [0, 0];
@@ -46,7 +67,10 @@ function wanted({ point, turn }: Look, pose: Played, seen: Quaternion[], now: [l
   let left = toSide;
   if (Math.abs(left) > LOOKING.BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
   left *= Math.min(Math.hypot(aim[0], aim[2]) / LOOKING.UNDER, 1);
-  return [clamp(left, -LOOKING.MOST[0], LOOKING.MOST[0]) - now[0], clamp(up, -LOOKING.MOST[1], LOOKING.MOST[1]) - now[1]];
+  return [
+    clamp(left, -LOOKING.MOST[0], LOOKING.MOST[0]) - now[0],
+    clamp(up, -LOOKING.MOST[1], LOOKING.MOST[1]) - now[1],
+  ];
 }
 
 /** Rotations of the bones that turn in the frame of the lower spine. */
@@ -83,6 +107,9 @@ function turned(bones: Quaternion[], gaze: number, [left, up]: number[]): Quater
     const share = SHARES[i]![1];
     const [way, half] = [gaze + share * left!, (share * up!) / 2];
     const [sine, cosine] = [Math.sin(half), Math.cos(half)];
-    return product([-Math.cos(way) * sine, 0, Math.sin(way) * sine, cosine], product(about(Y, share * left!), bone));
+    return product(
+      [-Math.cos(way) * sine, 0, Math.sin(way) * sine, cosine],
+      product(about(Y, share * left!), bone),
+    );
   });
 }

@@ -52,9 +52,20 @@ const LARGEST = 16;
 
 /** Triples of a mirror image: of feet, their velocities, hips and hands, in the order of the other side's. */
 const SWAPPED = [1, 0, 3, 2, 4, 6, 5];
-const COLUMNS = [...Array(MATCHING.TRAJECTORY).keys(), ...SWAPPED.flatMap((three) => [0, 1, 2].map((i) => MATCHING.TRAJECTORY + 3 * three + i))];
+const COLUMNS = [
+  ...Array(MATCHING.TRAJECTORY).keys(),
+  ...SWAPPED.flatMap((three) => [0, 1, 2].map((i) => MATCHING.TRAJECTORY + 3 * three + i)),
+];
 /** To the left is the first of a pair or a triple. */
-const SIGNS = COLUMNS.map((_, i) => (i < MATCHING.TRAJECTORY ? (i % 2 || i === MATCHING.TRAJECTORY - 1 ? 1 : -1) : (i - MATCHING.TRAJECTORY) % 3 ? 1 : -1));
+const SIGNS = COLUMNS.map((_, i) =>
+  i < MATCHING.TRAJECTORY
+    ? i % 2 || i === MATCHING.TRAJECTORY - 1
+      ? 1
+      : -1
+    : (i - MATCHING.TRAJECTORY) % 3
+      ? 1
+      : -1,
+);
 
 /** Of each row the angle from the facing to where its recording goes in the stride around it. */
 function waysOf({ moves, left }: Tables): Float64Array {
@@ -67,7 +78,10 @@ function waysOf({ moves, left }: Tables): Float64Array {
   let start = 0; // of the recording
   return Float64Array.from({ length: rows }, (_, row) => {
     if (row && row + left[row]! !== row - 1 + left[row - 1]!) start = row;
-    const [first, stop] = [Math.max(start, row - MATCHING.STRIDE_ROWS), Math.min(row + left[row]!, row + MATCHING.STRIDE_ROWS) + 1];
+    const [first, stop] = [
+      Math.max(start, row - MATCHING.STRIDE_ROWS),
+      Math.min(row + left[row]!, row + MATCHING.STRIDE_ROWS) + 1,
+    ];
     return Math.atan2(aside[stop]! - aside[first]!, forward[stop]! - forward[first]!);
   });
 }
@@ -103,17 +117,28 @@ export class Matcher {
     this.reserve = Math.ceil((how.search_every + 1) * how.fastest) + 2;
     this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
     this.features = Int16Array.from(tables.features, (step) => (step * MATCHING.STEPS) / STEER.FEATURE_STEPS);
-    const lasts = (row: number) => tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
+    const lasts = (row: number) =>
+      tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
     // what is played at its own rate leads to a leap, with arms that swing: it is entered well before
     const soon = Array.from({ length: how.prepares + 1 }, (_, at) => at);
-    const leaps = (row: number) => !tables.moves[6 * row + 3] && soon.some((at) => row + at < this.rows && this.flies(row + at));
+    const leaps = (row: number) =>
+      !tables.moves[6 * row + 3] && soon.some((at) => row + at < this.rows && this.flies(row + at));
     const all = [...Array(this.rows).keys()].filter((row) => lasts(row) && !leaps(row));
     this.goals = Array.from({ length: gaits }, (_, gait) => {
       const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % how.row_step === 0);
-      return new Goals(this.features, MATCHING.FEATURES, rows, tables.feature_mean, tables.feature_scale, how.lag);
+      return new Goals(
+        this.features,
+        MATCHING.FEATURES,
+        rows,
+        tables.feature_mean,
+        tables.feature_scale,
+        how.lag,
+      );
     });
     this.creeps = Array.from({ length: gaits }, (_, gait) => {
-      const speeds = Float32Array.from({ length: this.rows }, (_, row) => (this.shows(row, gait) ? tables.moves[6 * row + 3]! : 0));
+      const speeds = Float32Array.from({ length: this.rows }, (_, row) =>
+        this.shows(row, gait) ? tables.moves[6 * row + 3]! : 0,
+      );
       const moving = speeds.filter((speed) => speed > how.idle).sort();
       return moving.length > 0 && moving[moving.length >> 1]! > how.creep;
     });
@@ -183,7 +208,8 @@ export class Matcher {
     const found = goals.nearest(this.asked, this.image, bound);
     if (!found) return;
     const ahead = found.row - row;
-    if (!stays || ahead < -how.jump_back || ahead > how.jump_ahead) this.jump(figure, found.row, found.mirror);
+    if (!stays || ahead < -how.jump_back || ahead > how.jump_ahead)
+      this.jump(figure, found.row, found.mirror);
   }
 
   /** What is asked for, as steps of features, and their mirror image: the row's own but for where it goes. */
@@ -200,7 +226,9 @@ export class Matcher {
   private lead(figure: Playback, target: Target, creeps: boolean): void {
     const { asked, image } = this;
     const { feature_mean: mean, feature_scale: scale } = this.tables;
-    this.trajectory(figure, target, creeps).forEach((value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)));
+    this.trajectory(figure, target, creeps).forEach(
+      (value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)),
+    );
     for (let i = 0; i < MATCHING.FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
   }
 
@@ -208,7 +236,12 @@ export class Matcher {
   private trajectory({ root, spring, springRate }: Playback, target: Target, creeps: boolean): number[] {
     const [toFacing, by] = [target[2], creeps ? this.hurry(spring[0], spring[1]) : 1];
     const more = creeps ? this.hurry(target[0], target[1]) : 1;
-    const [toX, toZ, rateX, rateZ] = [target[0] * more, target[1] * more, springRate[0] * by, springRate[1] * by];
+    const [toX, toZ, rateX, rateZ] = [
+      target[0] * more,
+      target[1] * more,
+      springRate[0] * by,
+      springRate[1] * by,
+    ];
     const { velocity, facing: halfLife, half_speed, horizon } = this.how;
     const [slow, calm] = [dampingOf(velocity), dampingOf(halfLife)];
     const [cos, sin] = [Math.cos(root[2]), Math.sin(root[2])];
@@ -222,20 +255,29 @@ export class Matcher {
       facings.push(Math.sin(angle), Math.cos(angle));
     }
     const soon = (horizon * 2) / 3;
-    const speed = Math.hypot(toX + damped(offX, rateX, slow, soon)[0], toZ + damped(offZ, rateZ, slow, soon)[0]);
+    const speed = Math.hypot(
+      toX + damped(offX, rateX, slow, soon)[0],
+      toZ + damped(offZ, rateZ, slow, soon)[0],
+    );
     return [...places, ...facings, speed / (speed + half_speed)];
   }
 
   /** How a figure is: the features after those of the trajectory, scaled. */
   now({ row, mirror }: Playback): number[] {
-    const value = (i: number) => this.features[row * MATCHING.FEATURES + (mirror ? COLUMNS[i]! : i)]! * (mirror ? SIGNS[i]! : 1);
-    return Array.from({ length: MATCHING.FEATURES - MATCHING.TRAJECTORY }, (_, i) => value(MATCHING.TRAJECTORY + i) / MATCHING.STEPS);
+    const value = (i: number) =>
+      this.features[row * MATCHING.FEATURES + (mirror ? COLUMNS[i]! : i)]! * (mirror ? SIGNS[i]! : 1);
+    return Array.from(
+      { length: MATCHING.FEATURES - MATCHING.TRAJECTORY },
+      (_, i) => value(MATCHING.TRAJECTORY + i) / MATCHING.STEPS,
+    );
   }
 
   /** Features after those of the trajectory, as the table has them. */
   scaled(features: number[]): number[] {
     const { feature_mean: mean, feature_scale: scale } = this.tables;
-    return features.map((value, i) => (value - mean[MATCHING.TRAJECTORY + i]!) * scale[MATCHING.TRAJECTORY + i]!);
+    return features.map(
+      (value, i) => (value - mean[MATCHING.TRAJECTORY + i]!) * scale[MATCHING.TRAJECTORY + i]!,
+    );
   }
 
   /** Let a figure go on from the row that fits best after being so, features after those of the trajectory, scaled. */

@@ -26,7 +26,12 @@ export class Memory {
   readonly shortest = new Map<number, number>();
 
   /** table: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. */
-  constructor(private readonly table: NumberArray, moves: NumberArray, body: NumberArray, actions: number) {
+  constructor(
+    private readonly table: NumberArray,
+    moves: NumberArray,
+    body: NumberArray,
+    actions: number,
+  ) {
     const [steps, columns] = [table.shape[0]!, table.shape[1]!];
     this.steps = steps;
     this.width = moves.shape[1]! + (columns - 3) * body.shape[1]!;
@@ -36,7 +41,10 @@ export class Memory {
     this.lasts = lastsOf(this.ages);
     for (const [action, rows] of this.rows) {
       const steps = rows.map((row) => this.ages[this.lasts[row]!]!);
-      this.shortest.set(action, steps.reduce((least, one) => Math.min(least, one)));
+      this.shortest.set(
+        action,
+        steps.reduce((least, one) => Math.min(least, one)),
+      );
     }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
     this.parts = this.over(changes.map((change) => MEMORY.REST + change));
@@ -50,7 +58,8 @@ export class Memory {
     const found = new Float64Array(this.steps);
     for (let row = 0; row < this.steps; row++) {
       for (let at = ways; at < this.width && this.ages[row]! > 0 && this.column(row, 0) !== end; at++) {
-        found[row]! += (this.numbers[row * this.width + at]! - this.numbers[(row - 1) * this.width + at]!) ** 2;
+        found[row]! +=
+          (this.numbers[row * this.width + at]! - this.numbers[(row - 1) * this.width + at]!) ** 2;
       }
     }
     return found;
@@ -137,7 +146,13 @@ export class Memory {
    * recordings, an act.
    */
   next(
-    action: number, recent: Float32Array[], age: number, ends: boolean, uniform: number, done: number, whole: boolean,
+    action: number,
+    recent: Float32Array[],
+    age: number,
+    ends: boolean,
+    uniform: number,
+    done: number,
+    whole: boolean,
   ): number {
     const all = this.rows.get(action)!;
     const { ages, over } = this.course(action, whole);
@@ -147,9 +162,18 @@ export class Memory {
       return starts[Math.floor(uniform * starts.length)]!;
     }
     const places = [...all.keys()];
-    const fitting = places.filter((at) => (age ? ages[at]! > 0 : over[at]! < MEMORY.EARLY) && over[at]! <= done + MEMORY.LEAP);
+    const fitting = places.filter(
+      (at) => (age ? ages[at]! > 0 : over[at]! < MEMORY.EARLY) && over[at]! <= done + MEMORY.LEAP,
+    );
     const used = fitting.length ? fitting : places;
-    return this.near(used.map((at) => all[at]!), used.map((at) => ages[at]!), recent, age, ends, uniform);
+    return this.near(
+      used.map((at) => all[at]!),
+      used.map((at) => ages[at]!),
+      recent,
+      age,
+      ends,
+      uniform,
+    );
   }
 
   /** The ages of an action's rows and the shares that are over; unless all is shown those of its acts, which end at 1. */
@@ -176,13 +200,18 @@ export class Memory {
 
   /** The rows of each recording, and the last rows of its pieces, each of which begins within the one before. */
   private takes(rows: number[]): { take: number[]; pieces: Set<number> }[] {
-    const motions = [...new Set(rows.map((row) => this.lasts[row]!))].map((last) => rows.filter((row) => this.lasts[row] === last));
+    const motions = [...new Set(rows.map((row) => this.lasts[row]!))].map((last) =>
+      rows.filter((row) => this.lasts[row] === last),
+    );
     const found: { take: number[]; pieces: Set<number> }[] = [];
     for (const piece of motions.sort((a, b) => this.ages[a[0]!]! - this.ages[b[0]!]!)) {
       const codes = (some: number[]) => some.map((row) => this.codes(row)).join();
       const place = (take: number[]) => this.ages[piece[0]!]! - this.ages[take[0]!]!;
       const begin = codes(piece.slice(0, MEMORY.PAST.length));
-      const before = found.find(({ take }) => place(take) > 0 && codes(take.slice(place(take), place(take) + MEMORY.PAST.length)) === begin);
+      const before = found.find(
+        ({ take }) =>
+          place(take) > 0 && codes(take.slice(place(take), place(take) + MEMORY.PAST.length)) === begin,
+      );
       const last = this.lasts[piece[0]!]!;
       if (!before) found.push({ take: piece, pieces: new Set([last]) });
       else {
@@ -211,7 +240,11 @@ export class Memory {
       let [sum, k] = [0, 0];
       while (k < end && (sum += this.particular[take[order[k]!]!]!) < enough) k++;
       for (let last = Math.max(shown[order[k]!]! + 1, first + MEMORY.WHOLE); last <= end; last++) {
-        found.push([last - first + MEMORY.UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))), first, last]);
+        found.push([
+          last - first + MEMORY.UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))),
+          first,
+          last,
+        ]);
       }
     }
     for (const [cost, first, last] of found.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
@@ -224,7 +257,7 @@ export class Memory {
   busiest(action: number, recent: Float32Array[], steps: number, uniform: number): number {
     const all = this.rows.get(action)!;
     const found: number[] = [];
-    for (let at = 0; at < all.length; ) {
+    for (let at = 0; at < all.length;) {
       const [start, last] = [all[at]!, this.lasts[all[at]!]!];
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
       const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
@@ -234,11 +267,25 @@ export class Memory {
       while (at < all.length && all[at]! <= last) at++;
     }
     if (!recent.length) return found[Math.floor(uniform * found.length)]!;
-    return this.near(found, found.map((row) => this.ages[row]!), recent, 0, false, uniform);
+    return this.near(
+      found,
+      found.map((row) => this.ages[row]!),
+      recent,
+      0,
+      false,
+      uniform,
+    );
   }
 
   /** A row whose past resembles the present. */
-  private near(rows: number[], ages: number[], recent: Float32Array[], age: number, ends: boolean, uniform: number): number {
+  private near(
+    rows: number[],
+    ages: number[],
+    recent: Float32Array[],
+    age: number,
+    ends: boolean,
+    uniform: number,
+  ): number {
     const off = new Float64Array(rows.length);
     for (let at = 0; at < rows.length; at++) {
       const later = MEMORY.LATER * (ages[at]! - age) ** 2;

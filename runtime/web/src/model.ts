@@ -1,5 +1,13 @@
 /* What the models of all verbs share: their manifest, settings, and checks of what they are given. */
-import { LANGUAGE, PREDICT, betweenSettings, codesSettings, consensusSettings, freeRunSettings, nearestSettings } from "./generated.js";
+import {
+  LANGUAGE,
+  PREDICT,
+  betweenSettings,
+  codesSettings,
+  consensusSettings,
+  freeRunSettings,
+  nearestSettings,
+} from "./generated.js";
 import { integers, stacked } from "./arrays.js";
 import type { Manifest } from "./bundle.js";
 import { BundleError, DecodingError } from "./errors.js";
@@ -31,7 +39,8 @@ export abstract class Model {
 
   protected checked(frames: Frames, width: number, least = 1): Frames {
     const fits = frames.every((frame) => frame.length === width && Array.from(frame).every(Number.isFinite));
-    if (frames.length < least || !fits) throw new DecodingError(`at least ${least} frames of ${width} finite numbers are needed`);
+    if (frames.length < least || !fits)
+      throw new DecodingError(`at least ${least} frames of ${width} finite numbers are needed`);
     return frames;
   }
 
@@ -40,7 +49,9 @@ export abstract class Model {
     const range = RANGES[name]!;
     const value = given ?? this.manifest.defaults[name] ?? range.default;
     if (value === null || !fits(value, range)) {
-      throw new DecodingError(`${name} must be ${range.whole ? "a whole number " : ""}from ${range.low} to ${range.high}, not ${value}`);
+      throw new DecodingError(
+        `${name} must be ${range.whole ? "a whole number " : ""}from ${range.low} to ${range.high}, not ${value}`,
+      );
     }
     return value;
   }
@@ -51,7 +62,8 @@ export abstract class LanguageModel extends Model {
 
   constructor(manifest: Manifest) {
     super(manifest);
-    if (!manifest.vocabulary || !manifest.text) throw new BundleError(`the bundle ${manifest.name} has no words`);
+    if (!manifest.vocabulary || !manifest.text)
+      throw new BundleError(`the bundle ${manifest.name} has no words`);
     this.vocabulary = new Vocabulary(manifest.vocabulary, manifest.text, manifest.common);
   }
 
@@ -63,7 +75,10 @@ export abstract class LanguageModel extends Model {
   protected motion(frames: Frames) {
     const given = this.checked(frames, this.manifest.motion.channels.length, 2);
     const most = Math.floor(LANGUAGE.MAX_SECONDS * this.fps + 1e-9) + 1;
-    if (given.length > most) throw new DecodingError(`the motion has ${given.length} frames, but the model takes at most ${most}: cut it`);
+    if (given.length > most)
+      throw new DecodingError(
+        `the motion has ${given.length} frames, but the model takes at most ${most}: cut it`,
+      );
     return { frames: stacked(given, 1, given.length, given[0]!.length), lengths: integers([given.length]) };
   }
 }

@@ -36,26 +36,38 @@ export async function release(model: AnyModel): Promise<void> {
  * kind that is not run here or not the one that is wanted: `load("generate.zip", GenerateModel)`.
  */
 export async function load<T extends AnyModel = AnyModel>(
-  source: string | URL | Uint8Array, kind?: new (...given: never[]) => T, settings?: SessionSettings,
+  source: string | URL | Uint8Array,
+  kind?: new (...given: never[]) => T,
+  settings?: SessionSettings,
 ): Promise<T> {
   const bytes = source instanceof Uint8Array ? source : await fetched(source);
   const graphs: Record<string, Graph> = {};
   try {
     const model = await loaded(await Bundle.open(bytes), graphs, settings);
     loadedGraphs.set(model, Object.values(graphs));
-    if (kind && !(model instanceof kind)) throw new BundleError(`the bundle ${model.manifest.name} is for ${model.manifest.verb}: it is no ${kind.name}`);
+    if (kind && !(model instanceof kind))
+      throw new BundleError(
+        `the bundle ${model.manifest.name} is for ${model.manifest.verb}: it is no ${kind.name}`,
+      );
     return model as T;
   } catch (error) {
     await Promise.all(Object.values(graphs).map((graph) => graph.release()));
     // a manifest of the wrong form shows in many ways
-    throw error instanceof BundleError ? error : new BundleError(`the bundle's manifest is damaged: ${String(error)}`);
+    throw error instanceof BundleError
+      ? error
+      : new BundleError(`the bundle's manifest is damaged: ${String(error)}`);
   }
 }
 
-async function loaded(bundle: Bundle, graphs: Record<string, Graph>, settings?: SessionSettings): Promise<AnyModel> {
+async function loaded(
+  bundle: Bundle,
+  graphs: Record<string, Graph>,
+  settings?: SessionSettings,
+): Promise<AnyModel> {
   const { manifest } = bundle;
   const known = Object.keys(manifest.graphs);
-  for (const role of new Set([...(ROLES[manifest.loop] ?? []), ...known])) graphs[role] = await bundle.graph(role, settings);
+  for (const role of new Set([...(ROLES[manifest.loop] ?? []), ...known]))
+    graphs[role] = await bundle.graph(role, settings);
   switch (manifest.loop) {
     case "beam":
     case "consensus":
@@ -71,12 +83,15 @@ async function loaded(bundle: Bundle, graphs: Record<string, Graph>, settings?: 
     case "nearest":
       return new SearchModel(manifest, graphs);
     default:
-      throw new BundleError(`the bundle ${manifest.name} has the loop ${JSON.stringify(manifest.loop)}, which is not run here`);
+      throw new BundleError(
+        `the bundle ${manifest.name} has the loop ${JSON.stringify(manifest.loop)}, which is not run here`,
+      );
   }
 }
 
 async function fetched(address: string | URL): Promise<Uint8Array> {
-  const isPath = typeof process !== "undefined" && process.versions?.node && !/^(https?|data|blob):/.test(String(address));
+  const isPath =
+    typeof process !== "undefined" && process.versions?.node && !/^(https?|data|blob):/.test(String(address));
   if (isPath) return readFile(address);
   const response = await fetch(address).catch((error: unknown) => {
     const allowed = "a page may fetch from where it comes from itself, and from servers that allow it (CORS)";
@@ -91,7 +106,9 @@ async function readFile(path: string | URL): Promise<Uint8Array> {
   const module = "node:fs/promises"; // by a name that no bundler of pages looks for
   const { readFile } = (await import(module)) as typeof import("node:fs/promises");
   const file = String(path).startsWith("file:") ? new URL(path) : path;
-  return new Uint8Array(await readFile(file).catch((error: unknown) => {
-    throw new BundleError(`${path} cannot be read: ${String(error)}`);
-  }));
+  return new Uint8Array(
+    await readFile(file).catch((error: unknown) => {
+      throw new BundleError(`${path} cannot be read: ${String(error)}`);
+    }),
+  );
 }

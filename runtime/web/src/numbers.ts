@@ -34,13 +34,22 @@ export function smoothed(rows: number[][], deviation: number): number[][] {
   const reach = rounded(3 * deviation);
   const last = rows.length - 1;
   if (last < 1 || !reach) return rows;
-  const window = Array.from({ length: 2 * reach + 1 }, (_, at) => Math.exp(-0.5 * ((at - reach) / deviation) ** 2));
+  const window = Array.from({ length: 2 * reach + 1 }, (_, at) =>
+    Math.exp(-0.5 * ((at - reach) / deviation) ** 2),
+  );
   const total = window.reduce((sum, weight) => sum + weight);
   const value = (row: number, column: number): number =>
-    row < 0 ? 2 * rows[0]![column]! - value(-row, column)
-    : row > last ? 2 * rows[last]![column]! - value(2 * last - row, column)
-    : rows[row]![column]!;
-  return rows.map((own, row) => own.map((_, column) => window.reduce((sum, weight, at) => sum + weight * value(row + at - reach, column), 0) / total));
+    row < 0
+      ? 2 * rows[0]![column]! - value(-row, column)
+      : row > last
+        ? 2 * rows[last]![column]! - value(2 * last - row, column)
+        : rows[row]![column]!;
+  return rows.map((own, row) =>
+    own.map(
+      (_, column) =>
+        window.reduce((sum, weight, at) => sum + weight * value(row + at - reach, column), 0) / total,
+    ),
+  );
 }
 
 /** Each value's window of `reach` values before and as many after; those at the ends go on. */

@@ -2,7 +2,17 @@ import type { Manifest } from "./bundle.js";
 import { DecodingError } from "./errors.js";
 import type { Frames } from "./model.js";
 import { moved, type Pose as Ground, seenFrom } from "./planar.js";
-import { about, inverse, product, type Quaternion, quaternionOf, rotated, rotationOf, X, Y } from "./rotations.js";
+import {
+  about,
+  inverse,
+  product,
+  type Quaternion,
+  quaternionOf,
+  rotated,
+  rotationOf,
+  X,
+  Y,
+} from "./rotations.js";
 import { wrapped } from "./springs.js";
 
 /** The humanoid in one frame: its hips in metres, and each bone's rotation in its parent's frame, by VRM 1.0's names. */
@@ -25,13 +35,16 @@ export function poser({ motion: { representation, channels, fps } }: Manifest): 
   }
   const bones = channels.filter((name) => name.endsWith(".xx")).map((name) => name.slice(0, -3));
   let ground: Ground | undefined;
-  return (frames) => frames.map((frame) => {
-    ground = ground ? moved(ground, [frame[0]! / fps, frame[1]! / fps, frame[2]! / fps]) : [0, 0, 0];
-    const rotations = Object.fromEntries(bones.map((bone, i) => [bone, quaternionOf(rotationOf(frame, ROOT.length + 6 * i))]));
-    const half = ground[2] / 2;
-    rotations[bones[0]!] = product([0, Math.sin(half), 0, Math.cos(half)], rotations[bones[0]!]!);
-    return { hips: [ground[0], frame[3]!, ground[1]], rotations };
-  });
+  return (frames) =>
+    frames.map((frame) => {
+      ground = ground ? moved(ground, [frame[0]! / fps, frame[1]! / fps, frame[2]! / fps]) : [0, 0, 0];
+      const rotations = Object.fromEntries(
+        bones.map((bone, i) => [bone, quaternionOf(rotationOf(frame, ROOT.length + 6 * i))]),
+      );
+      const half = ground[2] / 2;
+      rotations[bones[0]!] = product([0, Math.sin(half), 0, Math.cos(half)], rotations[bones[0]!]!);
+      return { hips: [ground[0], frame[3]!, ground[1]], rotations };
+    });
 }
 
 /** Frames in `root_sixd` of poses in turn that know where their figure is, such as a steered one's; the first stands still. */

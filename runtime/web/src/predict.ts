@@ -7,14 +7,23 @@ import { type Frames, Model } from "./model.js";
 
 /** The frames that follow a motion. */
 export class PredictModel extends Model {
-  constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>) {
+  constructor(
+    manifest: Manifest,
+    private readonly graphs: Record<string, Graph>,
+  ) {
     super(manifest);
   }
 
   /** The next frames after the last ones of (T, D); by default one horizon. */
   async predict(frames: Frames, count = this.setting("horizon")): Promise<Float32Array[]> {
     const seed = this.seed(frames);
-    return freeRun(this.graphs.encoder!, this.graphs.step!, seed, this.setting("frames", count), this.setting("horizon"));
+    return freeRun(
+      this.graphs.encoder!,
+      this.graphs.step!,
+      seed,
+      this.setting("frames", count),
+      this.setting("horizon"),
+    );
   }
 
   /** For each frame of a horizon how far its joints are expected to be off, on average, in centimetres. */

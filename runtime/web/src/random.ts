@@ -89,7 +89,8 @@ export class Recorded implements Noise {
 
   uniform(count: number): number[] {
     const { value, done } = this.blocks.next();
-    if (done || value.length !== count) throw new RangeError(`the recording lacks a block of ${count} numbers`);
+    if (done || value.length !== count)
+      throw new RangeError(`the recording lacks a block of ${count} numbers`);
     return Array.from(value);
   }
 }

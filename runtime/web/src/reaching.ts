@@ -2,7 +2,22 @@
 import { REACHING } from "./generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { ARM, BONES, HUMANOID, SIDES, SPINE } from "./humanoid.js";
-import { about, dot, inverse, minus, normalised, plus, product, type Quaternion, rotated, size, times, unit, type Vector, Y } from "./rotations.js";
+import {
+  about,
+  dot,
+  inverse,
+  minus,
+  normalised,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  size,
+  times,
+  unit,
+  type Vector,
+  Y,
+} from "./rotations.js";
 import type { Played } from "./steering.js";
 import { TwoBones } from "./twoBones.js";
 
@@ -32,7 +47,13 @@ export function reached(hand: Reach, side: number, pose: Played, seconds: number
   if (!hand.point && rests) return pose;
   const wanted = hand.point ?? hand.aim.wanted;
   // an arm that does not reach yet goes to the point by its weight alone
-  hand.aim = followed(rests ? followerAt([...wanted]) : hand.aim, [...wanted], REACHING.LEAP, REACHING.HALF_LIFE, seconds);
+  hand.aim = followed(
+    rests ? followerAt([...wanted]) : hand.aim,
+    [...wanted],
+    REACHING.LEAP,
+    REACHING.HALF_LIFE,
+    seconds,
+  );
   hand.weight = followed(hand.weight, [hand.point ? 1 : 0], 0.5, REACHING.HALF_LIFE, seconds);
   const { upper, lower, gap } = arm(pose, side, shownBy(hand.aim) as Vector);
   hand.beyond = !!hand.point && gap > REACHING.REACHED;
@@ -44,17 +65,34 @@ export function reached(hand: Reach, side: number, pose: Played, seconds: number
 }
 
 /** Rotations of an upper arm and a forearm in their parents' frames with the hand at a point, and the metres that are missing. */
-function arm(pose: Played, side: number, point: Vector): { upper: Quaternion; lower: Quaternion; gap: number } {
+function arm(
+  pose: Played,
+  side: number,
+  point: Vector,
+): { upper: Quaternion; lower: Quaternion; gap: number } {
   const bones = ARMS[side]!;
-  const [shoulder, , , hand] = bones.map((bone) => pose.rotations[bone]!) as [Quaternion, Quaternion, Quaternion, Quaternion];
+  const [shoulder, , , hand] = bones.map((bone) => pose.rotations[bone]!) as [
+    Quaternion,
+    Quaternion,
+    Quaternion,
+    Quaternion,
+  ];
   const offsets = bones.map((bone) => OFFSETS[bone]!);
   const start = plus(offsets[0]!, rotated(shoulder, offsets[1]!));
   const way = minus(inChest(pose, point), start);
-  const ready = readied(side, offsets[2]!, plus(offsets[3]!, rotated(hand, [out(side) * REACHING.PALM, 0, 0])));
+  const ready = readied(
+    side,
+    offsets[2]!,
+    plus(offsets[3]!, rotated(hand, [out(side) * REACHING.PALM, 0, 0])),
+  );
   const near = within(way, side, ready.longest);
   const { thigh, shin } = ready.turns(near);
   const [up, low] = [product(thigh, READY[side]![0]), product(shin, READY[side]![1])];
-  return { upper: product(inverse(shoulder), up), lower: product(inverse(up), low), gap: size(minus(near, way)) };
+  return {
+    upper: product(inverse(shoulder), up),
+    lower: product(inverse(up), low),
+    gap: size(minus(near, way)),
+  };
 }
 
 /** 1 for the left side, which is at positive x, -1 for the right. */
@@ -82,7 +120,12 @@ const READY = SIDES.map((_, side): [Quaternion, Quaternion] => {
 function readied(side: number, along: Vector, down: Vector): TwoBones {
   const [upper, lower] = READY[side]!;
   const elbow = rotated(upper, along);
-  return new TwoBones([0, 0, 0], elbow, plus(elbow, rotated(lower, down)), rotated(lower, times(Y, -out(side))));
+  return new TwoBones(
+    [0, 0, 0],
+    elbow,
+    plus(elbow, rotated(lower, down)),
+    rotated(lower, times(Y, -out(side))),
+  );
 }
 
 /** The place nearest to one, from the shoulder, that an arm of a length reaches, turned and stretched no farther than it can be. */
@@ -90,8 +133,15 @@ function within(way: Vector, side: number, longest: number): Vector {
   const [axis, far] = [unit([out(side), 0, 1]), size(way)];
   const along = dot(way, axis);
   const aside = unit(minus(way, times(axis, along)));
-  const edge = plus(times(axis, REACHING.WIDEST * far), times(aside, Math.sqrt(1 - REACHING.WIDEST * REACHING.WIDEST) * far));
-  const [nearest, straight, more] = [REACHING.NEAREST * longest, REACHING.STRAIGHT * longest, REACHING.STRETCHED * longest];
+  const edge = plus(
+    times(axis, REACHING.WIDEST * far),
+    times(aside, Math.sqrt(1 - REACHING.WIDEST * REACHING.WIDEST) * far),
+  );
+  const [nearest, straight, more] = [
+    REACHING.NEAREST * longest,
+    REACHING.STRAIGHT * longest,
+    REACHING.STRETCHED * longest,
+  ];
   const over = Math.max(far - straight, 0);
   const eased = over > 0 ? straight + more * (1 - Math.exp(-over / more)) : Math.max(far, nearest);
   return times(along >= REACHING.WIDEST * far ? way : edge, eased / Math.max(far, 1e-12));

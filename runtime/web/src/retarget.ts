@@ -2,12 +2,39 @@
 import { SKELETON } from "./generated.js";
 import { MotionError } from "./errors.js";
 import { relaxed } from "./fingers.js";
-import { BONES, groundUnder, HIPS, HUMANOID, isHumanoid, LEG_LENGTH, NECK, SIDES, solePoints, SPINE } from "./humanoid.js";
+import {
+  BONES,
+  groundUnder,
+  HIPS,
+  HUMANOID,
+  isHumanoid,
+  LEG_LENGTH,
+  NECK,
+  SIDES,
+  solePoints,
+  SPINE,
+} from "./humanoid.js";
 import { carrierOf, type JointMap, mapFrom, mapOf } from "./jointMap.js";
 import { checkFrames, fit, type Fitted, solesOf, unitOf, upright } from "./measure.js";
 import { atRest, checked, cut, type Motion, motionFrom, placesOf, type World, worldOf } from "./motion.js";
 import {
-  about, inverse, mean, minus, plus, product, type Quaternion, rotated, STILL, swing, times, towards, twist, type Vector, X, Y, Z,
+  about,
+  inverse,
+  mean,
+  minus,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  STILL,
+  swing,
+  times,
+  towards,
+  twist,
+  type Vector,
+  X,
+  Y,
+  Z,
 } from "./rotations.js";
 import type { Skeleton } from "./skeleton.js";
 
@@ -64,16 +91,20 @@ export function onHumanoid(motion: Motion): Motion {
 
 /** Knees bend about the axis of the thigh. */
 function hingesOf({ body, aligned }: Fitted, { turns }: World): Record<string, Vector[]> {
-  return Object.fromEntries(SIDES.map((side) => {
-    const joint = body.map.joints[`${side}UpperLeg`]!;
-    const axis = rotated(aligned[joint]!, X);
-    return [side, turns.map((turned) => rotated(turned[joint]!, axis))];
-  }));
+  return Object.fromEntries(
+    SIDES.map((side) => {
+      const joint = body.map.joints[`${side}UpperLeg`]!;
+      const axis = rotated(aligned[joint]!, X);
+      return [side, turns.map((turned) => rotated(turned[joint]!, axis))];
+    }),
+  );
 }
 
 function retargeted(fitted: Fitted, world: World, turn: Quaternion, { fps, travels }: Motion): Motion {
   const factor = LEG_LENGTH / fitted.leg;
-  const turns = world.turns.map((own, frame) => humanoidTurns(own, world.places[frame]!, fitted).map((one) => product(turn, one)));
+  const turns = world.turns.map((own, frame) =>
+    humanoidTurns(own, world.places[frame]!, fitted).map((one) => product(turn, one)),
+  );
   const places = turns.map((turned, frame) => {
     const legs = times(rotated(turn, fitted.body.middle(world.places[frame]!, "UpperLeg")), factor);
     const found = placesOf(HUMANOID, turned);
@@ -91,14 +122,18 @@ function humanoidTurns(turns: Quaternion[], pose: Vector[], { body, aligned, pel
   const own = (joint: number) => product(turns[joint]!, aligned[joint]!);
   const found: Record<string, Quaternion> = {};
   for (const [bone, joint] of Object.entries(joints)) found[bone] = own(joint);
-  if (!pelvis) found.hips = product(swing(rotated(found.hips!, X), body.toLeft(pose, "UpperLeg")), found.hips!);
+  if (!pelvis)
+    found.hips = product(swing(rotated(found.hips!, X), body.toLeft(pose, "UpperLeg")), found.hips!);
   const above = [...neck.map(own), ...(found.head ? [found.head] : [])];
   shared([found.hips!, ...spine.map(own)], SPINE.length).forEach((turn, at) => (found[SPINE[at]!] = turn));
-  if (above.length) shared([own(spine.at(-1)!), ...above], NECK.length).forEach((turn, at) => (found[NECK[at]!] = turn));
+  if (above.length)
+    shared([own(spine.at(-1)!), ...above], NECK.length).forEach((turn, at) => (found[NECK[at]!] = turn));
   for (const bone of BONES.slice(1)) {
     found[bone] ??= found[HUMANOID.names[HUMANOID.joints[HUMANOID.index(bone)]!.parent]!]!;
   }
-  return HUMANOID.names.map((name) => found[name.endsWith(SKELETON.END_SUFFIX) ? name.slice(0, -SKELETON.END_SUFFIX.length) : name]!);
+  return HUMANOID.names.map(
+    (name) => found[name.endsWith(SKELETON.END_SUFFIX) ? name.slice(0, -SKELETON.END_SUFFIX.length) : name]!,
+  );
 }
 
 /** Rotations of so many joints of another chain with the same ends, by how far up the chain each is; the first is no part. */
@@ -125,8 +160,13 @@ export function figureOf(like: Like, joints?: NamedJoints): Figure {
  * Retarget a motion of the humanoid to another human skeleton, whose fingers bend as in a relaxed hand; feet stay on
  * the ground. ahead: z becomes the way that the figure faces at rest. MotionError where one of them is no human's.
  */
-export function fromHumanoid(motion: Motion, like: Like, { joints, ahead = false }: { joints?: NamedJoints; ahead?: boolean } = {}): Motion {
-  if (!isHumanoid(motion.skeleton)) throw new MotionError("this motion is not on the humanoid: convert it with toHumanoid first");
+export function fromHumanoid(
+  motion: Motion,
+  like: Like,
+  { joints, ahead = false }: { joints?: NamedJoints; ahead?: boolean } = {},
+): Motion {
+  if (!isHumanoid(motion.skeleton))
+    throw new MotionError("this motion is not on the humanoid: convert it with toHumanoid first");
   const figure = figureOf(like, joints);
   const { skeleton, still } = postureOf(figure);
   const { fitted } = figure;
@@ -139,7 +179,12 @@ export function fromHumanoid(motion: Motion, like: Like, { joints, ahead = false
   };
   const turned = source.turns.map((own) => figureTurns(own, fitted, skeleton, still));
   const carrier = carrierOf(fitted.body.map, skeleton);
-  return motionFrom(skeleton, turned, new Map([[carrier, moves(fitted, skeleton, source, turned, carrier)]]), motion.fps);
+  return motionFrom(
+    skeleton,
+    turned,
+    new Map([[carrier, moves(fitted, skeleton, source, turned, carrier)]]),
+    motion.fps,
+  );
 }
 
 /** The skeleton with its unit where that is known, and local rotations of joints that are no bones. */
@@ -153,26 +198,48 @@ function postureOf({ fitted, first }: Figure): { skeleton: Skeleton; still: Quat
 }
 
 /** Translations of a figure's carrier in its parent's frame: its path is scaled, its feet are as high over the ground. */
-function moves(fitted: Fitted, skeleton: Skeleton, source: World, turned: Quaternion[][], carrier: number): Vector[] {
+function moves(
+  fitted: Fitted,
+  skeleton: Skeleton,
+  source: World,
+  turned: Quaternion[][],
+  carrier: number,
+): Vector[] {
   const scale = fitted.leg / LEG_LENGTH;
   const figure = turned.map((turns) => placesOf(skeleton, turns));
-  const moved = source.places.map((pose, at) => minus(times(mean(HIPS.map((joint) => pose[joint]!)), scale), fitted.body.middle(figure[at]!, "UpperLeg")));
+  const moved = source.places.map((pose, at) =>
+    minus(times(mean(HIPS.map((joint) => pose[joint]!)), scale), fitted.body.middle(figure[at]!, "UpperLeg")),
+  );
   const soles = source.turns.map((turns, at) => {
-    const bones = Object.fromEntries(Object.keys(fitted.heights).map((bone) => [bone, turns[HUMANOID.index(bone)]!]));
-    return solesOf(fitted, bones, figure[at]!.map((place) => plus(place, moved[at]!)));
+    const bones = Object.fromEntries(
+      Object.keys(fitted.heights).map((bone) => [bone, turns[HUMANOID.index(bone)]!]),
+    );
+    return solesOf(
+      fitted,
+      bones,
+      figure[at]!.map((place) => plus(place, moved[at]!)),
+    );
   });
   const rise = scale * groundUnder(solePoints(source)) - groundUnder(soles);
   return moved.map((move, at): Vector => {
     const place: Vector = [move[0], move[1] + rise, move[2]];
     if (!carrier) return place;
     const above = skeleton.joints[carrier]!.parent;
-    const fromAbove = minus(minus(plus(figure[at]![carrier]!, place), figure[at]![above]!), skeleton.joints[0]!.offset);
+    const fromAbove = minus(
+      minus(plus(figure[at]![carrier]!, place), figure[at]![above]!),
+      skeleton.joints[0]!.offset,
+    );
     return rotated(inverse(turned[at]![above]!), fromAbove);
   });
 }
 
 /** Rotations in the world of a figure's joints, from those of the humanoid's in one frame. */
-function figureTurns(source: Quaternion[], { body, aligned }: Fitted, skeleton: Skeleton, still: Quaternion[]): Quaternion[] {
+function figureTurns(
+  source: Quaternion[],
+  { body, aligned }: Fitted,
+  skeleton: Skeleton,
+  still: Quaternion[],
+): Quaternion[] {
   const { map } = body;
   const { joints, spine, neck } = map;
   const of = (bone: string) => source[HUMANOID.index(bone)]!;

@@ -7,13 +7,22 @@ export type Plane = [x: number, z: number][];
 
 /** Velocities over the ground, in m/s from each frame to the next, that keep points (T, K) from sliding; heights: of them over the ground. */
 export function velocityByFeet(points: Plane[], heights: number[][], fps: number): Plane {
-  const calm = smoothed(points.map((row) => row.flat()), treadmillSettings.calm * fps);
+  const calm = smoothed(
+    points.map((row) => row.flat()),
+    treadmillSettings.calm * fps,
+  );
   const steps = calm.slice(1).map((row, at) => row.map((value, i) => (calm[at]![i]! - value) * fps));
-  const votes = steps.map((row) => heights[0]!.map((_, k): [number, number] => [row[2 * k]!, row[2 * k + 1]!]));
-  const near = votes.map((row, at) => row.map((_, k) => 1 - rise((heights[at]![k]! + heights[at + 1]![k]!) / 2, 0, CONTACTS.VOTING_HEIGHT)));
+  const votes = steps.map((row) =>
+    heights[0]!.map((_, k): [number, number] => [row[2 * k]!, row[2 * k + 1]!]),
+  );
+  const near = votes.map((row, at) =>
+    row.map((_, k) => 1 - rise((heights[at]![k]! + heights[at + 1]![k]!) / 2, 0, CONTACTS.VOTING_HEIGHT)),
+  );
   let velocity = led(votes, near, fps);
   for (let attempt = 0; attempt < 10; attempt++) {
-    const weights = votes.map((row, at) => row.map((vote, k) => near[at]![k]! * agreement(vote, velocity[at]!)));
+    const weights = votes.map((row, at) =>
+      row.map((vote, k) => near[at]![k]! * agreement(vote, velocity[at]!)),
+    );
     velocity = led(votes, weights, fps);
   }
   return velocity;
@@ -29,11 +38,14 @@ function agreement([x, z]: [number, number], [alongX, alongZ]: [number, number])
 /** The weighted mean of all votes, those of near frames more. */
 function led(votes: Plane[], weights: number[][], fps: number): Plane {
   const sums = votes.map((row, at) => {
-    const sum = (of: (vote: [number, number]) => number) => row.reduce((all, vote, k) => all + weights[at]![k]! * of(vote), 0);
+    const sum = (of: (vote: [number, number]) => number) =>
+      row.reduce((all, vote, k) => all + weights[at]![k]! * of(vote), 0);
     return [sum(() => 1), sum(([x]) => x), sum(([, z]) => z)] as const;
   });
   const reach = rounded(CONTACTS.REACH * fps);
-  const nearness = Array.from({ length: reach + 1 }, (_, away) => Math.exp(-away / (CONTACTS.TOGETHER * fps)));
+  const nearness = Array.from({ length: reach + 1 }, (_, away) =>
+    Math.exp(-away / (CONTACTS.TOGETHER * fps)),
+  );
   return sums.map((_, at) => {
     let [total, x, z] = [1e-12, 0, 0]; // no vote within a second is none
     for (let other = Math.max(0, at - reach); other <= Math.min(sums.length - 1, at + reach); other++) {
@@ -50,7 +62,10 @@ function led(votes: Plane[], weights: number[][], fps: number): Plane {
 export function heightsByFeet(standing: number[], fps: number): number[][] {
   // a jump up forward in time is a fall backward: only frames on which both agree are flight
   const [up, down] = [flown(standing, fps), flown([...standing].reverse(), fps).reverse()];
-  return smoothed(up.map((value, at) => [Math.min(value, down[at]!)]), treadmillSettings.calm * fps);
+  return smoothed(
+    up.map((value, at) => [Math.min(value, down[at]!)]),
+    treadmillSettings.calm * fps,
+  );
 }
 
 function flown(standing: number[], fps: number): number[] {

@@ -21,7 +21,12 @@ export function quaternionOf([x, y, z]: Rotation): Quaternion {
   const [a, b, c] = [y[2] - z[1], z[0] - x[2], x[1] - y[0]];
   const [d, e, f] = [x[1] + y[0], z[0] + x[2], y[2] + z[1]];
   // each is the quaternion times four times one of its parts
-  const scaled: Quaternion[] = [[diagonal[0]!, d, e, a], [d, diagonal[1]!, f, b], [e, f, diagonal[2]!, c], [a, b, c, diagonal[3]!]];
+  const scaled: Quaternion[] = [
+    [diagonal[0]!, d, e, a],
+    [d, diagonal[1]!, f, b],
+    [e, f, diagonal[2]!, c],
+    [a, b, c, diagonal[3]!],
+  ];
   return positive(normalised(scaled[diagonal.indexOf(Math.max(...diagonal))]!));
 }
 
@@ -71,7 +76,11 @@ export function mean(vectors: Vector[]): Vector {
 /** No turn. */
 export const STILL: Quaternion = [0, 0, 0, 1];
 
-export const [X, Y, Z]: Rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+export const [X, Y, Z]: Rotation = [
+  [1, 0, 0],
+  [0, 1, 0],
+  [0, 0, 1],
+];
 
 export function normalised(q: Quaternion): Quaternion {
   const length = Math.hypot(...q);

@@ -15,7 +15,10 @@ export interface Hit {
 export class SearchModel extends LanguageModel {
   private readonly index = settingsOf("index", indexSettings, this.manifest.settings.index);
 
-  constructor(manifest: Manifest, private readonly graphs: Record<string, Graph>) {
+  constructor(
+    manifest: Manifest,
+    private readonly graphs: Record<string, Graph>,
+  ) {
     super(manifest);
   }
 
@@ -40,16 +43,29 @@ export class SearchModel extends LanguageModel {
   }
 
   /** The vectors of motions that are nearest to a sentence or to frames (T, D), best first; where the first is not `like` it, none is. */
-  async search(query: string | Frames, vectors: Float32Array[], count = this.setting("count")): Promise<Hit[]> {
+  async search(
+    query: string | Frames,
+    vectors: Float32Array[],
+    count = this.setting("count"),
+  ): Promise<Hit[]> {
     const least = typeof query === "string" ? this.index.like_text : this.index.like_motion;
     const vector = await (typeof query === "string" ? this.embedText(query) : this.embedMotion(query));
     return this.nearest(vector, vectors, count).map((hit) => ({ ...hit, like: hit.score >= least }));
   }
 
   /** The indices of the vectors nearest to one, and their scores, best first. */
-  nearest(vector: Float32Array, vectors: Float32Array[], count = this.setting("count")): { index: number; score: number }[] {
-    const scores = vectors.map((one, index) => ({ index, score: one.reduce((sum, value, i) => sum + value * vector[i]!, 0) }));
-    return scores.sort((a, b) => b.score - a.score || a.index - b.index).slice(0, this.setting("count", count));
+  nearest(
+    vector: Float32Array,
+    vectors: Float32Array[],
+    count = this.setting("count"),
+  ): { index: number; score: number }[] {
+    const scores = vectors.map((one, index) => ({
+      index,
+      score: one.reduce((sum, value, i) => sum + value * vector[i]!, 0),
+    }));
+    return scores
+      .sort((a, b) => b.score - a.score || a.index - b.index)
+      .slice(0, this.setting("count", count));
   }
 }
 

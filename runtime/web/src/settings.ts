@@ -24,12 +24,15 @@ export function settingsOf<Ranges extends Record<string, Range>>(
   values: Record<string, number> = {},
 ): Settings<Ranges> {
   const unknown = Object.keys(values).filter((name) => !Object.hasOwn(ranges, name));
-  if (unknown.length) throw new BundleError(`manifest, settings.${feature}: ${unknown.join(", ")} is unknown`);
+  if (unknown.length)
+    throw new BundleError(`manifest, settings.${feature}: ${unknown.join(", ")} is unknown`);
   const settings: Record<string, number> = {};
   for (const [name, range] of Object.entries(ranges)) {
     const value = values[name] ?? range.default;
     if (value === null || !fits(value, range)) {
-      throw new BundleError(`manifest, settings.${feature}.${name}: must be ${range.low} to ${range.high}, not ${value}`);
+      throw new BundleError(
+        `manifest, settings.${feature}.${name}: must be ${range.low} to ${range.high}, not ${value}`,
+      );
     }
     settings[name] = value;
   }

@@ -1,4 +1,4 @@
-import {  } from "./generated.js";
+import {} from "./generated.js";
 import { MotionError } from "./errors.js";
 import { spread } from "./numbers.js";
 import { plus, type Quaternion, type Vector } from "./rotations.js";
@@ -40,7 +40,8 @@ export class Skeleton {
     if (this.places.size < joints.length) throw new MotionError("names of joints must be unique");
     this.children = joints.map(() => []);
     joints.forEach(({ name, parent, offset }, at) => {
-      if (at ? !(parent >= 0 && parent < at) : parent !== -1) throw new MotionError(`the joint ${name} must come after its parent`);
+      if (at ? !(parent >= 0 && parent < at) : parent !== -1)
+        throw new MotionError(`the joint ${name} must come after its parent`);
       if (!offset.every(Number.isFinite)) throw new MotionError(`the offset of ${name} must be finite`);
       this.rest.push(at ? plus(this.rest[parent]!, offset) : [0, 0, 0]);
       if (at) this.children[parent]!.push(at);
@@ -54,7 +55,11 @@ export class Skeleton {
 
   /** The same tree with other offsets and another unit. */
   with(offset: (joint: number) => Vector, metresPerUnit: number | null): Skeleton {
-    return new Skeleton(this.joints.map((joint, at) => ({ ...joint, offset: offset(at) })), metresPerUnit, this.nodes);
+    return new Skeleton(
+      this.joints.map((joint, at) => ({ ...joint, offset: offset(at) })),
+      metresPerUnit,
+      this.nodes,
+    );
   }
 
   index(name: string): number {

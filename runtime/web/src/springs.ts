@@ -5,7 +5,12 @@ export function dampingOf(halfLife: number): number {
   return (2 * Math.LN2) / halfLife;
 }
 
-export function damped(off: number, rate: number, damping: number, seconds: number): [off: number, rate: number] {
+export function damped(
+  off: number,
+  rate: number,
+  damping: number,
+  seconds: number,
+): [off: number, rate: number] {
   const rise = (rate + damping * off) * seconds;
   const left = Math.exp(-damping * seconds);
   return [(off + rise) * left, (rate - damping * rise) * left];

@@ -24,9 +24,18 @@ export function notYet(): Standing {
 }
 
 /** A tick later; a figure that stands is kept where it was before it. root: before the tick. acts: whether an act leads the whole body. */
-export function kept(standing: Standing, pose: Played, playback: Playback, [x, z]: Ground, target: Target, acts: boolean, dt: number): Played {
+export function kept(
+  standing: Standing,
+  pose: Played,
+  playback: Playback,
+  [x, z]: Ground,
+  target: Target,
+  acts: boolean,
+  dt: number,
+): Played {
   const slow = Math.hypot(playback.spring[0], playback.spring[1]) < STANDING.SLOW;
-  const stands = !target[0] && !target[1] && !acts && slow && pose.contacts.every((contact) => contact > STANDING.STANDS);
+  const stands =
+    !target[0] && !target[1] && !acts && slow && pose.contacts.every((contact) => contact > STANDING.STANDS);
   const goal = stands ? 1 : 0;
   const [off, rate] = damped(standing.share - goal, standing.rate, dampingOf(STANDING.SETTLES), dt);
   Object.assign(standing, { ticks: standing.ticks + 1, share: goal + off, rate });
@@ -40,7 +49,12 @@ export function kept(standing: Standing, pose: Played, playback: Playback, [x, z
 export function breathed({ ticks, share }: Standing, pose: Played, dt: number): Played {
   if (share <= STANDING.LEAST) return pose;
   const [x, z] = pose.ground;
-  const angle = STANDING.DEPTH * share * Math.sin(2 * Math.PI * (((ticks * dt) / STANDING.PERIOD) % 1) + STANDING.WAVE[0] * x + STANDING.WAVE[1] * z);
+  const angle =
+    STANDING.DEPTH *
+    share *
+    Math.sin(
+      2 * Math.PI * (((ticks * dt) / STANDING.PERIOD) % 1) + STANDING.WAVE[0] * x + STANDING.WAVE[1] * z,
+    );
   const rotations = [...pose.rotations];
   let above: Quaternion = STILL;
   for (const { bone, times } of TURNS) {

@@ -34,13 +34,28 @@ export function standing(model: ControlModel, gait: number, place?: Ground, phas
   const { matcher } = model.steerer;
   const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
-  const told: Pick<Steered, "going" | "look" | "hands"> = { going: null, look: ahead(), hands: [idle(), idle()] };
-  return { playback, acting: noAct(model, playback), lock: newLock(), standing: notYet(), command, target: [0, 0, facing], ...told, happenings: null };
+  const told: Pick<Steered, "going" | "look" | "hands"> = {
+    going: null,
+    look: ahead(),
+    hands: [idle(), idle()],
+  };
+  return {
+    playback,
+    acting: noAct(model, playback),
+    lock: newLock(),
+    standing: notYet(),
+    command,
+    target: [0, 0, facing],
+    ...told,
+    happenings: null,
+  };
 }
 
 /** Set where a figure goes from now on, off any path: a command, and the target that its gait makes of it. */
 export function tell(figure: Steered, command: Command, target: Target): void {
-  const changed = target.some((value, i) => Math.abs(value - figure.target[i]!) > 1e-4) || command.gait !== figure.command.gait;
+  const changed =
+    target.some((value, i) => Math.abs(value - figure.target[i]!) > 1e-4) ||
+    command.gait !== figure.command.gait;
   if (changed) hasten(figure.playback);
   Object.assign(figure, { command, target, going: null });
 }
@@ -62,12 +77,19 @@ export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, ra
   const stood = holdFeet ? kept(figure.standing, played, playback, root, target, whole, dt) : played;
   const pose = laid(model, acting, stood, playback, root, changed);
   if (whole && !command.speed) stand(figure);
-  return guided(figure, holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), how, dt) : pose, dt);
+  return guided(
+    figure,
+    holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), how, dt) : pose,
+    dt,
+  );
 }
 
 /** A pose with head and arms as the figure is told. */
 function guided({ look, hands }: Steered, pose: Played, seconds: number): Played {
-  return hands.reduce((found, hand, side) => reached(hand, side, found, seconds), looked(look, pose, seconds));
+  return hands.reduce(
+    (found, hand, side) => reached(hand, side, found, seconds),
+    looked(look, pose, seconds),
+  );
 }
 
 /** Who acts with the whole body and is told to stand goes on standing as it does then. */

@@ -75,7 +75,9 @@ export class Steerer {
   /** Velocity over the ground (forward, left, turn), speed, and how much each foot stands, of the row as recorded. */
   private moves({ row, part }: Playback): number[] {
     const { moves } = this.matcher.tables;
-    return [0, 1, 2, 3, 4, 5].map((i) => moves[6 * row + i]! + part * (moves[6 * row + 6 + i]! - moves[6 * row + i]!));
+    return [0, 1, 2, 3, 4, 5].map(
+      (i) => moves[6 * row + i]! + part * (moves[6 * row + 6 + i]! - moves[6 * row + i]!),
+    );
   }
 
   /** By how much hips and legs are turned towards where the springs go, a tick later; by nothing if the row stands or goes elsewhere. */
@@ -94,7 +96,12 @@ export class Steerer {
   /** The next root, rate of playback and stride of the legs, of a figure that creeps or does not. */
   private move(figure: Playback, moves: number[], creeps: boolean): void {
     const { how, dt } = this.matcher;
-    const { root: [x, z, facing], rate, spring, mirror } = figure;
+    const {
+      root: [x, z, facing],
+      rate,
+      spring,
+      mirror,
+    } = figure;
     const recorded = moves[3]!;
     const side = mirror ? -1 : 1;
     const pace = Math.hypot(spring[0], spring[1]);
@@ -104,7 +111,9 @@ export class Steerer {
     const by = rate * dt * stride;
     const [forward, left, turn] = [moves[0]! * by, side * moves[1]! * by, side * moves[2]! * rate * dt];
     const error = wrapped(spring[2] - facing);
-    const most = (how.turn_still + how.turn_moving * Math.min(pace, how.turn_speed)) * dt + how.turn_turning * Math.abs(turn);
+    const most =
+      (how.turn_still + how.turn_moving * Math.min(pace, how.turn_speed)) * dt +
+      how.turn_turning * Math.abs(turn);
     const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / how.turn)), -most, most));
     const [sin, cos] = [Math.sin(facing + figure.warp), Math.cos(facing + figure.warp)];
     const [stepX, stepZ] = [sin * forward + cos * left, cos * forward - sin * left];
@@ -141,7 +150,8 @@ export class Steerer {
     for (let k = 0; k < codes.length; k += 4) {
       const [a, b, c, d] = [codes[k]!, codes[k + 1]!, codes[k + 2]!, codes[k + 3]!];
       for (let i = 0, at = k * count; i < count; i++, at++) {
-        values[i]! += a * basis[at]! + b * basis[at + count]! + c * basis[at + 2 * count]! + d * basis[at + 3 * count]!;
+        values[i]! +=
+          a * basis[at]! + b * basis[at + count]! + c * basis[at + 2 * count]! + d * basis[at + 3 * count]!;
       }
     }
     const rotations: Quaternion[] = [];
@@ -172,7 +182,12 @@ export function between(pose: Played, other: Played, part: number): Played {
   const rotations = pose.rotations.map(([a, b, c, d], at): Quaternion => {
     const [e, f, g, h] = other.rotations[at]!;
     const side = a * e + b * f + c * g + d * h < 0 ? -1 : 1;
-    const found: Quaternion = [mixed(a, side * e), mixed(b, side * f), mixed(c, side * g), mixed(d, side * h)];
+    const found: Quaternion = [
+      mixed(a, side * e),
+      mixed(b, side * f),
+      mixed(c, side * g),
+      mixed(d, side * h),
+    ];
     const size = Math.hypot(...found);
     return [found[0] / size, found[1] / size, found[2] / size, found[3] / size];
   });

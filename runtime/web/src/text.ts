@@ -22,10 +22,16 @@ export class Vocabulary {
     /** Further words, whose ids go on, each with the one of `words` that is nearest to it. */
     private readonly common: Record<string, string> = {},
   ) {
-    if (`${words.slice(0, 4)}` !== "PAD,SOS,EOS,UNK" || rules.rules !== 1) throw new BundleError("its vocabulary is damaged");
+    if (`${words.slice(0, 4)}` !== "PAD,SOS,EOS,UNK" || rules.rules !== 1)
+      throw new BundleError("its vocabulary is damaged");
     const every = [...words, ...Object.keys(common)];
     this.ids = new Map(every.map((word, id) => [word, id]));
-    this.stems = new Map(every.slice(UNK! + 1).reverse().map((word) => [stem(word), word]));
+    this.stems = new Map(
+      every
+        .slice(UNK! + 1)
+        .reverse()
+        .map((word) => [stem(word), word]),
+    );
     const wrong = Object.keys(rules.spelling).sort((a, b) => b.length - a.length);
     this.misspelt = new RegExp(`(?<![\\p{L}\\p{N}_])(${wrong.join("|") || "(?!)"})(?![\\p{L}\\p{N}_])`, "gu");
   }
@@ -33,15 +39,20 @@ export class Vocabulary {
   /** The ids of a sentence's words, and the words that are unknown; TextError where there is none that is known. */
   encode(sentence: string): { ids: number[]; unknown: string[] } {
     if (sentence.length > VOCABULARY.MAX_LETTERS) {
-      throw new TextError(`the sentence has ${sentence.length} letters, but at most ${VOCABULARY.MAX_LETTERS} are allowed`);
+      throw new TextError(
+        `the sentence has ${sentence.length} letters, but at most ${VOCABULARY.MAX_LETTERS} are allowed`,
+      );
     }
     const words = this.split(sentence);
     if (!words.length) throw new TextError(`the sentence ${JSON.stringify(sentence)} has no words`);
     if (words.length > VOCABULARY.MAX_WORDS) {
-      throw new TextError(`the sentence has ${words.length} words, but at most ${VOCABULARY.MAX_WORDS} are allowed`);
+      throw new TextError(
+        `the sentence has ${words.length} words, but at most ${VOCABULARY.MAX_WORDS} are allowed`,
+      );
     }
     const unknown = words.filter((word) => !this.meant(word));
-    if (unknown.length === words.length) throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);
+    if (unknown.length === words.length)
+      throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);
     return { ids: words.map((word) => this.ids.get(this.meant(word)) ?? UNK!), unknown };
   }
 
@@ -49,7 +60,9 @@ export class Vocabulary {
   meant(word: string): string {
     if (this.ids.has(word) || [...word].length < 4) return this.ids.has(word) ? word : "";
     const common = Object.keys(this.common); // without them "torches" were read as "touches"
-    return this.stems.get(stem(word)) ?? (common.length ? corrected(word, this.words.slice(UNK! + 1), common) : "");
+    return (
+      this.stems.get(stem(word)) ?? (common.length ? corrected(word, this.words.slice(UNK! + 1), common) : "")
+    );
   }
 
   /** The one of `words` that a word is, or that is nearest to it; "" where there is none. */
@@ -66,7 +79,11 @@ export class Vocabulary {
   /** The sentence of ids, without PAD, SOS, EOS and UNK. */
   decode(ids: Iterable<number>): string {
     const { numbers, spelled, point } = this.rules;
-    const small = new Map(Object.entries(numbers).filter(([, value]) => value <= spelled).map(([word, value]) => [`${value}`, word]));
+    const small = new Map(
+      Object.entries(numbers)
+        .filter(([, value]) => value <= spelled)
+        .map(([word, value]) => [`${value}`, word]),
+    );
     return Array.from(ids, (id) => (id > UNK! ? this.words[id]! : ""))
       .join(" ")
       .replace(/(?<=\d) (?=\d)/g, "")
@@ -92,7 +109,7 @@ export class Vocabulary {
 
   private withDigits(words: string[]): string[] {
     const found: string[] = [];
-    for (let at = 0; at < words.length; ) {
+    for (let at = 0; at < words.length;) {
       const [value, used] = this.number(words.slice(at, at + 5));
       found.push(used ? `${value}` : words[at]!);
       at += used || 1;
@@ -111,8 +128,12 @@ export class Vocabulary {
   }
 
   private belowHundred(words: string[]): [number, number] {
-    const [first, second] = words.map((word) => (Object.hasOwn(this.rules.numbers, word) ? this.rules.numbers[word] : undefined));
+    const [first, second] = words.map((word) =>
+      Object.hasOwn(this.rules.numbers, word) ? this.rules.numbers[word] : undefined,
+    );
     if (first === undefined) return [0, 0];
-    return first >= 20 && second !== undefined && second > 0 && second < 10 ? [first + second, 2] : [first, 1];
+    return first >= 20 && second !== undefined && second > 0 && second < 10
+      ? [first + second, 2]
+      : [first, 1];
   }
 }

@@ -62,7 +62,9 @@ function jointTracks(motion: Motion): Track[] {
     const node = (skeleton.nodes?.[at]?.name ?? name).replace(/\s/g, "_").replace(/[[\].:/]/g, "");
     const moving = at === 0 || translations.some((row) => row[at] !== offset);
     const turns = () => nearby(rotations.map((row) => turned(skeleton, at, row[at]!)));
-    const turn = name.endsWith(SKELETON.END_SUFFIX) ? [] : [track(`${node}.quaternion`, "quaternion", fps, turns())];
+    const turn = name.endsWith(SKELETON.END_SUFFIX)
+      ? []
+      : [track(`${node}.quaternion`, "quaternion", fps, turns())];
     const moves = () => translations.map((row) => placed(skeleton, at, row[at]!));
     return moving ? [...turn, track(`${node}.position`, "vector", fps, moves())] : turn;
   });
@@ -77,7 +79,10 @@ function turned({ nodes }: Skeleton, at: number, turn: Quaternion): Quaternion {
 function placed({ nodes, joints }: Skeleton, at: number, move: Vector): Vector {
   const above = nodes?.[at]?.above;
   if (!above) return move;
-  return times(rotated(inverse(above.turn), joints[at]!.parent < 0 ? minus(move, above.place) : move), 1 / above.scale);
+  return times(
+    rotated(inverse(above.turn), joints[at]!.parent < 0 ? minus(move, above.place) : move),
+    1 / above.scale,
+  );
 }
 
 function avatarTracks({ fps, rotations, translations }: Motion, { humanoid, meta }: Avatar): Track[] {
@@ -85,14 +90,24 @@ function avatarTracks({ fps, rotations, translations }: Motion, { humanoid, meta
   const sign = meta.metaVersion === "0" ? -1 : 1;
   const node = (bone: string) => humanoid.getNormalizedBoneNode(bone as never)?.name;
   const [hips, height] = [node("hips"), humanoid.normalizedRestPose.hips?.position?.[1]];
-  if (hips === undefined || height === undefined) throw new MotionError("this avatar has no hips: a VRM humanoid is needed");
+  if (hips === undefined || height === undefined)
+    throw new MotionError("this avatar has no hips: a VRM humanoid is needed");
   const tracks = BONES.flatMap((bone) => {
     const [name, at] = [node(bone), HUMANOID.index(bone)];
-    const turns = rotations.map((row): Quaternion => [sign * row[at]![0], row[at]![1], sign * row[at]![2], row[at]![3]]);
+    const turns = rotations.map((row): Quaternion => [
+      sign * row[at]![0],
+      row[at]![1],
+      sign * row[at]![2],
+      row[at]![3],
+    ]);
     return name === undefined ? [] : [track(`${name}.quaternion`, "quaternion", fps, nearby(turns))];
   });
   const scale = height / HUMANOID.joints[0]!.offset[1];
-  const moves = translations.map((row): Vector => [sign * scale * row[0]![0], scale * row[0]![1], sign * scale * row[0]![2]]);
+  const moves = translations.map((row): Vector => [
+    sign * scale * row[0]![0],
+    scale * row[0]![1],
+    sign * scale * row[0]![2],
+  ]);
   return [...tracks, track(`${hips}.position`, "vector", fps, moves)];
 }
 

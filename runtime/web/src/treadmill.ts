@@ -39,7 +39,11 @@ export function withTravel(motion: Motion): Motion {
   const root = found.translations.map((moves) => moves[0]!);
   const path = pathOf(found);
   const translations = motion.translations.map((moves, at) => {
-    const laid: Vector = [path[at]![0] - root[at]![0] + root[0]![0], 0, path[at]![1] - root[at]![2] + root[0]![2]];
+    const laid: Vector = [
+      path[at]![0] - root[at]![0] + root[0]![0],
+      0,
+      path[at]![1] - root[at]![2] + root[0]![2],
+    ];
     return [plus(moves[0]!, toFile(laid)), ...moves.slice(1)];
   });
   return checked({ ...motion, translations, travels: true });
@@ -49,14 +53,20 @@ export function withTravel(motion: Motion): Motion {
 function seen(motion: Motion): { motion: Motion; toFile: (path: Vector) => Vector } {
   if (isHumanoid(motion.skeleton)) return { motion, toFile: (path) => path };
   const { motion: found, figure, turn } = toHumanoid(motion);
-  return { motion: found, toFile: (path) => times(rotated(inverse(turn), path), figure.fitted.leg / LEG_LENGTH) };
+  return {
+    motion: found,
+    toFile: (path) => times(rotated(inverse(turn), path), figure.fitted.leg / LEG_LENGTH),
+  };
 }
 
 /** Whether, before the figure is measured, the first joint that moves goes too far: most recordings end here. */
 function goes({ skeleton, translations }: Motion): boolean {
   for (const joint of skeleton.joints.keys()) {
-    const [x, y, z] = [0, 1, 2].map((axis) => spread(translations.map((moves) => moves[joint]![axis]!))) as Vector;
-    if (x || y || z) return Math.hypot(x, z) > 1.5 * treadmillSettings.room * (skeleton.height / CONTACTS.ADULT_HEIGHT);
+    const [x, y, z] = [0, 1, 2].map((axis) =>
+      spread(translations.map((moves) => moves[joint]![axis]!)),
+    ) as Vector;
+    if (x || y || z)
+      return Math.hypot(x, z) > 1.5 * treadmillSettings.room * (skeleton.height / CONTACTS.ADULT_HEIGHT);
   }
   return false;
 }
@@ -65,28 +75,53 @@ function goes({ skeleton, translations }: Motion): boolean {
 function strides(motion: Motion): boolean {
   const { fps } = motion;
   const root = motion.translations.map((moves) => moves[0]!);
-  if (Math.hypot(...[0, 2].map((axis) => spread(root.map((place) => place[axis]!)))) > treadmillSettings.room) return false;
+  if (Math.hypot(...[0, 2].map((axis) => spread(root.map((place) => place[axis]!)))) > treadmillSettings.room)
+    return false;
   const soles = solePoints(worldOf(motion));
   const ground = groundUnder(soles);
-  const slid = averaged(velocityByFeet(soles.map(flat), soles.map((row) => row.map((point) => point[1] - ground)), fps), treadmillSettings.span * fps);
-  const went = averaged(root.slice(1).map((place, at) => flat([times(minus(place, root[at]!), fps)])[0]!), treadmillSettings.span * fps);
+  const slid = averaged(
+    velocityByFeet(
+      soles.map(flat),
+      soles.map((row) => row.map((point) => point[1] - ground)),
+      fps,
+    ),
+    treadmillSettings.span * fps,
+  );
+  const went = averaged(
+    root.slice(1).map((place, at) => flat([times(minus(place, root[at]!), fps)])[0]!),
+    treadmillSettings.span * fps,
+  );
   const way = (velocity: Plane) => velocity.reduce((sum, one) => sum + Math.hypot(...one), 0);
-  const [left, right] = [0, 3].map((first) => slid.map(([x, z], at) => {
-    const foot = minus(mean(soles[at + 1]!.slice(first, first + 3)), root[at + 1]!);
-    return (foot[0] * x + foot[2] * z) / Math.max(Math.hypot(x, z), 1e-9);
-  })) as [number[], number[]];
+  const [left, right] = [0, 3].map((first) =>
+    slid.map(([x, z], at) => {
+      const foot = minus(mean(soles[at + 1]!.slice(first, first + 3)), root[at + 1]!);
+      return (foot[0] * x + foot[2] * z) / Math.max(Math.hypot(x, z), 1e-9);
+    }),
+  ) as [number[], number[]];
   const apart = left.map((one, at) => one - right[at]!);
   const hips = average(root.map((place) => place[1])) - average(soles.flat().map((point) => point[1]));
-  return way(slid) >= treadmillSettings.speed * slid.length && way(went) <= treadmillSettings.share * way(slid) && Math.sqrt(together(apart, apart)) >= treadmillSettings.stride
-    && together(left, right) < 0 && hips >= treadmillSettings.hips;
+  return (
+    way(slid) >= treadmillSettings.speed * slid.length &&
+    way(went) <= treadmillSettings.share * way(slid) &&
+    Math.sqrt(together(apart, apart)) >= treadmillSettings.stride &&
+    together(left, right) < 0 &&
+    hips >= treadmillSettings.hips
+  );
 }
 
 /** The path over the ground of a motion of the humanoid whose feet do not slide, from the origin. */
 function pathOf(motion: Motion): Plane {
   const { fps } = motion;
   const points = worldOf(motion).places.map((pose) => FEET.map((joint) => minus(pose[joint]!, pose[0]!)));
-  const heights = heightsByFeet(points.map((row) => -Math.min(...row.map((point) => point[1]))), fps);
-  const velocity = velocityByFeet(points.map(flat), points.map((row, at) => row.map((point) => point[1] + heights[at]![0]!)), fps);
+  const heights = heightsByFeet(
+    points.map((row) => -Math.min(...row.map((point) => point[1]))),
+    fps,
+  );
+  const velocity = velocityByFeet(
+    points.map(flat),
+    points.map((row, at) => row.map((point) => point[1] + heights[at]![0]!)),
+    fps,
+  );
   const path: Plane = [[0, 0]];
   velocity.forEach(([x, z], at) => path.push([path[at]![0] + x / fps, path[at]![1] + z / fps]));
   return path;

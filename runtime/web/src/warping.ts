@@ -36,7 +36,11 @@ export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
   SIDES.forEach((_, side) => {
     const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);
     const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
-    const led: [number, number, number] = [(x - OFFSETS[side]![0]![0]) * (stride - 1), 0, (z - UNDER) * (stride - 1)];
+    const led: [number, number, number] = [
+      (x - OFFSETS[side]![0]![0]) * (stride - 1),
+      0,
+      (z - UNDER) * (stride - 1),
+    ];
     reach(found, side, rotations[0]!, leg, led);
   });
   return found;

@@ -22,7 +22,9 @@ export function openZip(bytes: Uint8Array): Archive {
     for (let left = view.getUint16(end + 10, true); left > 0; left--) {
       if (view.getUint32(at, true) !== ENTRY) throw new RangeError();
       const length = view.getUint16(at + 28, true);
-      const name = new TextDecoder("utf-8", { fatal: true }).decode(bytes.subarray(at + 46, at + 46 + length));
+      const name = new TextDecoder("utf-8", { fatal: true }).decode(
+        bytes.subarray(at + 46, at + 46 + length),
+      );
       if (entries.has(name) || !/^[A-Za-z0-9_][A-Za-z0-9_.-]*$/.test(name)) {
         throw new BundleError(`the zip has a file of an improper name, ${JSON.stringify(name.slice(0, 60))}`);
       }
@@ -41,7 +43,8 @@ export function openZip(bytes: Uint8Array): Archive {
   async function read(name: string, limit: number): Promise<Uint8Array> {
     const entry = entries.get(name);
     if (!entry) throw new BundleError(`the file ${JSON.stringify(name)} is missing`);
-    if (entry.at + 30 > bytes.length || view.getUint32(entry.at, true) !== LOCAL) throw new BundleError(`${name}: damaged`);
+    if (entry.at + 30 > bytes.length || view.getUint32(entry.at, true) !== LOCAL)
+      throw new BundleError(`${name}: damaged`);
     const start = entry.at + 30 + view.getUint16(entry.at + 26, true) + view.getUint16(entry.at + 28, true);
     const packed = bytes.subarray(start, start + entry.packed);
     if (entry.method === 0) return bounded(name, [packed], limit);
@@ -52,7 +55,9 @@ export function openZip(bytes: Uint8Array): Archive {
 }
 
 async function inflate(name: string, packed: Uint8Array, limit: number): Promise<Uint8Array> {
-  const unpacked = new Blob([packed as BlobPart]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  const unpacked = new Blob([packed as BlobPart])
+    .stream()
+    .pipeThrough(new DecompressionStream("deflate-raw"));
   const reader = unpacked.getReader();
   const chunks: Uint8Array[] = [];
   let size = 0;

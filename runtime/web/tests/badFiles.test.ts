@@ -2,7 +2,17 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import test from "node:test";
-import { clipsOf, FormatError, fromHumanoid, holdFeet, MotionError, readBVH, readGLB, Skeleton, toHumanoid } from "../src/index.js";
+import {
+  clipsOf,
+  FormatError,
+  fromHumanoid,
+  holdFeet,
+  MotionError,
+  readBVH,
+  readGLB,
+  Skeleton,
+  toHumanoid,
+} from "../src/index.js";
 import { rateOf } from "../src/gltfMotion.js";
 
 const mixamo = readFileSync("../../tests/runtime/skeletons/mixamo.bvh", "utf8");
@@ -24,7 +34,12 @@ test("BVH texts that are wrong are refused with the line", () => {
     [mixamo.replace("}", ""), /does not belong|MOTION is missing/],
     [Uint8Array.from([66, 86, 72, 0, 1]), /not a text file/],
   ];
-  for (const [content, reason] of wrong) assert.throws(() => readBVH(content), (error) => error instanceof FormatError && reason.test(error.message), String(reason));
+  for (const [content, reason] of wrong)
+    assert.throws(
+      () => readBVH(content),
+      (error) => error instanceof FormatError && reason.test(error.message),
+      String(reason),
+    );
 });
 
 test("files cut short at any place are refused or read, but nothing else is thrown", () => {
@@ -39,8 +54,14 @@ test("files cut short at any place are refused or read, but nothing else is thro
 
 test("figures that are no human's are refused with the reason", () => {
   const read = (text: string) => toHumanoid(readBVH(text));
-  assert.throws(() => read(mixamo.replaceAll(/(JOINT|ROOT) \S+/g, (_, kind) => `${kind} x`)), /give a map of bones and joints/);
-  assert.throws(() => read(mixamo.replaceAll("LeftFoot", "LeftSole").replaceAll("LeftToe", "LeftTip")), /no joint was found for leftFoot.*one side/);
+  assert.throws(
+    () => read(mixamo.replaceAll(/(JOINT|ROOT) \S+/g, (_, kind) => `${kind} x`)),
+    /give a map of bones and joints/,
+  );
+  assert.throws(
+    () => read(mixamo.replaceAll("LeftFoot", "LeftSole").replaceAll("LeftToe", "LeftTip")),
+    /no joint was found for leftFoot.*one side/,
+  );
   assert.throws(() => read(mixamo.replaceAll(/OFFSET .*/g, "OFFSET 0 0 0")), /length zero/);
   const large = readBVH(mixamo);
   const skeleton = new Skeleton(large.skeleton.joints, 1);
@@ -49,14 +70,24 @@ test("figures that are no human's are refused with the reason", () => {
   assert.throws(() => toHumanoid({ ...large, fps: NaN }), /frame rate/);
   assert.throws(() => toHumanoid(large, { hips: "Nobody" }), /no joint "Nobody"/);
   assert.throws(() => toHumanoid(large, { tail: "mixamorig:Hips" }), /"tail" is not a bone/);
-  for (const wrong of [() => fromHumanoid(large, large), () => holdFeet(large)]) assert.throws(wrong, MotionError);
+  for (const wrong of [() => fromHumanoid(large, large), () => holdFeet(large)])
+    assert.throws(wrong, MotionError);
 });
 
 test("a map names joints that no table knows", () => {
   const { joints, spine, neck } = toHumanoid(readBVH(mixamo)).figure.fitted.body.map;
-  const renamed = readBVH(mixamo.replaceAll(/(JOINT|ROOT) (\S+)/g, (_, kind, name) => `${kind} q${name.replace("mixamorig:", "")}q`));
+  const renamed = readBVH(
+    mixamo.replaceAll(
+      /(JOINT|ROOT) (\S+)/g,
+      (_, kind, name) => `${kind} q${name.replace("mixamorig:", "")}q`,
+    ),
+  );
   const name = (at: number) => renamed.skeleton.names[at]!;
-  const map = { ...Object.fromEntries(Object.entries(joints).map(([bone, at]) => [bone, name(at)])), spine: spine.map(name), neck: neck.map(name) };
+  const map = {
+    ...Object.fromEntries(Object.entries(joints).map(([bone, at]) => [bone, name(at)])),
+    spine: spine.map(name),
+    neck: neck.map(name),
+  };
   assert.deepEqual(toHumanoid(renamed, map).motion.rotations, toHumanoid(readBVH(mixamo)).motion.rotations);
 });
 
@@ -97,7 +128,10 @@ test("sparse arrays of glTF are read as plain ones", () => {
 test("frame rates of keys are read as written", () => {
   for (const fps of [23.976, 24, 25, 29.97, 30, 59.94, 60, 119.88, 120]) {
     const times = Array.from({ length: 3000 }, (_, frame) => Math.fround(frame / fps));
-    assert.equal(rateOf([times, times.filter((_, at) => at % 3 === 0), times.filter((_, at) => at % 7 !== 3)]), fps);
+    assert.equal(
+      rateOf([times, times.filter((_, at) => at % 3 === 0), times.filter((_, at) => at % 7 !== 3)]),
+      fps,
+    );
   }
   assert.equal(rateOf([[0, 1], [5]]), 30);
 });
@@ -111,29 +145,72 @@ test("glTF files that are wrong are refused by name", () => {
     [avatar.subarray(0, 15), /no JSON chunk/],
     [avatar.subarray(0, avatar.length - 100), /cut short/],
     [changed((d) => (d.asset.version = "1.0")), /not a file of glTF 2.0/],
-    [changed((d) => { d.extensions = { VRMC_vrm: {} }; d.skins = []; d.animations = []; }), /no skeleton: expected a skin with joints or a VRM humanoid/],
-    [changed((d) => { for (const [bone] of Object.entries(bones(d))) bones(d)[bone] = { node: 1e9 }; }), /joints that are not nodes/],
+    [
+      changed((d) => {
+        d.extensions = { VRMC_vrm: {} };
+        d.skins = [];
+        d.animations = [];
+      }),
+      /no skeleton: expected a skin with joints or a VRM humanoid/,
+    ],
+    [
+      changed((d) => {
+        for (const [bone] of Object.entries(bones(d))) bones(d)[bone] = { node: 1e9 };
+      }),
+      /joints that are not nodes/,
+    ],
     [changed((d) => d.nodes[3].children.push(0)), /cycle|not a tree/],
     [changed((d) => (d.nodes = Array(30000).fill({}))), /30000 nodes/],
     [changed((d) => (d.accessors[d.animations[0].samplers[0].output].count = 2 ** 40)), /beyond its buffer/],
-    [changed((d) => (d.accessors[d.animations[0].samplers[0].output].type = "VEC9")), /broken glTF file|beyond/],
+    [
+      changed((d) => (d.accessors[d.animations[0].samplers[0].output].type = "VEC9")),
+      /broken glTF file|beyond/,
+    ],
     [changed((d) => (d.bufferViews = 7)), /broken glTF file/],
-    [changed((d) => { const accessor = d.accessors[d.animations[0].samplers[0].output]; delete accessor.bufferView; accessor.count = 2 ** 40; }), /its arrays overlap/],
+    [
+      changed((d) => {
+        const accessor = d.accessors[d.animations[0].samplers[0].output];
+        delete accessor.bufferView;
+        accessor.count = 2 ** 40;
+      }),
+      /its arrays overlap/,
+    ],
     [changed((d) => sparsely(d, { count: 1e9 })), /beyond its buffer/],
     [changed((d) => sparsely(d, { count: -1 })), /beyond its buffer/],
-    [changed((d) => sparsely(d, { indices: { bufferView: 0, componentType: 5126 } })), /sparse indices are not unsigned/],
-    [changed((d) => sparsely(d, { indices: { bufferView: 0, componentType: 5125 } })), /sparse indices do not rise/],
+    [
+      changed((d) => sparsely(d, { indices: { bufferView: 0, componentType: 5126 } })),
+      /sparse indices are not unsigned/,
+    ],
+    [
+      changed((d) => sparsely(d, { indices: { bufferView: 0, componentType: 5125 } })),
+      /sparse indices do not rise/,
+    ],
     [changed((d) => sparsely(d, { indices: undefined })), /broken glTF file/],
     [changed((d) => (d.buffers[0].uri = "other.bin")), /is a file of its own/],
-    [changed((d) => (d.bufferViews.at(-1).extensions = { EXT_meshopt_compression: {} })), /packed by meshoptimizer/],
+    [
+      changed((d) => (d.bufferViews.at(-1).extensions = { EXT_meshopt_compression: {} })),
+      /packed by meshoptimizer/,
+    ],
   ];
   for (const [content, reason] of wrong) {
-    assert.throws(() => readGLB(content), (error) => error instanceof FormatError && reason.test(error.message), String(reason));
+    assert.throws(
+      () => readGLB(content),
+      (error) => error instanceof FormatError && reason.test(error.message),
+      String(reason),
+    );
   }
   assert.throws(() => readGLB(avatar, "dance"), /no clip "dance"/);
   assert.throws(() => clipsOf(avatar.subarray(0, 40)), FormatError);
-  const legless = readGLB(changed((d) => { for (const bone of Object.keys(bones(d))) if (/Leg|Foot|Toes/.test(bone)) delete bones(d)[bone]; }));
-  assert.throws(() => toHumanoid(legless), (error) => error instanceof MotionError && /no table|no joint was found for leftUpperLeg/.test(error.message));
+  const legless = readGLB(
+    changed((d) => {
+      for (const bone of Object.keys(bones(d))) if (/Leg|Foot|Toes/.test(bone)) delete bones(d)[bone];
+    }),
+  );
+  assert.throws(
+    () => toHumanoid(legless),
+    (error) =>
+      error instanceof MotionError && /no table|no joint was found for leftUpperLeg/.test(error.message),
+  );
 });
 
 test("a glTF file of which any byte was altered is read or refused, but nothing else is thrown", () => {

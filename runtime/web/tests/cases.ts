@@ -1,7 +1,18 @@
 /* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
 import { type NumberArray, rows } from "../src/arrays.js";
 import { Bundle, type TextTables } from "../src/bundle.js";
-import { actOf, ControlModel, DescribeModel, FillModel, GenerateModel, load, PredictModel, SearchModel, type Told, type Way } from "../src/index.js";
+import {
+  actOf,
+  ControlModel,
+  DescribeModel,
+  FillModel,
+  GenerateModel,
+  load,
+  PredictModel,
+  SearchModel,
+  type Told,
+  type Way,
+} from "../src/index.js";
 import { framesOf } from "../src/poses.js";
 import { Recorded } from "../src/random.js";
 import { Vocabulary } from "../src/text.js";
@@ -49,9 +60,16 @@ const graphs = ["describe", "generate", "predict", "fill", "search"].map((name) 
     const bundle = await Bundle.open(await read(name));
     const golden = await bundle.golden();
     for (const [role, spec] of Object.entries(bundle.manifest.graphs)) {
-      const inputs = Object.fromEntries(spec.inputs.map((input) => [input.name, golden.get(`${role}.in.${input.name}`)!]));
+      const inputs = Object.fromEntries(
+        spec.inputs.map((input) => [input.name, golden.get(`${role}.in.${input.name}`)!]),
+      );
       const outputs = await (await bundle.graph(role)).run(inputs);
-      for (const output of spec.outputs) close(outputs[output.name]!.data, golden.get(`${role}.out.${output.name}`)!.data, `${role} ${output.name}`);
+      for (const output of spec.outputs)
+        close(
+          outputs[output.name]!.data,
+          golden.get(`${role}.out.${output.name}`)!.data,
+          `${role} ${output.name}`,
+        );
     }
   },
 }));
@@ -62,16 +80,26 @@ async function describe(read: Read): Promise<void> {
   const { data, shape } = wanted("ids");
   const ids = found.map((one) => [...one.ids, ...Array<number>(shape[1]! - one.ids.length).fill(0)]);
   equal(ids.flat(), Array.from(data, Number), "ids");
-  close(found.map((one) => one.logProbability), wanted("log_probabilities").data, "log-probabilities");
+  close(
+    found.map((one) => one.logProbability),
+    wanted("log_probabilities").data,
+    "log-probabilities",
+  );
 }
 
 async function generate(read: Read): Promise<void> {
   const { model, wanted, run, golden } = await loaded(read, "generate", GenerateModel);
   equal(model.vocabulary.encode(String(run.text)).ids, Array.from(wanted("ids").data, Number), "ids");
-  const noise = new Recorded(rows(golden.get("run.in.uniform") as NumberArray<Float32Array>)[Symbol.iterator]());
-  const [best] = await model.drawn(String(run.text), Array(Number(run.hypotheses)).fill(noise), { seconds: Number(run.seconds) });
+  const noise = new Recorded(
+    rows(golden.get("run.in.uniform") as NumberArray<Float32Array>)[Symbol.iterator](),
+  );
+  const [best] = await model.drawn(String(run.text), Array(Number(run.hypotheses)).fill(noise), {
+    seconds: Number(run.seconds),
+  });
   const { mean, std } = model.manifest.motion;
-  const normalised = best!.frames.map((frame) => frame.map((value, at) => (std[at] ? Math.max(-50, Math.min(50, (value - mean[at]!) / std[at]!)) : 0)));
+  const normalised = best!.frames.map((frame) =>
+    frame.map((value, at) => (std[at] ? Math.max(-50, Math.min(50, (value - mean[at]!) / std[at]!)) : 0)),
+  );
   close(flat(normalised), wanted("frames").data, "frames");
 }
 
@@ -82,7 +110,11 @@ async function predict(read: Read): Promise<void> {
 
 async function fill(read: Read): Promise<void> {
   const { model, frames, wanted, run } = await loaded(read, "fill", FillModel);
-  close(flat(await model.fill(frames("past"), frames("after"), Number(run.frames))), wanted("filled").data, "filled");
+  close(
+    flat(await model.fill(frames("past"), frames("after"), Number(run.frames))),
+    wanted("filled").data,
+    "filled",
+  );
 }
 
 async function search(read: Read): Promise<void> {
@@ -90,11 +122,19 @@ async function search(read: Read): Promise<void> {
   close(await model.embedMotion(frames("frames")), wanted("motion").data, "motion");
   const vector = await model.embedText(String(run.text));
   close(vector, wanted("text").data, "text");
-  equal(model.nearest(vector, [await model.embedMotion(frames("frames")), vector], 1)[0]!.index, 1, "nearest");
+  equal(
+    model.nearest(vector, [await model.embedMotion(frames("frames")), vector], 1)[0]!.index,
+    1,
+    "nearest",
+  );
 }
 
 /** Some of the frames, as python.json has them. */
-function shown(frames: ArrayLike<number>[], wanted: { count: number; every: number; frames: number[][] }, what: string): void {
+function shown(
+  frames: ArrayLike<number>[],
+  wanted: { count: number; every: number; frames: number[][] },
+  what: string,
+): void {
   equal(frames.length, wanted.count, `${what}, how many frames`);
   close(flat(frames.filter((_, at) => at % wanted.every === 0)), wanted.frames.flat(), what);
 }
@@ -105,7 +145,11 @@ async function seeds(read: Read): Promise<void> {
   shown(walk!.frames, python.walk, "walk");
   const jumps = await model.generate("someone jumps twice", { seed: 11, hypotheses: 2 });
   jumps.forEach((one, at) => shown(one.frames, python.jumps[at]!, `jump ${at}`));
-  shown((await model.story("a person runs", { after: walk!.frames, seed: 2, seconds: 1.5 })).frames, python.after, "after");
+  shown(
+    (await model.story("a person runs", { after: walk!.frames, seed: 2, seconds: 1.5 })).frames,
+    python.after,
+    "after",
+  );
   for (const [text, parts] of Object.entries(python.parts)) equal(await model.parts(text), parts, text);
   for (const { text, confidence, ...rest } of python.understood) {
     const { confidence: found, ...other } = await model.understood(text);
@@ -124,10 +168,22 @@ async function taken(read: Read): Promise<void> {
     for (const [text, wanted] of Object.entries(python.taken)) {
       const found = await model.generate(text, { hypotheses: 2, seed: 1, seconds: 1 });
       const own = found.flatMap((one) => [one, ...("passages" in one ? one.passages : [])]);
-      equal(own.map(({ action, lacking }) => [action, lacking]), wanted.map(([action, lacking]) => [action, lacking]), text);
-      close(own.map((one) => one.confidence), wanted.map((one) => one[2]), text);
+      equal(
+        own.map(({ action, lacking }) => [action, lacking]),
+        wanted.map(([action, lacking]) => [action, lacking]),
+        text,
+      );
+      close(
+        own.map((one) => one.confidence),
+        wanted.map((one) => one[2]),
+        text,
+      );
       const refused = await model.generate(text, { seconds: 1, strict: true }).then(() => "", String);
-      equal(refused.includes(", which leaves out '"), own.some((one) => one.lacking.length > 0), `${text}: ${refused}`);
+      equal(
+        refused.includes(", which leaves out '"),
+        own.some((one) => one.lacking.length > 0),
+        `${text}: ${refused}`,
+      );
     }
   } finally {
     console.warn = warn;
@@ -141,25 +197,57 @@ async function story(read: Read): Promise<void> {
   const settings = { seed: 5, seconds: [1.3, null], stand: "both" as const };
   const { frames, passages } = await model.story(texts, settings);
   shown(frames, python.story, "story");
-  equal(passages.map(({ text }) => text), python.story.passages.map(({ text }) => text), "passages");
-  close(passages.flatMap(({ start, stop }) => [start, stop]), python.story.passages.flatMap(({ start, stop }) => [start, stop]), "passages");
+  equal(
+    passages.map(({ text }) => text),
+    python.story.passages.map(({ text }) => text),
+    "passages",
+  );
+  close(
+    passages.flatMap(({ start, stop }) => [start, stop]),
+    python.story.passages.flatMap(({ start, stop }) => [start, stop]),
+    "passages",
+  );
   const pieces: Float32Array[][] = [];
   for await (const piece of model.stream(texts, settings)) pieces.push(piece);
   if (pieces.length < 10) throw new Error(`a stream of ${pieces.length} pieces`);
-  equal(pieces.flat().map((frame) => [...frame]), frames.map((frame) => [...frame]), "stream");
+  equal(
+    pieces.flat().map((frame) => [...frame]),
+    frames.map((frame) => [...frame]),
+    "stream",
+  );
 }
 
 async function agreed(read: Read): Promise<void> {
   const { model, frames } = await loaded(read, "describe", DescribeModel);
   const found = await model.describe(frames("frames"), { draws: 60, seed: 4 });
-  equal(found.map(({ text }) => text), python.draws.map(({ text }) => text), "texts");
-  close(found.flatMap((one) => [one.logProbability, one.score]), python.draws.flatMap((one) => [one.logProbability, one.score]), "scores");
+  equal(
+    found.map(({ text }) => text),
+    python.draws.map(({ text }) => text),
+    "texts",
+  );
+  close(
+    found.flatMap((one) => [one.logProbability, one.score]),
+    python.draws.flatMap((one) => [one.logProbability, one.score]),
+    "scores",
+  );
   close([await model.score(frames("frames"), "a person walks")], [python.score], "score");
   for (const [at, wanted] of python.answered.entries()) {
     const given = at ? frames("frames").slice(0, 4) : frames("frames"); // too short to be told
-    const told = (await model.describe(given, { beams: 3 })).map(({ text, score, confident }) => ({ text, score, confident }));
-    equal(told.map(({ text, confident }) => [text, confident]), wanted.map(({ text, confident }) => [text, confident]), "answers");
-    close(told.map(({ score }) => score), wanted.map(({ score }) => score), "probabilities");
+    const told = (await model.describe(given, { beams: 3 })).map(({ text, score, confident }) => ({
+      text,
+      score,
+      confident,
+    }));
+    equal(
+      told.map(({ text, confident }) => [text, confident]),
+      wanted.map(({ text, confident }) => [text, confident]),
+      "answers",
+    );
+    close(
+      told.map(({ score }) => score),
+      wanted.map(({ score }) => score),
+      "probabilities",
+    );
   }
 }
 
@@ -167,17 +255,33 @@ async function agreed(read: Read): Promise<void> {
 async function backwards(read: Read): Promise<void> {
   const { model } = await loaded(read, "describe", DescribeModel);
   const { frames, text } = python.backwards;
-  equal((await model.describe(frames.map((row) => Float32Array.from(row)), { beams: 1 }))[0]!.text, text, "text");
+  equal(
+    (
+      await model.describe(
+        frames.map((row) => Float32Array.from(row)),
+        { beams: 1 },
+      )
+    )[0]!.text,
+    text,
+    "text",
+  );
 }
 
 async function expected(read: Read): Promise<void> {
   const { model, frames } = await loaded(read, "predict", PredictModel);
-  close(await model.expectedErrors(frames("frames")), python.expected.map((metres) => 100 * metres), "centimetres");
+  close(
+    await model.expectedErrors(frames("frames")),
+    python.expected.map((metres) => 100 * metres),
+    "centimetres",
+  );
 }
 
 async function long(read: Read): Promise<void> {
   const { model, frames } = await loaded(read, "search", SearchModel);
-  const many = Array(8).fill(frames("frames")).flat().slice(0, 25 * model.fps + 1);
+  const many = Array(8)
+    .fill(frames("frames"))
+    .flat()
+    .slice(0, 25 * model.fps + 1);
   close(await model.embedMotion(many), python.long, "vector");
 }
 
@@ -192,34 +296,59 @@ async function steersTargets(read: Read): Promise<void> {
 /** The calls of python.json, and some pictures of each, with the feet held and without. */
 async function steers(read: Read): Promise<void> {
   const { model } = await loaded(read, "control", ControlModel);
-  for (const [holdFeet, wanted] of [[false, python.steered], [true, python.held]] as const) {
+  for (const [holdFeet, wanted] of [
+    [false, python.steered],
+    [true, python.held],
+  ] as const) {
     const session = model.start({ characters: 2, holdFeet });
     const turn = actOf(model, "turn", python.acted.flat());
     type Go = Way & { points: number[][] | null };
     type Some = { who?: number[] };
     type Points = { points: number[] | number[][] | null };
-    type Call = { put?: number[][]; push?: number[]; control?: Told; act?: { who: number[]; upper?: boolean }; end?: Some; jump?: Some; look_at?: Some & Points; reach?: Some & Points & { hand: "left" | "right" }; keep_apart?: number | null; go_to?: Go; go_along?: Go };
-    const found = (python.steering as Call[]).flatMap(({ put, push, control, act, end, jump, keep_apart, go_to, go_along, look_at, reach }, call) => {
-      if (act) session.act(turn, act);
-      if (end) session.act(null, end);
-      if (jump) session.act("jump", jump);
-      if (look_at) session.lookAt(look_at.points, look_at);
-      if (reach) session.reach(reach.hand, reach.points, reach);
-      if (put) session.put(put);
-      if (push) session.push(push);
-      if (control) session.control(control);
-      if (keep_apart !== undefined) session.keepApart(keep_apart);
-      if (go_to) session.goTo(go_to.points, go_to);
-      if (go_along) session.goAlong(go_along.points!, go_along);
-      const pictures = Array.from({ length: 36 }, () => session.advance(1 / 48));
-      const happened = [0, 1].map((figure) => pictures.flatMap((poses) => poses[figure]!.events.map(({ kind, name }) => [kind, name ?? ""])));
-      if (holdFeet) equal(happened, python.happened[call], `events after call ${call}`);
-      return pictures.filter((_, at) => at % 12 === 0);
-    });
+    type Call = {
+      put?: number[][];
+      push?: number[];
+      control?: Told;
+      act?: { who: number[]; upper?: boolean };
+      end?: Some;
+      jump?: Some;
+      look_at?: Some & Points;
+      reach?: Some & Points & { hand: "left" | "right" };
+      keep_apart?: number | null;
+      go_to?: Go;
+      go_along?: Go;
+    };
+    const found = (python.steering as Call[]).flatMap(
+      ({ put, push, control, act, end, jump, keep_apart, go_to, go_along, look_at, reach }, call) => {
+        if (act) session.act(turn, act);
+        if (end) session.act(null, end);
+        if (jump) session.act("jump", jump);
+        if (look_at) session.lookAt(look_at.points, look_at);
+        if (reach) session.reach(reach.hand, reach.points, reach);
+        if (put) session.put(put);
+        if (push) session.push(push);
+        if (control) session.control(control);
+        if (keep_apart !== undefined) session.keepApart(keep_apart);
+        if (go_to) session.goTo(go_to.points, go_to);
+        if (go_along) session.goAlong(go_along.points!, go_along);
+        const pictures = Array.from({ length: 36 }, () => session.advance(1 / 48));
+        const happened = [0, 1].map((figure) =>
+          pictures.flatMap((poses) => poses[figure]!.events.map(({ kind, name }) => [kind, name ?? ""])),
+        );
+        if (holdFeet) equal(happened, python.happened[call], `events after call ${call}`);
+        return pictures.filter((_, at) => at % 12 === 0);
+      },
+    );
     equal(found.length, wanted.length, "pictures");
-    found.forEach((poses, at) => poses.forEach(({ ground, hips, rotations, contacts }, figure) => {
-      close([...ground, hips[1], ...Object.values(rotations).flat(), ...contacts], wanted[at]![figure]!, `figure ${figure} in picture ${at}, held: ${holdFeet}`);
-    }));
+    found.forEach((poses, at) =>
+      poses.forEach(({ ground, hips, rotations, contacts }, figure) => {
+        close(
+          [...ground, hips[1], ...Object.values(rotations).flat(), ...contacts],
+          wanted[at]![figure]!,
+          `figure ${figure} in picture ${at}, held: ${holdFeet}`,
+        );
+      }),
+    );
   }
 }
 
@@ -227,7 +356,8 @@ async function steers(read: Read): Promise<void> {
 async function words(): Promise<void> {
   const { vocabulary, rules, common, read, ids } = python.known;
   const known = new Vocabulary(vocabulary, rules as unknown as TextTables, common);
-  for (const [word, wanted] of Object.entries(read)) equal([known.meant(word), known.near(word)], wanted, word);
+  for (const [word, wanted] of Object.entries(read))
+    equal([known.meant(word), known.near(word)], wanted, word);
   equal(known.encode(Object.keys(read).join(" ")).ids, ids, "ids");
 }
 
@@ -235,9 +365,15 @@ async function words(): Promise<void> {
 async function searched(read: Read): Promise<void> {
   const { model, frames } = await loaded(read, "search", SearchModel);
   const all = frames("frames");
-  const parts = await Promise.all([all.slice(0, 10), all.slice(5), all].map((part) => model.embedMotion(part)));
+  const parts = await Promise.all(
+    [all.slice(0, 10), all.slice(5), all].map((part) => model.embedMotion(part)),
+  );
   const hits = await Promise.all([...python.searched.texts, all].map((query) => model.search(query, parts)));
-  equal(hits.map((row) => row.map(({ index, like }) => [index, like])), python.searched.hits, "hits");
+  equal(
+    hits.map((row) => row.map(({ index, like }) => [index, like])),
+    python.searched.hits,
+    "hits",
+  );
 }
 
 export const cases: Case[] = [

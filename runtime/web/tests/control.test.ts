@@ -23,33 +23,75 @@ test("what cannot be followed is refused, and changes nothing", () => {
     [{ direction: Infinity }, /direction must be finite/],
     [{ facing: "left" as unknown as number }, /facing must be finite/],
     [{ velocity: [1] }, /a velocity needs x, z/],
-    [{ velocity: [[1, 0], [0, NaN]] }, /a velocity must be finite/],
+    [
+      {
+        velocity: [
+          [1, 0],
+          [0, NaN],
+        ],
+      },
+      /a velocity must be finite/,
+    ],
     [{ velocity: [1, 0], speed: 1 }, /not both/],
   ];
   for (const [told, said] of refused) {
-    assert.throws(() => session.control(told), (error) => error instanceof ControlError && said.test(error.message), JSON.stringify(told));
+    assert.throws(
+      () => session.control(told),
+      (error) => error instanceof ControlError && said.test(error.message),
+      JSON.stringify(told),
+    );
   }
   assert.deepEqual(session.targets, before);
   for (const seconds of [-1, 1.5, NaN]) assert.throws(() => session.advance(seconds), ControlError);
   for (const characters of [0, 1.5, NaN, 1e6]) assert.throws(() => model.start({ characters }), ControlError);
   assert.throws(() => model.start({ gait: "fly" }), ControlError);
   assert.throws(() => model.start({ places: [1, 2] }), ControlError);
-  assert.throws(() => session.restore(model.start({ characters: 2, holdFeet: false }).snapshot()), ControlError);
+  assert.throws(
+    () => session.restore(model.start({ characters: 2, holdFeet: false }).snapshot()),
+    ControlError,
+  );
 });
 
 test("ways that cannot be gone are refused, and change nothing", () => {
   const session = model.start({ characters: 2 });
-  session.goTo([[0, 0.02], [3, 0]]);
+  session.goTo([
+    [0, 0.02],
+    [3, 0],
+  ]);
   const before = session.snapshot();
   const refused: [() => void, RegExp][] = [
     [() => session.lookAt([0, 1]), /points needs x, y, z, for all or for each of 2/],
     [() => session.lookAt([0, 1, NaN]), /points must be finite/],
     [() => session.lookAt([0, 1, 1], { who: [2] }), /whole numbers from 0 to 1/],
-    [() => session.reach("left", [[0, 1, 1], [0, 1]]), /points needs x, y, z/],
+    [
+      () =>
+        session.reach("left", [
+          [0, 1, 1],
+          [0, 1],
+        ]),
+      /points needs x, y, z/,
+    ],
     [() => session.reach("both" as "left", [0, 1, 1]), /unknown hand "both"; expected left or right/],
     [() => session.goTo([1]), /points needs x, z, for all or for each of 2/],
-    [() => session.goTo([[1, 0], [0, NaN]]), /points must be finite/],
-    [() => session.goTo([[1, 0], [0, 1]], { who: [1] }), /for each of 1/],
+    [
+      () =>
+        session.goTo([
+          [1, 0],
+          [0, NaN],
+        ]),
+      /points must be finite/,
+    ],
+    [
+      () =>
+        session.goTo(
+          [
+            [1, 0],
+            [0, 1],
+          ],
+          { who: [1] },
+        ),
+      /for each of 1/,
+    ],
     [() => session.goTo([1, 0], { who: [2] }), /whole numbers from 0 to 1/],
     [() => session.goTo([1, 0], { who: [1, 1] }), /none twice/],
     [() => session.goTo([1, 0], { speed: 0 }), /speed must be above 0/],
@@ -58,18 +100,27 @@ test("ways that cannot be gone are refused, and change nothing", () => {
     [() => session.act(["jump", "fly"]), /no act "fly"; expected a motion, or one of jump/],
     [() => session.goAlong([]), /a path needs 1 to 10000 points/],
     [() => session.goAlong([[1, 0], [2]]), /points needs x, z/],
-    ...[0, 0.05, 6, NaN].map((room): [() => void, RegExp] => [() => session.keepApart(room), /keep 0.1 to 5 m apart/]),
+    ...[0, 0.05, 6, NaN].map((room): [() => void, RegExp] => [
+      () => session.keepApart(room),
+      /keep 0.1 to 5 m apart/,
+    ]),
   ];
-  for (const [call, said] of refused) assert.throws(call, (error) => error instanceof ControlError && said.test(error.message), String(said));
+  for (const [call, said] of refused)
+    assert.throws(call, (error) => error instanceof ControlError && said.test(error.message), String(said));
   assert.deepEqual(session.snapshot(), before);
 });
 
 test("a figure arrives, says so once, and a command takes it off its path", () => {
   const session = model.start({ characters: 2 });
   session.goTo([0.5, 2], { who: [1] });
-  const happened = Array.from({ length: 480 }, () => session.advance(1 / 60)).flatMap((poses) => poses.map(({ events }) => events.filter(({ kind }) => kind === "arrived").length));
+  const happened = Array.from({ length: 480 }, () => session.advance(1 / 60)).flatMap((poses) =>
+    poses.map(({ events }) => events.filter(({ kind }) => kind === "arrived").length),
+  );
   assert.deepEqual(session.arrived, [false, true]);
-  assert.equal(happened.reduce((sum, count) => sum + count), 1);
+  assert.equal(
+    happened.reduce((sum, count) => sum + count),
+    1,
+  );
   const [x, z] = session.advance(0)[1]!.ground;
   assert.ok(Math.hypot(x - 0.5, z - 2) < 0.08, `${x}, ${z}`);
   session.control({ speed: 0 });
@@ -78,12 +129,21 @@ test("a figure arrives, says so once, and a command takes it off its path", () =
 
 test("what is out of reach is told, and what a figure no longer reaches for is not", () => {
   const session = model.start({ characters: 2 });
-  session.reach("left", [[0.3, 1.4, 5], [0.2, 1.3, 0.4]]);
+  session.reach("left", [
+    [0.3, 1.4, 5],
+    [0.2, 1.3, 0.4],
+  ]);
   for (let at = 0; at < 60; at++) session.tick();
-  assert.deepEqual(session.outOfReach, [[true, false], [false, false]]);
+  assert.deepEqual(session.outOfReach, [
+    [true, false],
+    [false, false],
+  ]);
   session.reach("left", null);
   session.tick();
-  assert.deepEqual(session.outOfReach, [[false, false], [false, false]]);
+  assert.deepEqual(session.outOfReach, [
+    [false, false],
+    [false, false],
+  ]);
 });
 
 test("a look and a reach leave nothing once they are over, and a restored session has them", () => {
@@ -104,12 +164,21 @@ test("a look and a reach leave nothing once they are over, and a restored sessio
 
 test("a session is restored, and figures move as each would alone", () => {
   const session = model.start({ characters: 2 });
-  session.control({ gait: ["walk", "run"], velocity: [[1, 0.5], [-2, 1]] });
+  session.control({
+    gait: ["walk", "run"],
+    velocity: [
+      [1, 0.5],
+      [-2, 1],
+    ],
+  });
   for (let at = 0; at < 20; at++) session.advance(1 / 60);
   const snapshot = session.snapshot();
   const next = Array.from({ length: 30 }, () => session.advance(1 / 60));
   session.restore(snapshot);
-  assert.deepEqual(Array.from({ length: 30 }, () => session.advance(1 / 60)), next);
+  assert.deepEqual(
+    Array.from({ length: 30 }, () => session.advance(1 / 60)),
+    next,
+  );
   const alone = model.start({ gait: "walk" });
   alone.control({ gait: "run", velocity: [-2, 1] });
   for (let at = 0; at < 49; at++) alone.advance(1 / 60);
@@ -124,7 +193,10 @@ test("each of many searches in its turn, and moves as it would alone", () => {
   alone.control({ gait: "run", speed: 2.5, direction: 9 * 15 });
   for (let at = 0; at < 40; at++) assert.deepEqual(crowd.tick()[15], alone.tick()[0]);
   for (const phases of [6, -1, 0.5, [0, 1, 2]]) {
-    assert.throws(() => model.start({ characters: 2, phases }), /phases must be whole numbers from 0 to 5, for all or for each of 2/);
+    assert.throws(
+      () => model.start({ characters: 2, phases }),
+      /phases must be whole numbers from 0 to 5, for all or for each of 2/,
+    );
   }
 });
 
@@ -154,17 +226,27 @@ test("settings and tables that are out of range are refused", () => {
   assert.throws(() => steering({ search_every: 2.5 }), BundleError);
   assert.throws(() => steering({ wings: 2 }), /wings is unknown/);
   const { manifest, steerer } = model;
-  const made = (config: object) => new ControlModel({ ...manifest, config: { ...manifest.config, ...config } }, steerer.matcher.tables);
-  for (const config of [{ gaits: [] }, { speeds: [[1, 2]] }, { odd: 99 }, { gaits: "walk" }]) assert.throws(() => made(config), BundleError);
+  const made = (config: object) =>
+    new ControlModel({ ...manifest, config: { ...manifest.config, ...config } }, steerer.matcher.tables);
+  for (const config of [{ gaits: [] }, { speeds: [[1, 2]] }, { odd: 99 }, { gaits: "walk" }])
+    assert.throws(() => made(config), BundleError);
   const speeds = structuredClone(manifest.config.speeds as number[][]);
   speeds[0]![0] = 50;
   assert.throws(() => made({ speeds }), /config.speeds: must rise from the slowest/);
 });
 
 test("figures come and go, and each moves as it would alone", () => {
-  for (const [holdFeet, step] of [[true, "tick"], [false, "tick"], [true, "advance"]] as const) {
+  for (const [holdFeet, step] of [
+    [true, "tick"],
+    [false, "tick"],
+    [true, "advance"],
+  ] as const) {
     const begun = (place: number[]) => model.start({ places: place, holdFeet });
-    const places = [[0, 0, 0], [1, 0.5, 30], [-1, 0.5, 200]];
+    const places = [
+      [0, 0, 0],
+      [1, 0.5, 30],
+      [-1, 0.5, 200],
+    ];
     const crowd = begun(places[0]!);
     let alone = [begun(places[0]!)];
     const moved = (session: typeof crowd) => (step === "tick" ? session.tick() : session.advance(1 / 30));
@@ -183,7 +265,10 @@ test("figures come and go, and each moves as it would alone", () => {
       }
       if (at === 75) {
         const before = crowd.snapshot();
-        crowd.add([[5, 5, 0], [6, 6, 0]]);
+        crowd.add([
+          [5, 5, 0],
+          [6, 6, 0],
+        ]);
         assert.equal(crowd.tick().length, 4);
         crowd.restore(before);
       }
@@ -196,8 +281,10 @@ test("figures come and go, and each moves as it would alone", () => {
 test("figures that cannot come or go are refused, and nothing changes", () => {
   const session = model.start({ characters: 2 });
   const before = session.snapshot();
-  for (const places of [[], [0, 0], [[0, 0, NaN]], "here", null]) assert.throws(() => session.add(places as number[]), ControlError);
-  for (const who of [[], [2], [0, 0], [0, 1], 0, null]) assert.throws(() => session.remove(who as number[]), ControlError);
+  for (const places of [[], [0, 0], [[0, 0, NaN]], "here", null])
+    assert.throws(() => session.add(places as number[]), ControlError);
+  for (const who of [[], [2], [0, 0], [0, 1], 0, null])
+    assert.throws(() => session.remove(who as number[]), ControlError);
   assert.throws(() => session.add([0, 0, 0], { gait: "fly" }), ControlError);
   assert.throws(() => session.add(Array<number[]>(100_000).fill([0, 0, 0])), /100000/);
   assert.deepEqual(session.snapshot(), before);

@@ -4,19 +4,43 @@ import { readdirSync, readFileSync } from "node:fs";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
 import {
-  Bundle, clipsOf, framesFor, fromHumanoid, isHumanoid, type Motion, motionOf, plantFeet, readBVH, readGLB, toBVH, toHumanoid, toVRMA, worldOf,
+  Bundle,
+  clipsOf,
+  framesFor,
+  fromHumanoid,
+  isHumanoid,
+  type Motion,
+  motionOf,
+  plantFeet,
+  readBVH,
+  readGLB,
+  toBVH,
+  toHumanoid,
+  toVRMA,
+  worldOf,
 } from "../src/index.js";
 import { TABLES } from "../src/tables.js";
 
-interface Case { text?: string; convention: string; confidence: number; unit: number; places: number[][][]; back?: number[][][] }
+interface Case {
+  text?: string;
+  convention: string;
+  confidence: number;
+  unit: number;
+  places: number[][][];
+  back?: number[][][];
+}
 
 const cases = JSON.parse(readFileSync("tests/cases.json", "utf8")) as {
   figures: Record<string, Case>;
   frames: Record<string, { frames: number[][]; places: number[][][] }>;
-  scenes: Record<string, { base64: string; joints: string[]; fps: number; own: number[][][]; places: number[][][] }>;
+  scenes: Record<
+    string,
+    { base64: string; joints: string[]; fps: number; own: number[][][]; places: number[][][] }
+  >;
   feet: { frames: number[][]; held: number[][]; places: number[][][] };
 };
-const manifestOf = async (name: string) => (await Bundle.open(new Uint8Array(await readFile(`../motet/bundles/${name}.zip`)))).manifest;
+const manifestOf = async (name: string) =>
+  (await Bundle.open(new Uint8Array(await readFile(`../motet/bundles/${name}.zip`)))).manifest;
 
 function near(found: unknown, wanted: unknown, within = 1e-4, what = ""): void {
   const [own, other] = [[found].flat(4) as number[], [wanted].flat(4) as number[]];
@@ -34,10 +58,15 @@ for (const [name, { text, convention, confidence, unit, places, back }] of Objec
     const found = toHumanoid(motion);
     assert.deepEqual([found.convention, found.confidence, found.unit], [convention, confidence, unit]);
     near(every(found.motion, text ? 4 : 1), places, 1e-4, "places");
-    const first = { ...found.motion, rotations: found.motion.rotations.slice(0, 4), translations: found.motion.translations.slice(0, 4) };
+    const first = {
+      ...found.motion,
+      rotations: found.motion.rotations.slice(0, 4),
+      translations: found.motion.translations.slice(0, 4),
+    };
     // lengths are in the figure's unit
     if (back) near(every(fromHumanoid(first, motion), 1), back, 1e-4 / unit, "back");
-    if (back) near(every(fromHumanoid(first, found.figure), 1), back, 1e-4 / unit, "back onto what was measured");
+    if (back)
+      near(every(fromHumanoid(first, found.figure), 1), back, 1e-4 / unit, "back onto what was measured");
   });
 }
 
@@ -54,8 +83,13 @@ for (const [name, { base64, joints, fps, own, places }] of Object.entries(cases.
 
 test("all tables of names are there, in the order of their files", () => {
   const files = readdirSync("../motet/figures/humanoid/conventions").sort();
-  const titles = files.map((file) => JSON.parse(readFileSync(`../motet/figures/humanoid/conventions/${file}`, "utf8")).title);
-  assert.deepEqual(TABLES.map((table) => table.title), titles);
+  const titles = files.map(
+    (file) => JSON.parse(readFileSync(`../motet/figures/humanoid/conventions/${file}`, "utf8")).title,
+  );
+  assert.deepEqual(
+    TABLES.map((table) => table.title),
+    titles,
+  );
 });
 
 for (const name of ["describe", "predict", "generate"]) {
@@ -78,10 +112,18 @@ test("BVH that is written is read again, with the same positions; Python reads i
   const { motion } = toHumanoid(readBVH(cases.figures.walk!.text!));
   const text = toBVH(motion);
   near(worldOf(toHumanoid(readBVH(text)).motion).places, worldOf(motion).places, 1e-6);
-  const words = (content: string) => content.split(/\s+/).map((word) => (Number.isNaN(Number(word)) ? word : Number(word)));
+  const words = (content: string) =>
+    content.split(/\s+/).map((word) => (Number.isNaN(Number(word)) ? word : Number(word)));
   const [own, wanted] = [words(text), words(readFileSync("tests/written/walk.bvh", "utf8"))];
-  assert.deepEqual(own.filter((word) => typeof word === "string"), wanted.filter((word) => typeof word === "string"));
-  near(own.filter((word) => typeof word === "number"), wanted.filter((word) => typeof word === "number"), 1e-5);
+  assert.deepEqual(
+    own.filter((word) => typeof word === "string"),
+    wanted.filter((word) => typeof word === "string"),
+  );
+  near(
+    own.filter((word) => typeof word === "number"),
+    wanted.filter((word) => typeof word === "number"),
+    1e-5,
+  );
 });
 
 test("VRMA is written as the file that Python reads", () => {
@@ -90,7 +132,10 @@ test("VRMA is written as the file that Python reads", () => {
   const parts = (file: Uint8Array) => {
     const data = Uint8Array.from(file); // aligned
     const length = new DataView(data.buffer).getUint32(12, true);
-    return { json: new TextDecoder().decode(data.subarray(20, 20 + length)), numbers: Array.from(new Float32Array(data.buffer, 28 + length)) };
+    return {
+      json: new TextDecoder().decode(data.subarray(20, 20 + length)),
+      numbers: Array.from(new Float32Array(data.buffer, 28 + length)),
+    };
   };
   const [own, wanted] = [parts(toVRMA(motion)), parts(readFileSync("tests/written/walk.vrma"))];
   assert.equal(own.json, wanted.json);

@@ -12,9 +12,12 @@ const KILOBYTES = 128;
 
 test("the packed module is small, and the README's example runs in a new project", async () => {
   const folder = await mkdtemp(join(tmpdir(), "motet-packed-"));
-  const run = (command: string, ...given: string[]) => execFileSync(command, given, { cwd: folder, encoding: "utf8" });
+  const run = (command: string, ...given: string[]) =>
+    execFileSync(command, given, { cwd: folder, encoding: "utf8" });
   execFileSync("npm", ["run", "-s", "build"], { stdio: ["ignore", "ignore", "pipe"] });
-  const [{ filename }] = JSON.parse(execFileSync("npm", ["pack", "--json", "--pack-destination", folder], { encoding: "utf8" }));
+  const [{ filename }] = JSON.parse(
+    execFileSync("npm", ["pack", "--json", "--pack-destination", folder], { encoding: "utf8" }),
+  );
   assert.ok((await stat(join(folder, filename))).size < 1024 * KILOBYTES);
   await writeFile(join(folder, "package.json"), JSON.stringify({ private: true, type: "module" }));
   run("npm", "install", "--offline", "--no-audit", "--no-fund", `./${filename}`);
@@ -25,10 +28,23 @@ test("the packed module is small, and the README's example runs in a new project
     response.end(await readFile(`../motet${request.url}`));
   }).listen(0);
   const { port } = server.address() as { port: number };
-  const said = "console.log(JSON.stringify([frames.length, next.length, next[0].length === channels.length]));";
-  await writeFile(join(folder, "main.ts"), example.replaceAll('"/bundles', `"http://localhost:${port}/bundles`) + said);
+  const said =
+    "console.log(JSON.stringify([frames.length, next.length, next[0].length === channels.length]));";
+  await writeFile(
+    join(folder, "main.ts"),
+    example.replaceAll('"/bundles', `"http://localhost:${port}/bundles`) + said,
+  );
   try {
-    run(process.execPath, resolve("node_modules/typescript/bin/tsc"), "--strict", "--module", "nodenext", "--target", "es2022", "main.ts");
+    run(
+      process.execPath,
+      resolve("node_modules/typescript/bin/tsc"),
+      "--strict",
+      "--module",
+      "nodenext",
+      "--target",
+      "es2022",
+      "main.ts",
+    );
     const { stdout } = await promisify(execFile)(process.execPath, ["main.js"], { cwd: folder });
     assert.deepEqual(JSON.parse(stdout), [120, 30, true]);
   } finally {

@@ -2,7 +2,18 @@
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
-import { Bundle, BundleError, DecodingError, FillModel, type GenerateModel, load, type PredictModel, release, type SearchModel, TextError } from "../src/index.js";
+import {
+  Bundle,
+  BundleError,
+  DecodingError,
+  FillModel,
+  type GenerateModel,
+  load,
+  type PredictModel,
+  release,
+  type SearchModel,
+  TextError,
+} from "../src/index.js";
 import { checkGraph } from "../src/graphSafety.js";
 import { Pcg64 } from "../src/random.js";
 import { openZip } from "../src/zip.js";
@@ -26,7 +37,12 @@ test("bundles with an altered byte are refused, wherever it is read", async () =
 
 test("what is cut short or no bundle is refused", async () => {
   const whole = await bytes("predict");
-  for (const damaged of [new Uint8Array(), whole.subarray(0, 1000), whole.subarray(1000), new TextEncoder().encode("no zip")]) {
+  for (const damaged of [
+    new Uint8Array(),
+    whole.subarray(0, 1000),
+    whole.subarray(1000),
+    new TextEncoder().encode("no zip"),
+  ]) {
     await assert.rejects(Bundle.open(damaged), BundleError);
   }
 });
@@ -39,7 +55,10 @@ function zipped(files: Record<string, Uint8Array>): Uint8Array {
     const [own, entry] = [new DataView(new ArrayBuffer(30)), new DataView(new ArrayBuffer(46))];
     own.setUint32(0, 0x04034b50, true);
     entry.setUint32(0, 0x02014b50, true);
-    for (const [view, size, length] of [[own, 18, 26], [entry, 20, 28]] as const) {
+    for (const [view, size, length] of [
+      [own, 18, 26],
+      [entry, 20, 28],
+    ] as const) {
       view.setUint32(size, data.length, true);
       view.setUint32(size + 4, data.length, true);
       view.setUint16(length, name.length, true);
@@ -62,15 +81,27 @@ test("bundles of another format, and manifests of another form, are refused", as
   const files: Record<string, Uint8Array> = {};
   for (const name of zip.names) files[name] = await zip.read(name, 1 << 24);
   const manifest = JSON.parse(new TextDecoder().decode(files["manifest.json"]));
-  const altered = (text: string) => load(zipped({ ...files, "manifest.json": new TextEncoder().encode(text) }));
+  const altered = (text: string) =>
+    load(zipped({ ...files, "manifest.json": new TextEncoder().encode(text) }));
   await altered(JSON.stringify(manifest));
   await assert.rejects(altered(JSON.stringify({ ...manifest, format: 2 })), /format 2; format 3 is read/);
-  for (const text of ["", "no JSON", "null", "[]", '{"format": 3}', JSON.stringify({ ...manifest, loop: "other" })]) {
+  for (const text of [
+    "",
+    "no JSON",
+    "null",
+    "[]",
+    '{"format": 3}',
+    JSON.stringify({ ...manifest, loop: "other" }),
+  ]) {
     await assert.rejects(altered(text), BundleError, text.slice(0, 20));
   }
   for (const name of ["files", "graphs", "motion", "defaults", "loop"]) {
     for (const value of [undefined, null, 3, "x", []]) {
-      await assert.rejects(altered(JSON.stringify({ ...manifest, [name]: value })), BundleError, `${name}: ${value}`);
+      await assert.rejects(
+        altered(JSON.stringify({ ...manifest, [name]: value })),
+        BundleError,
+        `${name}: ${value}`,
+      );
     }
   }
 });
@@ -108,20 +139,32 @@ test("sentences and frames that a model cannot read are refused", async () => {
   for (const text of ["", "...", "xyzzy qwrt", "walk ".repeat(41), "a".repeat(2001)]) {
     await assert.rejects(search.embedText(text), TextError, `${text.slice(0, 20)} is refused`);
   }
-  assert.equal(search.vocabulary.decode(search.vocabulary.encode("Walks one hundred and five steps, wlaks!").ids), "walks 105 steps walks");
+  assert.equal(
+    search.vocabulary.decode(search.vocabulary.encode("Walks one hundred and five steps, wlaks!").ids),
+    "walks 105 steps walks",
+  );
   const generate = (await load(await bytes("generate"))) as GenerateModel;
-  for (const settings of [{ seconds: 0 }, { seconds: -1 }, { seconds: NaN }, { temperature: 0 }, { seed: 1.5 }, { hypotheses: 0 }]) {
+  for (const settings of [
+    { seconds: 0 },
+    { seconds: -1 },
+    { seconds: NaN },
+    { temperature: 0 },
+    { seed: 1.5 },
+    { hypotheses: 0 },
+  ]) {
     await assert.rejects(generate.generate("walk", settings), DecodingError, JSON.stringify(settings));
   }
   const predict = (await load(await bytes("predict"))) as PredictModel;
   for (const frames of [[], [[1, 2]], Array(10).fill(Array(69).fill(NaN))]) {
     await assert.rejects(predict.predict(frames), DecodingError);
   }
-  for (const count of [0, 2.5, Infinity]) await assert.rejects(predict.predict(Array(10).fill(Array(69).fill(0)), count), DecodingError);
+  for (const count of [0, 2.5, Infinity])
+    await assert.rejects(predict.predict(Array(10).fill(Array(69).fill(0)), count), DecodingError);
 });
 
 test("noise is numpy's: default_rng(seed).random(3, float32), and what it spawns", () => {
-  const near = (found: number[], wanted: number[]) => found.forEach((value, at) => assert.ok(Math.abs(value - wanted[at]!) < 1e-7));
+  const near = (found: number[], wanted: number[]) =>
+    found.forEach((value, at) => assert.ok(Math.abs(value - wanted[at]!) < 1e-7));
   near(new Pcg64(0).uniform(5), [0.8506242, 0.63696164, 0.5111365, 0.26978666, 0.30782938]);
   near(new Pcg64(12345678901).uniform(3), [0.0879392, 0.8361378, 0.7384326]);
   near(new Pcg64(7, 0).uniform(3), [0.30536908, 0.79785913, 0.2038976]);
@@ -140,40 +183,76 @@ async function changed(name: string, change: (manifest: Record<string, never>) =
 
 const WRONG: Record<string, [string, (manifest: any) => void, RegExp]> = {
   "no shape": ["predict", (m) => delete m.graphs.step.inputs[0].shape, /graphs\.step\.inputs\.0\.shape/],
-  "a shape of lists": ["predict", (m) => (m.graphs.step.inputs[0].shape = [[1], 2]), /graphs\.step\.inputs\.0\.shape/],
-  "a size of 2 ** 40": ["predict", (m) => (m.graphs.step.inputs[0].shape = [2 ** 40]), /graphs\.step\.inputs\.0\.shape/],
+  "a shape of lists": [
+    "predict",
+    (m) => (m.graphs.step.inputs[0].shape = [[1], 2]),
+    /graphs\.step\.inputs\.0\.shape/,
+  ],
+  "a size of 2 ** 40": [
+    "predict",
+    (m) => (m.graphs.step.inputs[0].shape = [2 ** 40]),
+    /graphs\.step\.inputs\.0\.shape/,
+  ],
   "no inputs": ["predict", (m) => (m.graphs.encoder.inputs = []), /graphs\.encoder\.inputs/],
-  "another type of tensors": ["predict", (m) => (m.graphs.step.inputs[0].dtype = "string"), /needs a name and a dtype/],
+  "another type of tensors": [
+    "predict",
+    (m) => (m.graphs.step.inputs[0].dtype = "string"),
+    /needs a name and a dtype/,
+  ],
   "a state from nowhere": ["predict", (m) => (m.graphs.step.feedback.none = "nothing"), /feedback\.none/],
   "a start of words": ["predict", (m) => (m.graphs.step.start = { state: ["x"] }), /start\.state/],
   "no deviation": ["predict", (m) => (m.motion.std[0] = 0), /motion\.std/],
   "a mean of text": ["predict", (m) => (m.motion.mean[0] = "x"), /motion\.mean/],
   "a rate of 10^6": ["predict", (m) => (m.motion.fps = 1e6), /motion\.fps/],
-  "a joint below itself": ["predict", (m) => (m.motion.skeleton.joints[1].parent = 1), /motion\.skeleton\.joints\.1/],
-  "a table of half rows": ["control", (m) => (Object.values<any>(m.tables)[0].shape = [1.5]), /tables\..*shape/],
+  "a joint below itself": [
+    "predict",
+    (m) => (m.motion.skeleton.joints[1].parent = 1),
+    /motion\.skeleton\.joints\.1/,
+  ],
+  "a table of half rows": [
+    "control",
+    (m) => (Object.values<any>(m.tables)[0].shape = [1.5]),
+    /tables\..*shape/,
+  ],
   "a file of no size": ["predict", (m) => (m.files["golden.npz"].size = "x"), /files\.golden\.npz/],
   "words that are numbers": ["generate", (m) => (m.vocabulary[5] = 7), /vocabulary/],
   "actions without words": ["generate", (m) => delete m.actions[0].words, /actions/],
-  "a decoder that looks 1,000 steps ahead": ["generate", (m) => (m.config.codec.ahead[0] = 1000), /what its decoder looks at/],
+  "a decoder that looks 1,000 steps ahead": [
+    "generate",
+    (m) => (m.config.codec.ahead[0] = 1000),
+    /what its decoder looks at/,
+  ],
   "no codec": ["generate", (m) => delete m.config.codec, /what its decoder looks at/],
-  "a setting without end": ["generate", (m) => (m.settings.continuation.context = 1e12), /settings\.continuation\.context/],
+  "a setting without end": [
+    "generate",
+    (m) => (m.settings.continuation.context = 1e12),
+    /settings\.continuation\.context/,
+  ],
 };
 for (const [fault, [name, change, place]] of Object.entries(WRONG)) {
   test(`a manifest with ${fault} is refused with its place`, async () => {
-    await assert.rejects(load(await changed(name, change)), (error: unknown) => error instanceof BundleError && place.test(error.message));
+    await assert.rejects(
+      load(await changed(name, change)),
+      (error: unknown) => error instanceof BundleError && place.test(error.message),
+    );
   });
 }
 
 test("what ONNX Runtime throws while it computes is a BundleError, and a model that was released computes no more", async () => {
-  const model = await load(await bytes("search")) as SearchModel;
+  const model = (await load(await bytes("search"))) as SearchModel;
   const frames = Array.from({ length: 30 }, () => model.manifest.motion.mean);
   await model.embedMotion(frames);
   await release(model);
-  await assert.rejects(model.embedMotion(frames), (error: unknown) => error instanceof BundleError && /cannot compute it/.test(error.message));
+  await assert.rejects(
+    model.embedMotion(frames),
+    (error: unknown) => error instanceof BundleError && /cannot compute it/.test(error.message),
+  );
 });
 
 test("in Node a bundle is loaded by its path, and one that is not there is named", async () => {
   assert.equal((await load("../motet/bundles/predict.zip")).manifest.name, "predict");
-  await assert.rejects(load("../motet/bundles/none.zip"), (error: unknown) => error instanceof BundleError && /none\.zip cannot be read/.test(error.message));
+  await assert.rejects(
+    load("../motet/bundles/none.zip"),
+    (error: unknown) => error instanceof BundleError && /none\.zip cannot be read/.test(error.message),
+  );
 });
-

@@ -38,7 +38,12 @@ export class Avatar {
     const primitives = await primitivesOf(gltf, slots);
     if (!primitives.length) throw new FormatError("it has a skeleton but no mesh that could be shown");
     const mesh = { primitives, inverseBind: Float32Array.from(slots.binds.flat()) };
-    return new Avatar(mesh, skeleton.rest.map((place) => plus(place, skeleton.joints[0]!.offset)), slots.movers, figureOf(skeleton));
+    return new Avatar(
+      mesh,
+      skeleton.rest.map((place) => plus(place, skeleton.joints[0]!.offset)),
+      slots.movers,
+      figureOf(skeleton),
+    );
   }
 
   /** Of a pose a matrix for each slot of the mesh, columns first, from where it is at rest; and where the humanoid's joints are. */
@@ -48,7 +53,13 @@ export class Avatar {
     this.movers.forEach((joint, slot) => {
       const turn = turns[0]![joint]!;
       const move = minus(places[0]![joint]!, rotated(turn, this.rest[joint]!));
-      found.set(columns(AXES.map((axis) => rotated(turn, axis)), move), 16 * slot);
+      found.set(
+        columns(
+          AXES.map((axis) => rotated(turn, axis)),
+          move,
+        ),
+        16 * slot,
+      );
     });
     return { matrices: found, places: shown.places.map((place) => times(place, 1 / this.scale)) };
   }
@@ -57,7 +68,8 @@ export class Avatar {
 /** A VRM file has to say which node is which bone. */
 function checkHumanoid(gltf: Gltf): void {
   const { VRM, VRMC_vrm } = gltf.document.extensions ?? {};
-  if ((VRM || VRMC_vrm) && !gltf.humanoid().size) throw new MotionError("this VRM file has no humanoid: assign its bones and export it again");
+  if ((VRM || VRMC_vrm) && !gltf.humanoid().size)
+    throw new MotionError("this VRM file has no humanoid: assign its bones and export it again");
 }
 
 function columns(axes: Vector[], [x, y, z]: Vector): number[] {
@@ -91,9 +103,16 @@ class Slots {
   /** A slot of a node: its place at rest, after the matrix that brings a vertex to it. */
   add(node: number, bind?: readonly number[]): number {
     const { linear, place } = this.rest.get(node)!;
-    const apply = ([x, y, z]: Vector): Vector => [0, 1, 2].map((i) => linear[0][i]! * x + linear[1][i]! * y + linear[2][i]! * z) as Vector;
-    const column = (at: number) => (bind ? (bind.slice(at, at + 3) as Vector) : AXES[at / 4] ?? ([0, 0, 0] as Vector));
-    this.binds.push(columns([0, 4, 8].map((at) => apply(column(at))), plus(place, apply(column(12)))));
+    const apply = ([x, y, z]: Vector): Vector =>
+      [0, 1, 2].map((i) => linear[0][i]! * x + linear[1][i]! * y + linear[2][i]! * z) as Vector;
+    const column = (at: number) =>
+      bind ? (bind.slice(at, at + 3) as Vector) : (AXES[at / 4] ?? ([0, 0, 0] as Vector));
+    this.binds.push(
+      columns(
+        [0, 4, 8].map((at) => apply(column(at))),
+        plus(place, apply(column(12))),
+      ),
+    );
     let above = node;
     while (above >= 0 && !this.joints.includes(above)) above = this.gltf.parents[above]!;
     this.movers.push(Math.max(0, this.joints.indexOf(above)));
@@ -109,7 +128,9 @@ async function primitivesOf(gltf: Gltf, slots: Slots): Promise<Primitive[]> {
   gltf.nodes.forEach(({ mesh, skin }, node) => {
     if (mesh === undefined || !gltf.order.includes(node)) return;
     const slot = skin === undefined ? slots.add(node) : slots.ofSkin(skin);
-    const parts = gltf.document.meshes![mesh]!.primitives.filter((part) => (part.mode ?? TRIANGLES) === TRIANGLES);
+    const parts = gltf.document.meshes![mesh]!.primitives.filter(
+      (part) => (part.mode ?? TRIANGLES) === TRIANGLES,
+    );
     for (const part of parts) found.push(primitiveOf(gltf, part, array, slot, skin !== undefined, images));
   });
   return Promise.all(found);
@@ -117,25 +138,46 @@ async function primitivesOf(gltf: Gltf, slots: Slots): Promise<Primitive[]> {
 
 type Images = Map<number, Promise<ImageBitmap | null>>;
 
-async function primitiveOf(gltf: Gltf, part: MeshPart, array: (at: number) => number[][], slot: number, skinned: boolean, images: Images): Promise<Primitive> {
+async function primitiveOf(
+  gltf: Gltf,
+  part: MeshPart,
+  array: (at: number) => number[][],
+  slot: number,
+  skinned: boolean,
+  images: Images,
+): Promise<Primitive> {
   const { POSITION, NORMAL, TEXCOORD_0, JOINTS_0, WEIGHTS_0 } = part.attributes;
-  if (POSITION === undefined || part.extensions && "KHR_draco_mesh_compression" in part.extensions) {
+  if (POSITION === undefined || (part.extensions && "KHR_draco_mesh_compression" in part.extensions)) {
     throw new FormatError("its mesh is compressed by Draco: export it without");
   }
   const vertices = array(POSITION);
-  if (vertices.length > VERTICES) throw new FormatError(`a mesh of ${vertices.length} vertices is too large: at most ${VERTICES}`);
+  if (vertices.length > VERTICES)
+    throw new FormatError(`a mesh of ${vertices.length} vertices is too large: at most ${VERTICES}`);
   const flat = (at: number | undefined) => (at === undefined ? null : Float32Array.from(array(at).flat()));
   const hangs = skinned && JOINTS_0 !== undefined && WEIGHTS_0 !== undefined;
   const material = gltf.document.materials?.[part.material ?? -1];
   const base = material?.pbrMetallicRoughness;
   return {
-    positions: Float32Array.from(vertices.flat()), normals: flat(NORMAL), uvs: flat(TEXCOORD_0),
-    joints: Uint16Array.from(hangs ? array(JOINTS_0).flat().map((joint) => joint + slot) : vertices.flatMap(() => [slot, 0, 0, 0])),
+    positions: Float32Array.from(vertices.flat()),
+    normals: flat(NORMAL),
+    uvs: flat(TEXCOORD_0),
+    joints: Uint16Array.from(
+      hangs
+        ? array(JOINTS_0)
+            .flat()
+            .map((joint) => joint + slot)
+        : vertices.flatMap(() => [slot, 0, 0, 0]),
+    ),
     weights: Float32Array.from(hangs ? array(WEIGHTS_0).flat() : vertices.flatMap(() => [1, 0, 0, 0])),
     indices: Uint32Array.from(part.indices === undefined ? vertices.keys() : array(part.indices).flat()),
     colour: base?.baseColorFactor ?? [1, 1, 1, 1],
     image: await imageOf(gltf, base?.baseColorTexture?.index, images),
-    cut: material?.alphaMode === "MASK" ? (material.alphaCutoff ?? 0.5) : material?.alphaMode === "BLEND" ? 0.3 : 0,
+    cut:
+      material?.alphaMode === "MASK"
+        ? (material.alphaCutoff ?? 0.5)
+        : material?.alphaMode === "BLEND"
+          ? 0.3
+          : 0,
     twoSided: material?.doubleSided ?? false,
   };
 }
@@ -145,7 +187,8 @@ function imageOf(gltf: Gltf, texture: number | undefined, images: Images): Promi
   const { document } = gltf;
   const source = document.textures?.[texture ?? -1]?.source;
   const { bufferView, uri, mimeType: type = "image/png" } = document.images?.[source ?? -1] ?? {};
-  if (source === undefined || (bufferView === undefined && !uri?.startsWith("data:"))) return Promise.resolve(null);
+  if (source === undefined || (bufferView === undefined && !uri?.startsWith("data:")))
+    return Promise.resolve(null);
   const content = bufferView === undefined ? inlined(uri!) : gltf.bytes(bufferView);
   const read = () => createImageBitmap(new Blob([content as BlobPart], { type })).catch(() => null);
   return images.get(source) ?? images.set(source, read()).get(source)!;

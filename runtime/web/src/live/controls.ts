@@ -12,7 +12,11 @@ const CROWDS = [0, 1, 2, 3, 4, 7, 11, 19, 29, 49];
 const [STILL, SHORT] = [6, 400];
 
 /** What a file is handed over as. */
-const KINDS: Record<string, string> = { glb: "model/gltf-binary", vrma: "model/gltf-binary", gif: "image/gif" };
+const KINDS: Record<string, string> = {
+  glb: "model/gltf-binary",
+  vrma: "model/gltf-binary",
+  gif: "image/gif",
+};
 
 export function addControls(page: Page, most: number): void {
   addGaits(page);
@@ -21,7 +25,9 @@ export function addControls(page: Page, most: number): void {
   element("theme").onclick = () => page.stage.setTheme(!page.stage.isDark());
   addCrowd(page, most);
   const pace = element<HTMLInputElement>("pace");
-  pace.oninput = () => { page.state.pace = Number(pace.value); };
+  pace.oninput = () => {
+    page.state.pace = Number(pace.value);
+  };
   page.stage.listen(element<HTMLCanvasElement>("canvas"));
   addClicks(page, element("canvas"));
   addText(page);
@@ -29,9 +35,12 @@ export function addControls(page: Page, most: number): void {
   addFiles(page);
   for (const kind of Object.keys(KINDS)) element(kind).onclick = () => save(page, kind);
   page.hands.buttons = {
-    4: () => setGait(page, nextGait(page, -1)), 5: () => setGait(page, nextGait(page, 1)), 9: () => toggle(page, "pause"),
+    4: () => setGait(page, nextGait(page, -1)),
+    5: () => setGait(page, nextGait(page, 1)),
+    9: () => toggle(page, "pause"),
   };
-  element("facts").textContent = `${page.net.gaits.length} gaits · ${page.net.rows} recorded poses · ${page.net.fps} ticks a second`;
+  element("facts").textContent =
+    `${page.net.gaits.length} gaits · ${page.net.rows} recorded poses · ${page.net.fps} ticks a second`;
 }
 
 /** Say something where it is seen, and read out by screen readers. */
@@ -48,7 +57,9 @@ function toggle(page: Page, name: (typeof TOGGLES)[number]): void {
 function setGait(page: Page, gait: number): void {
   if (!goesOn(page, gait)) return page.once(page.net.gaits[gait]!);
   page.state.gait = gait;
-  [...element("gaits").children].forEach((button, n) => goesOn(page, n) && button.setAttribute("aria-pressed", `${n === gait}`));
+  [...element("gaits").children].forEach(
+    (button, n) => goesOn(page, n) && button.setAttribute("aria-pressed", `${n === gait}`),
+  );
 }
 
 function goesOn({ net }: Page, gait: number): boolean {
@@ -94,7 +105,8 @@ function addClicks(page: Page, canvas: HTMLElement): void {
   canvas.addEventListener("pointerup", ({ clientX, clientY, timeStamp }) => {
     const box = canvas.getBoundingClientRect();
     const point = page.scene.groundAt(clientX - box.left, clientY - box.top);
-    const still = Math.hypot(clientX - pressed.x, clientY - pressed.y) < STILL && timeStamp - pressed.at < SHORT;
+    const still =
+      Math.hypot(clientX - pressed.x, clientY - pressed.y) < STILL && timeStamp - pressed.at < SHORT;
     if (still && point) page.pilot = goTo(point);
   });
 }
@@ -106,17 +118,34 @@ function addText(page: Page): void {
     if (text.value.trim()) reply(page.told(text.value));
     text.select();
   };
-  element("known").append(...[...page.net.gaits, "stop", "turn left", "turn right", ...page.repertoire.names].map((name) => new Option(name)));
-  text.onkeydown = ({ key }) => { if (key === "Escape") element("canvas").focus(); };
+  element("known").append(
+    ...[...page.net.gaits, "stop", "turn left", "turn right", ...page.repertoire.names].map(
+      (name) => new Option(name),
+    ),
+  );
+  text.onkeydown = ({ key }) => {
+    if (key === "Escape") element("canvas").focus();
+  };
 }
 
 function addKeys(page: Page): void {
-  const { stage, hands: { keys } } = page;
+  const {
+    stage,
+    hands: { keys },
+  } = page;
   const once: Record<string, () => void> = {
-    Space: () => toggle(page, "pause"), KeyG: () => toggle(page, "strafe"), KeyV: () => toggle(page, "trails"),
-    KeyC: () => toggle(page, "contacts"), KeyF: () => toggle(page, "follows"), KeyR: () => stage.resetView(),
-    KeyT: () => stage.setTheme(!stage.isDark()), Equal: () => stage.zoom(1.1), NumpadAdd: () => stage.zoom(1.1),
-    Minus: () => stage.zoom(1 / 1.1), NumpadSubtract: () => stage.zoom(1 / 1.1), Slash: () => element("text").focus(),
+    Space: () => toggle(page, "pause"),
+    KeyG: () => toggle(page, "strafe"),
+    KeyV: () => toggle(page, "trails"),
+    KeyC: () => toggle(page, "contacts"),
+    KeyF: () => toggle(page, "follows"),
+    KeyR: () => stage.resetView(),
+    KeyT: () => stage.setTheme(!stage.isDark()),
+    Equal: () => stage.zoom(1.1),
+    NumpadAdd: () => stage.zoom(1.1),
+    Minus: () => stage.zoom(1 / 1.1),
+    NumpadSubtract: () => stage.zoom(1 / 1.1),
+    Slash: () => element("text").focus(),
   };
   window.onkeydown = (event) => {
     if (takes(event) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -128,14 +157,17 @@ function addKeys(page: Page): void {
     else return;
     event.preventDefault();
   };
-  window.onkeyup = (event) => { keys.delete(event.key === "Shift" ? "Shift" : event.code); };
+  window.onkeyup = (event) => {
+    keys.delete(event.key === "Shift" ? "Shift" : event.code);
+  };
   window.onblur = () => keys.clear();
 }
 
 /** Whether what has the focus needs the key itself. */
 function takes({ target, code }: KeyboardEvent): boolean {
   const place = target as HTMLElement;
-  if (place.tagName === "INPUT") return (place as HTMLInputElement).type === "text" || code.startsWith("Arrow");
+  if (place.tagName === "INPUT")
+    return (place as HTMLInputElement).type === "text" || code.startsWith("Arrow");
   const presses = place.tagName === "BUTTON" || place.tagName === "SUMMARY";
   return (place.tagName === "SELECT" && !code.startsWith("Key")) || (presses && code === "Space");
 }
@@ -156,11 +188,12 @@ async function take(page: Page, files: FileList | null): Promise<void> {
   const file = files?.[0];
   if (!file) return;
   reply(`reading ${file.name}`);
-  await dropped(file, page.net.fps).then((found) => page.show(found)).then(reply, (error: Error) => reply(error.message));
+  await dropped(file, page.net.fps)
+    .then((found) => page.show(found))
+    .then(reply, (error: Error) => reply(error.message));
 }
 
 function save(page: Page, kind: string): void {
   download(page.recorder.file(kind), `motet.${kind}`, KINDS[kind]!);
   reply(`saved the last ${page.recorder.seconds.toFixed(0)} s as motet.${kind}`);
 }
-

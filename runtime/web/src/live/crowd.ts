@@ -32,7 +32,8 @@ const moods = new WeakMap<Figure, Mood>();
 export function ownControl(net: Net, figures: Figure[], n: number, follows: boolean): Asked {
   const [leader, figure] = [figures[0]!, figures[n]!];
   const [x, z] = figure.root;
-  if (follows || Math.hypot(leader.root[0] - x, leader.root[1] - z) > FAR + n / 3) return followed(net, figures, n);
+  if (follows || Math.hypot(leader.root[0] - x, leader.root[1] - z) > FAR + n / 3)
+    return followed(net, figures, n);
   const mood = moods.get(figure) ?? { left: 0, way: 0, pace: 0, random: randomFrom(n) };
   moods.set(figure, mood);
   if (--mood.left <= 0) Object.assign(mood, newMood(net, figure, mood.random));
@@ -49,7 +50,11 @@ function randomFrom(seed: number): () => number {
 function newMood(net: Net, figure: Figure, random: () => number): Omit<Mood, "random"> {
   const rests = random() < REST;
   const way = figure.root[2] + (random() - 0.5) * 4;
-  return { left: net.fps * (2 + 4 * random()), way, pace: rests ? 0 : usual(net, 0) * (0.6 + 0.4 * random()) };
+  return {
+    left: net.fps * (2 + 4 * random()),
+    way,
+    pace: rests ? 0 : usual(net, 0) * (0.6 + 0.4 * random()),
+  };
 }
 
 /** The place of figure n in the rows behind the first one: how far behind it and to its left. */
@@ -62,7 +67,8 @@ function followed(net: Net, figures: Figure[], n: number): Asked {
   const [x, z, facing] = figures[0]!.root;
   const [behind, left] = placeBehind(n);
   const point: [number, number] = [
-    x - behind * Math.sin(facing) + left * Math.cos(facing), z - behind * Math.cos(facing) - left * Math.sin(facing),
+    x - behind * Math.sin(facing) + left * Math.cos(facing),
+    z - behind * Math.cos(facing) - left * Math.sin(facing),
   ];
   const figure = figures[n]!;
   const away = Math.hypot(point[0] - figure.root[0], point[1] - figure.root[1]);
@@ -71,7 +77,13 @@ function followed(net: Net, figures: Figure[], n: number): Asked {
 }
 
 /** The control that leads to a point at a pace, around others; faster than the first gait has, it runs. */
-export function towards(net: Net, figures: Figure[], n: number, [toX, toZ]: readonly [number, number], pace: number): Asked {
+export function towards(
+  net: Net,
+  figures: Figure[],
+  n: number,
+  [toX, toZ]: readonly [number, number],
+  pace: number,
+): Asked {
   const figure = figures[n]!;
   const [x, z] = figure.root;
   const away = Math.hypot(toX - x, toZ - z) || 1;

@@ -23,11 +23,17 @@ export interface Dropped {
 /** Read a dropped file; a sentence with its name is thrown as an Error where it is neither a motion nor an avatar. */
 export async function dropped(file: File, fps: number): Promise<Dropped> {
   try {
-    if (file.size > LARGEST) throw new FormatError(`it has ${Math.round(file.size / 1e6)} MB, and at most ${LARGEST / 1e6} are read`);
+    if (file.size > LARGEST)
+      throw new FormatError(
+        `it has ${Math.round(file.size / 1e6)} MB, and at most ${LARGEST / 1e6} are read`,
+      );
     return await opened(file.name, new Uint8Array(await file.arrayBuffer()), fps);
   } catch (error) {
     if (!(error instanceof FormatError || error instanceof MotionError)) throw error;
-    const why = error.message.replace(/[:;] give a map of bones and joints$/, ", and only human figures move here");
+    const why = error.message.replace(
+      /[:;] give a map of bones and joints$/,
+      ", and only human figures move here",
+    );
     throw new Error(`${file.name} cannot be used: ${why}`, { cause: error });
   }
 }
@@ -40,7 +46,8 @@ async function opened(name: string, content: Uint8Array, fps: number): Promise<D
   }
   const { document } = Gltf.parse(content);
   const moves = document.animations?.length ? clipsOf(content).length > 0 : false;
-  if (!document.meshes?.length || document.extensions?.VRMC_vrm_animation) return played(name, readGLB(content), fps);
+  if (!document.meshes?.length || document.extensions?.VRMC_vrm_animation)
+    return played(name, readGLB(content), fps);
   const avatar = await Avatar.read(content);
   const told = `${name} is who moves now.`;
   if (!moves) return { avatar, told };
@@ -49,11 +56,20 @@ async function opened(name: string, content: Uint8Array, fps: number): Promise<D
 }
 
 function played(name: string, given: Motion, fps: number): Dropped {
-  const { rotations: { length }, fps: rate } = given;
+  const {
+    rotations: { length },
+    fps: rate,
+  } = given;
   if (length < 3) throw new MotionError("it has a figure but no motion");
   const own = isHumanoid(given.skeleton);
-  const cut = { ...given, rotations: given.rotations.slice(0, MOST_SECONDS * rate), translations: given.translations.slice(0, MOST_SECONDS * rate) };
-  const found = own ? { motion: cut, convention: "motet's humanoid", notes: [] } : toHumanoid(cut.fps > fps ? resampled(cut, fps) : cut);
+  const cut = {
+    ...given,
+    rotations: given.rotations.slice(0, MOST_SECONDS * rate),
+    translations: given.translations.slice(0, MOST_SECONDS * rate),
+  };
+  const found = own
+    ? { motion: cut, convention: "motet's humanoid", notes: [] }
+    : toHumanoid(cut.fps > fps ? resampled(cut, fps) : cut);
   const motion = resampled(found.motion, fps);
   const figure = `${given.skeleton.joints.length} joints${own || found.convention ? `, ${found.convention}` : ""}`;
   const shown = length > cut.rotations.length ? `, of which the first ${MOST_SECONDS} s are shown` : "";
@@ -66,11 +82,20 @@ export function way({ translations, rotations, fps }: Motion): string {
   const places = translations.map((moves) => moves[0]!);
   const half = Math.round(fps / 2); // twice a second, so that swaying hips go nowhere
   const stops = places.filter((_, at) => at % half === 0);
-  const gone = stops.slice(1).reduce((sum, [x, , z], at) => sum + Math.hypot(x - stops[at]![0], z - stops[at]![2]), 0);
-  const facings = rotations.map(([hips]) => Math.atan2(2 * (hips![0] * hips![2] + hips![1] * hips![3]), 1 - 2 * (hips![0] ** 2 + hips![1] ** 2)));
-  const turned = facings.slice(1).reduce((sum, facing, at) => sum + wrapped(facing - facings[at]!), 0) / RADIANS;
+  const gone = stops
+    .slice(1)
+    .reduce((sum, [x, , z], at) => sum + Math.hypot(x - stops[at]![0], z - stops[at]![2]), 0);
+  const facings = rotations.map(([hips]) =>
+    Math.atan2(2 * (hips![0] * hips![2] + hips![1] * hips![3]), 1 - 2 * (hips![0] ** 2 + hips![1] ** 2)),
+  );
+  const turned =
+    facings.slice(1).reduce((sum, facing, at) => sum + wrapped(facing - facings[at]!), 0) / RADIANS;
   const seconds = places.length / fps;
-  const goes = gone < 0.5 ? "It stays in its place" : `It goes ${gone.toFixed(1)} m, ${(gone / seconds).toFixed(1)} m/s`;
-  const turns = Math.abs(turned) < 30 ? "" : `, and turns ${Math.round(Math.abs(turned))} degrees to the ${turned > 0 ? "left" : "right"}`;
+  const goes =
+    gone < 0.5 ? "It stays in its place" : `It goes ${gone.toFixed(1)} m, ${(gone / seconds).toFixed(1)} m/s`;
+  const turns =
+    Math.abs(turned) < 30
+      ? ""
+      : `, and turns ${Math.round(Math.abs(turned))} degrees to the ${turned > 0 ? "left" : "right"}`;
   return `${goes}${turns}.`;
 }

@@ -104,10 +104,16 @@ export class Figure {
 
   /** Where it is asked to be so many seconds from now: what its springs lead to. */
   later(seconds: number): Ground {
-    const { playback: { root, spring, springRate }, target } = this.steered;
+    const {
+      playback: { root, spring, springRate },
+      target,
+    } = this.steered;
     const { velocity, facing } = this.model.steerer.matcher.how;
     const slow = dampingOf(velocity);
-    const [x, z] = [0, 1].map((i) => root[i]! + target[i]! * seconds + dampedPath(spring[i]! - target[i]!, springRate[i]!, slow, seconds));
+    const [x, z] = [0, 1].map(
+      (i) =>
+        root[i]! + target[i]! * seconds + dampedPath(spring[i]! - target[i]!, springRate[i]!, slow, seconds),
+    );
     const [off] = damped(wrapped(spring[2] - target[2]), springRate[2], dampingOf(facing), seconds);
     return [x!, z!, target[2] + off];
   }

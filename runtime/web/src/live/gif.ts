@@ -1,7 +1,12 @@
 /* Animated GIF (GIF89a): up to 255 colours for all pictures, and pixels that stay are left as they are. */
 
 /** Pictures of RGBA pixels, row by row. delay: hundredths of a second of each. */
-export function toGIF(pictures: Uint8ClampedArray[], width: number, height: number, delay: number): Uint8Array<ArrayBuffer> {
+export function toGIF(
+  pictures: Uint8ClampedArray[],
+  width: number,
+  height: number,
+  delay: number,
+): Uint8Array<ArrayBuffer> {
   const { palette, nearest } = paletteOf(pictures);
   const out: number[] = [..."GIF89a"].map((letter) => letter.charCodeAt(0));
   const word = (value: number) => out.push(value & 255, value >> 8);
@@ -40,7 +45,10 @@ function paletteOf(pictures: Uint8ClampedArray[]): { palette: number[][]; neares
   const counts = new Float64Array(1 << 15);
   for (const picture of pictures) for (let at = 0; at < picture.length; at += 4) counts[bin(picture, at)]!++;
   const used = [...counts.keys()].filter((one) => counts[one]);
-  const palette = used.sort((a, b) => counts[b]! - counts[a]!).slice(0, CLEAR).map(colourOf);
+  const palette = used
+    .sort((a, b) => counts[b]! - counts[a]!)
+    .slice(0, CLEAR)
+    .map(colourOf);
   const nearest = new Uint8Array(1 << 15);
   for (const one of used) {
     const colour = colourOf(one);
@@ -86,5 +94,7 @@ function packed(pixels: Uint8Array): Uint8Array {
 }
 
 function blocks(bytes: Uint8Array): Uint8Array[] {
-  return Array.from({ length: Math.ceil(bytes.length / 255) }, (_, at) => bytes.subarray(255 * at, 255 * at + 255));
+  return Array.from({ length: Math.ceil(bytes.length / 255) }, (_, at) =>
+    bytes.subarray(255 * at, 255 * at + 255),
+  );
 }

@@ -8,8 +8,14 @@ const KNOB = 44;
 
 /** Keys that go, to the right and up as it is seen. */
 export const DIRECTIONS: Record<string, [right: number, up: number]> = {
-  KeyW: [0, 1], ArrowUp: [0, 1], KeyS: [0, -1], ArrowDown: [0, -1],
-  KeyA: [-1, 0], ArrowLeft: [-1, 0], KeyD: [1, 0], ArrowRight: [1, 0],
+  KeyW: [0, 1],
+  ArrowUp: [0, 1],
+  KeyS: [0, -1],
+  ArrowDown: [0, -1],
+  KeyA: [-1, 0],
+  ArrowLeft: [-1, 0],
+  KeyD: [1, 0],
+  ArrowRight: [1, 0],
 };
 
 export class Hands {
@@ -17,21 +23,32 @@ export class Hands {
   /** What a gamepad's buttons do once they are pressed, by their numbers. */
   buttons: Record<number, () => void> = {};
   private stick: [x: number, y: number] = [0, 0];
-  private pad: { x: number; y: number; hurries: boolean; down: readonly boolean[] } = { x: 0, y: 0, hurries: false, down: [] };
+  private pad: { x: number; y: number; hurries: boolean; down: readonly boolean[] } = {
+    x: 0,
+    y: 0,
+    hurries: false,
+    down: [],
+  };
 
   constructor(
     private readonly stage: Stage,
     private readonly round: HTMLElement,
   ) {
-    round.onpointerdown = (event) => { round.setPointerCapture(event.pointerId); this.push(event); };
-    round.onpointermove = (event) => { if (round.hasPointerCapture(event.pointerId)) this.push(event); };
+    round.onpointerdown = (event) => {
+      round.setPointerCapture(event.pointerId);
+      this.push(event);
+    };
+    round.onpointermove = (event) => {
+      if (round.hasPointerCapture(event.pointerId)) this.push(event);
+    };
     round.onpointerup = round.onpointercancel = () => this.move(0, 0);
   }
 
   /** Right and up, as they are seen, together at most 1 long. */
   get pushed(): [x: number, y: number] {
     let [x, y] = [this.stick[0] + this.pad.x, this.stick[1] + this.pad.y];
-    for (const [key, [right, up]] of Object.entries(DIRECTIONS)) if (this.keys.has(key)) [x, y] = [x + right, y + up];
+    for (const [key, [right, up]] of Object.entries(DIRECTIONS))
+      if (this.keys.has(key)) [x, y] = [x + right, y + up];
     const length = Math.hypot(x, y);
     return length > 1 ? [x / length, y / length] : length < DEAD ? [0, 0] : [x, y];
   }
@@ -62,7 +79,8 @@ export class Hands {
 
   private move(x: number, y: number): void {
     this.stick = [x, y];
-    (this.round.firstElementChild as HTMLElement).style.transform = `translate(${x * KNOB}px, ${-y * KNOB}px)`;
+    (this.round.firstElementChild as HTMLElement).style.transform =
+      `translate(${x * KNOB}px, ${-y * KNOB}px)`;
   }
 
   /** The left stick goes, the right one looks, a trigger hurries. */
@@ -76,7 +94,8 @@ export class Hands {
     const [lookX, lookY] = looks.map((axis) => (Math.abs(axis) < DEAD ? 0 : axis)) as [number, number];
     const down = found.buttons.map((button) => button.pressed);
     if (lookX || lookY) this.stage.turn(-PAD_ASIDE * seconds * lookX, PAD_UP * seconds * lookY);
-    for (const [button, act] of Object.entries(this.buttons)) if (down[Number(button)] && !this.pad.down[Number(button)]) act();
+    for (const [button, act] of Object.entries(this.buttons))
+      if (down[Number(button)] && !this.pad.down[Number(button)]) act();
     this.pad = { x, y: -y, hurries: Boolean(down[7] || down[6] || down[0]), down };
   }
 }

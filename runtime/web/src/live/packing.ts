@@ -1,7 +1,14 @@
 /* Arrays of a page: gzipped, column by column, of each column first all first bytes; as motet/live/packing.py packs them. */
 import { halves } from "../arrays.js";
 
-const KINDS = { f4: Float32Array, i1: Int8Array, u1: Uint8Array, i4: Int32Array, i2: Int16Array, f2: Uint16Array };
+const KINDS = {
+  f4: Float32Array,
+  i1: Int8Array,
+  u1: Uint8Array,
+  i4: Int32Array,
+  i2: Int16Array,
+  f2: Uint16Array,
+};
 
 /** Tables one after the other. bytes: base64. */
 export interface Packed {
@@ -18,7 +25,13 @@ export async function unpacked({ tables, bytes: text }: Packed): Promise<Record<
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   const found: Record<string, ArrayLike<number>> = {};
   let at = 0;
-  for (const [name, { kind, shape: [rows, width] }] of Object.entries(tables)) {
+  for (const [
+    name,
+    {
+      kind,
+      shape: [rows, width],
+    },
+  ] of Object.entries(tables)) {
     const size = KINDS[kind].BYTES_PER_ELEMENT;
     const target = new Uint8Array(rows * width * size);
     for (let column = 0; column < width; column++) {

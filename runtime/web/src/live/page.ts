@@ -34,7 +34,16 @@ export class Page {
   readonly figures: Figure[] = [];
   /** What can be typed; it comes once the first picture is drawn. */
   repertoire!: Repertoire;
-  readonly state = { gait: 0, hurry: false, strafe: false, trails: true, contacts: false, follows: true, pause: false, pace: 1 };
+  readonly state = {
+    gait: 0,
+    hurry: false,
+    strafe: false,
+    trails: true,
+    contacts: false,
+    follows: true,
+    pause: false,
+    pace: 1,
+  };
   /** Who steers while no hand does. */
   pilot: Pilot | null = null;
   /** Whether the first figure was told an act of the whole body, and whether what steered it then is held still. */
@@ -69,7 +78,9 @@ export class Page {
       const [behind, left] = n ? placeBehind(n) : [0, 0];
       const [sin, cos] = [Math.sin(facing), Math.cos(facing)];
       const phase = n ? n % net.model.steerer.matcher.how.search_every : undefined;
-      figures.push(new Figure(net.model, [x - behind * sin + left * cos, z - behind * cos - left * sin, facing], phase));
+      figures.push(
+        new Figure(net.model, [x - behind * sin + left * cos, z - behind * cos - left * sin, facing], phase),
+      );
     }
   }
 
@@ -107,7 +118,8 @@ export class Page {
 
   /** Do once what a gait that goes nowhere shows, of all figures or the first, and go on. */
   once(gait: string, all = false): void {
-    for (const figure of all ? this.figures : [this.figures[0]!]) figure.act(this.net.model.take(gait, figure.goes), false);
+    for (const figure of all ? this.figures : [this.figures[0]!])
+      figure.act(this.net.model.take(gait, figure.goes), false);
   }
 
   /** Begin an act, of all figures or the first; one of the whole body ends what steers it. */
@@ -201,7 +213,14 @@ export async function open(given: Given, stage: Stage): Promise<Page> {
   const model = await modelOf(given.net);
   const speeds = Object.fromEntries(model.gaits.map((gait, n) => [gait, model.abilities.speeds[n]!]));
   const net: Net = { model, gaits: model.gaits, fps: model.fps, speeds, rows: model.steerer.matcher.rows };
-  const page = new Page(net, stage, scene, new Hands(stage, element("stick")), new Recorder(net.fps, scene, canvas), said(element("speed")));
+  const page = new Page(
+    net,
+    stage,
+    scene,
+    new Hands(stage, element("stick")),
+    new Recorder(net.fps, scene, canvas),
+    said(element("speed")),
+  );
   page.setFigures(given.characters);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) page.startByItself();
   for (const done of DONE) addEventListener(done, () => (stage.view.dirty = true));

@@ -22,7 +22,10 @@ export function eight({ root: [x, z, facing] }: Figure): Pilot {
   const turned = facing - Math.PI / 4; // it starts at an angle of 45 degrees to its length
   const point = (): [number, number] => {
     const [ahead, aside] = [HALF * Math.sin(along), HALF * Math.sin(along) * Math.cos(along)];
-    return [x + ahead * Math.sin(turned) + aside * Math.cos(turned), z + ahead * Math.cos(turned) - aside * Math.sin(turned)];
+    return [
+      x + ahead * Math.sin(turned) + aside * Math.cos(turned),
+      z + ahead * Math.cos(turned) - aside * Math.sin(turned),
+    ];
   };
   const away = ({ root }: Figure) => Math.hypot(point()[0] - root[0], point()[1] - root[1]);
   return {
@@ -58,6 +61,11 @@ export class Order implements Pilot {
 
   ask({ model }: Net): Asked {
     const speed = this.speed ? inRange(model, this.gait, this.speed) : 0;
-    return { gait: this.gait, x: speed * Math.sin(this.way), z: speed * Math.cos(this.way), facing: this.way };
+    return {
+      gait: this.gait,
+      x: speed * Math.sin(this.way),
+      z: speed * Math.cos(this.way),
+      facing: this.way,
+    };
   }
 }

@@ -31,7 +31,9 @@ export class Recorder {
   file(kind: string): Uint8Array<ArrayBuffer> {
     if (kind === "gif") return this.gif();
     const motion = motionOf(this.poses, this.fps);
-    return (kind === "glb" ? toGLB(motion, surfaceOf(this.scene)) : toVRMA(motion)) as Uint8Array<ArrayBuffer>;
+    return (
+      kind === "glb" ? toGLB(motion, surfaceOf(this.scene)) : toVRMA(motion)
+    ) as Uint8Array<ArrayBuffer>;
   }
 
   private gif(): Uint8Array<ArrayBuffer> {
@@ -41,7 +43,11 @@ export class Recorder {
     const poses = this.poses.filter((_, at) => at % EVERY === 0);
     this.scene.cut();
     const pictures = poses.map((pose) => {
-      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, { trails: false, contacts: false, pause: true });
+      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, {
+        trails: false,
+        contacts: false,
+        pause: true,
+      });
       const { width, height } = this.canvas; // which are those of a sharp picture now
       const side = Math.min(width, height);
       ink.fillRect(0, 0, SIZE, SIZE);
@@ -53,8 +59,15 @@ export class Recorder {
 }
 
 /** The usual body in metres, its colours linear, as glTF has them. */
-function surfaceOf({ body: { primitives: [{ positions, normals, joints, weights, parts, indices }], colours }, height }: Scene): Surface {
-  const rows = (values: ArrayLike<number>, width: number) => Array.from(parts, (_, at) => Array.from({ length: width }, (_, i) => values[width * at + i]!));
+function surfaceOf({
+  body: {
+    primitives: [{ positions, normals, joints, weights, parts, indices }],
+    colours,
+  },
+  height,
+}: Scene): Surface {
+  const rows = (values: ArrayLike<number>, width: number) =>
+    Array.from(parts, (_, at) => Array.from({ length: width }, (_, i) => values[width * at + i]!));
   const size = (row: number[]) => Math.hypot(...row);
   return {
     positions: rows(positions, 3).map((row) => row.map((x) => x * height)),

@@ -36,7 +36,11 @@ export class Repertoire {
     const [, width] = given.tables.frames!.shape;
     const numbers = Float64Array.from(frames!);
     for (let at = width; at < numbers.length; at++) numbers[at]! += numbers[at - width]!;
-    return new Repertoire(model, given.acts, numbers.map((value) => value / given.steps));
+    return new Repertoire(
+      model,
+      given.acts,
+      numbers.map((value) => value / given.steps),
+    );
   }
 
   /** The act that a sentence asks for, whether the arms do it alone, the words that it leaves out, and how much it has, from 0 to 1; null for a sentence that none is. */

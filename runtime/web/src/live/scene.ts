@@ -51,7 +51,8 @@ export class Scene {
     if (this.avatar) this.painter.drop(this.avatar);
     const body = (this.avatar = this.painter.avatar(avatar.mesh));
     const others = this.looks;
-    this.looks = (shown, n) => (n ? others(shown, n) : { body, ...avatar.posed(shown), unit: avatar.scale / this.height });
+    this.looks = (shown, n) =>
+      n ? others(shown, n) : { body, ...avatar.posed(shown), unit: avatar.scale / this.height };
   }
 
   /** Remember where figures are, once a tick. */
@@ -66,13 +67,31 @@ export class Scene {
   }
 
   /** Draw figures in poses, so many seconds after the last picture; their ways where these are given. */
-  draw(poses: Shown[], passed: number, figures: Figure[], goal: readonly [number, number] | undefined, shows: Shows): void {
+  draw(
+    poses: Shown[],
+    passed: number,
+    figures: Figure[],
+    goal: readonly [number, number] | undefined,
+    shows: Shows,
+  ): void {
     const { width, height } = this.painter.begin(shows.pause);
     if (!width || !height) return;
     this.camera = this.follow(poses, passed, width, height);
-    const ways = shows.trails ? [...figures.slice(0, TRACED).map((figure, n) => this.gone(figure, n)), ...(figures[0] ? [this.asked(figures[0])] : [])] : [];
-    const spots = [...(shows.contacts ? poses.flatMap((pose) => this.standing(pose)) : []), ...(goal ? [this.spot(goal, 0.09, this.accent, 0.6)] : [])];
-    this.painter.draw(this.camera, { figures: poses.map((pose, n) => this.looks(pose, n)), strips: ways, spots });
+    const ways = shows.trails
+      ? [
+          ...figures.slice(0, TRACED).map((figure, n) => this.gone(figure, n)),
+          ...(figures[0] ? [this.asked(figures[0])] : []),
+        ]
+      : [];
+    const spots = [
+      ...(shows.contacts ? poses.flatMap((pose) => this.standing(pose)) : []),
+      ...(goal ? [this.spot(goal, 0.09, this.accent, 0.6)] : []),
+    ];
+    this.painter.draw(this.camera, {
+      figures: poses.map((pose, n) => this.looks(pose, n)),
+      strips: ways,
+      spots,
+    });
   }
 
   /** Let the camera be at once where it would come to. */
@@ -92,7 +111,13 @@ export class Scene {
     const goal: Vector = [x / this.height, 0.5, z / this.height];
     const part = this.target ? 1 - 0.5 ** (passed / LATE) : 1;
     this.target = (this.target ?? goal).map((value, i) => value + part * (goal[i]! - value)) as Vector;
-    return this.stage.cameraAt([...this.target], 0, STEP_BACK * Math.sqrt(4 * (poses.length - 1)), width, height);
+    return this.stage.cameraAt(
+      [...this.target],
+      0,
+      STEP_BACK * Math.sqrt(4 * (poses.length - 1)),
+      width,
+      height,
+    );
   }
 
   private gone(figure: Figure, n: number): Strip {
@@ -120,7 +145,12 @@ export class Scene {
     });
   }
 
-  private spot([x, z]: readonly [number, number], radius: number, colour: readonly number[], alpha: number): Spot {
+  private spot(
+    [x, z]: readonly [number, number],
+    radius: number,
+    colour: readonly number[],
+    alpha: number,
+  ): Spot {
     return { x: x / this.height, z: z / this.height, radius, colour, alpha };
   }
 
@@ -128,4 +158,3 @@ export class Scene {
     return this.stage.COLOURS.right;
   }
 }
-

@@ -57,7 +57,16 @@ export interface Primitive {
 
 /** A body of people as the stage has it: numbers of its corners, in heights, one corner after the other, on two joints each. */
 export interface Body {
-  primitives: [{ positions: Float32Array; normals: Float32Array; joints: Uint16Array; weights: Float32Array; parts: Uint8Array; indices: Uint32Array }];
+  primitives: [
+    {
+      positions: Float32Array;
+      normals: Float32Array;
+      joints: Uint16Array;
+      weights: Float32Array;
+      parts: Uint8Array;
+      indices: Uint32Array;
+    },
+  ];
   /** Of each part, 0 to 255. */
   colours: readonly (readonly number[])[];
 }
@@ -73,7 +82,11 @@ export interface Painter {
   avatar(mesh: Mesh): unknown;
   drop(body: unknown): void;
   begin(still: boolean): { width: number; height: number };
-  draw(camera: Camera, scene: { figures: Drawn[]; strips: Strip[]; spots: Spot[] }, box?: { x: number; y: number; width: number; height: number }): void;
+  draw(
+    camera: Camera,
+    scene: { figures: Drawn[]; strips: Strip[]; spots: Spot[] },
+    box?: { x: number; y: number; width: number; height: number },
+  ): void;
 }
 
 export interface Stage {

@@ -15,7 +15,11 @@ export interface Paces {
 }
 
 /** The speed in m/s, 0 to the usual run, of a stick pushed so far, 0 to 1; and whether it is a run, of a figure that runs or does not. */
-export function stick(push: number, runs: boolean, { least, walk, run }: Paces): { speed: number; runs: boolean } {
+export function stick(
+  push: number,
+  runs: boolean,
+  { least, walk, run }: Paces,
+): { speed: number; runs: boolean } {
   if (!(push >= DEAD)) return { speed: 0, runs: false };
   const [from, to, start, end] = push < WALKS ? [least, walk, DEAD, WALKS] : [walk, run, WALKS, 1];
   const speed = from + ((to - from) * (Math.min(push, 1) - start)) / (end - start);

@@ -6,7 +6,12 @@ import type { Figure } from "./figure.js";
 import { Order } from "./pilots.js";
 
 /** Words that add nothing to an order or an act. */
-const IDLE = new Set([...FUNCTION_WORDS, ..."ahead can degrees do does doing figure forward going keep let now please some something spot start starts straight you your".split(" ")]);
+const IDLE = new Set([
+  ...FUNCTION_WORDS,
+  ..."ahead can degrees do does doing figure forward going keep let now please some something spot start starts straight you your".split(
+    " ",
+  ),
+]);
 const TURNS: Record<string, number> = { left: 90, right: -90, around: 180, back: 180, backwards: 180 };
 const STOPS = new Set(["stop", "stand", "halt", "wait", "stay", "freeze", "still"].map(stem));
 const PACES: Record<string, number> = { faster: 1.4, quicker: 1.4, slower: 0.7 };
@@ -46,8 +51,12 @@ export function orderOf(text: string, net: Net, { asked, root }: Figure): Order 
 
 /** The gait that goes nowhere whose name is all that a sentence says: it is done once. */
 export function onceOf(text: string, net: Net): string | undefined {
-  const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word)).map(stem);
-  return words.length === 1 ? net.gaits.find((name) => !net.speeds[name]![1] && stem(name) === words[0]) : undefined;
+  const words = wordsOf(text)
+    .filter((word) => !IDLE.has(word) && !ALL.has(word))
+    .map(stem);
+  return words.length === 1
+    ? net.gaits.find((name) => !net.speeds[name]![1] && stem(name) === words[0])
+    : undefined;
 }
 
 /** Finds what a sentence asks for among sentences with further words that are said of the same. */
@@ -56,7 +65,10 @@ export class Phrases {
   private readonly known: string[];
 
   constructor(private readonly phrases: readonly { sentence: string; words: readonly string[] }[]) {
-    this.stems = phrases.map(({ sentence, words }) => new Set([...wordsOf(sentence), ...words].filter((word) => !IDLE.has(word)).map(stem)));
+    this.stems = phrases.map(
+      ({ sentence, words }) =>
+        new Set([...wordsOf(sentence), ...words].filter((word) => !IDLE.has(word)).map(stem)),
+    );
     this.known = [...new Set(phrases.flatMap(({ sentence, words }) => [...wordsOf(sentence), ...words]))];
   }
 
@@ -69,9 +81,15 @@ export class Phrases {
       const shared = asked.reduce((sum, word) => sum + (own.has(word) ? this.weight(word) : 0), 0);
       return { at, share: all ? shared / all : 0, ...this.own(at, asked) };
     });
-    const [best] = scores.sort((a, b) => b.share - a.share || b.said - a.said || a.rest - b.rest || a.at - b.at);
+    const [best] = scores.sort(
+      (a, b) => b.share - a.share || b.said - a.said || a.rest - b.rest || a.at - b.at,
+    );
     if (!best || best.share < ENOUGH) return { at: -1, lacking: words, confidence: best?.share ?? 0 };
-    return { at: best.at, lacking: words.filter((_, i) => !this.stems[best.at]!.has(asked[i]!)), confidence: best.share };
+    return {
+      at: best.at,
+      lacking: words.filter((_, i) => !this.stems[best.at]!.has(asked[i]!)),
+      confidence: best.share,
+    };
   }
 
   /** The stem of a word, or of the known one that it is a misspelling of. */

@@ -1,3 +1,5 @@
 import { figures } from "./figures.js";
 
-export default await figures(async (name) => new Uint8Array(await (await fetch(`/bundles/${name}.zip`)).arrayBuffer()));
+export default await figures(
+  async (name) => new Uint8Array(await (await fetch(`/bundles/${name}.zip`)).arrayBuffer()),
+);

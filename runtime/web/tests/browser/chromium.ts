@@ -7,12 +7,18 @@ import { delimiter, extname, join } from "node:path";
 import { accessSync, constants } from "node:fs";
 
 const NAMES = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
-const TYPES: Record<string, string> = { ".js": "text/javascript", ".mjs": "text/javascript", ".wasm": "application/wasm" };
+const TYPES: Record<string, string> = {
+  ".js": "text/javascript",
+  ".mjs": "text/javascript",
+  ".wasm": "application/wasm",
+};
 const SECONDS = 180;
 
 /** The browser that CHROME_PATH names, or the first one on the PATH. */
 function browser(): string {
-  const places = (process.env.PATH ?? "").split(delimiter).flatMap((folder) => NAMES.map((name) => join(folder, name)));
+  const places = (process.env.PATH ?? "")
+    .split(delimiter)
+    .flatMap((folder) => NAMES.map((name) => join(folder, name)));
   for (const place of process.env.CHROME_PATH ? [process.env.CHROME_PATH] : places) {
     try {
       accessSync(place, constants.X_OK);
@@ -21,7 +27,9 @@ function browser(): string {
       // the next one
     }
   }
-  throw new Error(`no Chromium at ${process.env.CHROME_PATH ?? "any place of PATH"}: install one, or name it in CHROME_PATH`);
+  throw new Error(
+    `no Chromium at ${process.env.CHROME_PATH ?? "any place of PATH"}: install one, or name it in CHROME_PATH`,
+  );
 }
 
 const page = (script: string) => `<!doctype html><meta charset="utf-8">
@@ -40,10 +48,19 @@ export async function inChromium(script: string): Promise<unknown> {
   const { server, reported } = await served(script);
   const { port } = server.address() as { port: number };
   const root = process.getuid?.() === 0 ? ["--no-sandbox"] : [];
-  const flags = ["--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", `--user-data-dir=${profile}`, ...root];
+  const flags = [
+    "--headless=new",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    `--user-data-dir=${profile}`,
+    ...root,
+  ];
   const child = spawn(program, [...flags, `http://localhost:${port}/`], { stdio: "ignore", detached: true });
   const ended = new Promise<never>((_, fail) => {
-    child.on("error", fail).on("exit", (code) => fail(new Error(`Chromium ended with ${code} before the page had reported`)));
+    child
+      .on("error", fail)
+      .on("exit", (code) => fail(new Error(`Chromium ended with ${code} before the page had reported`)));
     setTimeout(() => fail(new Error(`the page did not report within ${SECONDS} s`)), SECONDS * 1000).unref();
   });
   try {
@@ -70,8 +87,13 @@ async function served(script: string): Promise<{ server: Server; reported: Promi
     const file = path.startsWith("/bundles/") ? `../motet${path}` : `.${path}`;
     const found = path === "/" ? page(script) : await readFile(file).catch(() => null);
     // what lets a page have threads
-    const headers = { "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp" };
-    response.writeHead(found ? 200 : 404, { ...headers, "Content-Type": TYPES[extname(path)] ?? "text/html" }).end(found ?? "");
+    const headers = {
+      "Cross-Origin-Opener-Policy": "same-origin",
+      "Cross-Origin-Embedder-Policy": "require-corp",
+    };
+    response
+      .writeHead(found ? 200 : 404, { ...headers, "Content-Type": TYPES[extname(path)] ?? "text/html" })
+      .end(found ?? "");
   });
   await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
   return { server, reported };
