@@ -1,7 +1,6 @@
 /* What a steered figure is told to do, laid over its steps: docs/reference/bundle.md, "Acts". */
 import { ACTING, MATCHING, actSettings } from "./generated.js";
 import { type Act, stepOf } from "./acts.js";
-import type { ControlModel } from "./control.js";
 import { BONES, LEG, SIDES } from "./humanoid.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
@@ -16,7 +15,7 @@ import {
   vectorOf,
 } from "./rotations.js";
 import { clamp, damped, dampingOf, wrapped } from "./springs.js";
-import type { Played } from "./steering.js";
+import type { Played, Steerer } from "./steering.js";
 import type { Settings } from "./settings.js";
 
 const LOWER = ["hips", ...SIDES.flatMap((side) => LEG.map((part) => side + part))];
@@ -59,8 +58,15 @@ export interface Acting {
   drift: Ground;
 }
 
+/** What acts are laid over steps with. */
+export interface ActingModel {
+  readonly steerer: Steerer;
+  readonly acts: Settings<typeof actSettings>;
+  readonly fps: number;
+}
+
 /** Of a figure that does nothing but stand or go. */
-export function noAct({ steerer }: ControlModel, playback: Playback): Acting {
+export function noAct(steerer: Steerer, playback: Playback): Acting {
   const base = steerer.body(playback);
   const none = () => Array<number>(3 * BONES.length + 1).fill(0);
   const body = { base, shown: base, before: base };
@@ -90,7 +96,7 @@ export function doing({ playing, asked }: Acting, fps: number): Doing | null {
 
 /** Before a tick: go on by a frame, begin what is asked, end what is over. Whether something else is shown from now on. */
 export function begin(
-  model: ControlModel,
+  model: ActingModel,
   acting: Acting,
   playback: Playback,
   target: Target,
@@ -118,7 +124,7 @@ function next(now: Playing, goes: boolean): Playing | null {
 
 /** The act that is asked for, at the frame after the one that is most like the figure. */
 function entered(
-  { steerer: { matcher }, acts: how, fps }: ControlModel,
+  { steerer: { matcher }, acts: how, fps }: ActingModel,
   { playing }: Acting,
   act: Act,
   upper: boolean | undefined,
@@ -145,7 +151,7 @@ function entered(
 
 /** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */
 export function laid(
-  { acts: how, steerer: { matcher } }: ControlModel,
+  { acts: how, steerer: { matcher } }: ActingModel,
   acting: Acting,
   pose: Played,
   playback: Playback,

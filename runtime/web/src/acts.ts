@@ -1,6 +1,6 @@
 /* Acts, short motions of the humanoid that a steered figure can be told to do: docs/reference/bundle.md, "Acts". */
 import { ACTS } from "./generated.js";
-import type { ControlModel } from "./control.js";
+import type { Manifest } from "./bundle.js";
 import { ControlError } from "./errors.js";
 import { framesFor } from "./frames.js";
 import { contacts } from "./hold.js";
@@ -38,12 +38,18 @@ export interface Act {
   features: number[][];
 }
 
+/** The rate of acts, and how slow what rests in them is: those of a `ControlModel`. */
+export interface ActModel {
+  readonly fps: number;
+  readonly acts: { readonly rest: number };
+}
+
 /**
  * The act of frames, one after the other: of each, quaternions x, y, z, w of the 22 bones, the hips' in the frame of the
  * facing; x and z of the root in metres, its facing in radians; the hips' height in metres. What rests at both ends is left
  * out. ControlError for what is no act.
  */
-export function actOf({ fps, acts: { rest } }: ControlModel, name: string, numbers: ArrayLike<number>): Act {
+export function actOf({ fps, acts: { rest } }: ActModel, name: string, numbers: ArrayLike<number>): Act {
   const values = Array.from(numbers);
   const frames = values.length / ACTS.WIDTH;
   if (!Number.isInteger(frames) || frames < ACTS.SHORTEST)
@@ -112,7 +118,7 @@ export function reachOf({ ground }: Act): number {
 }
 
 /** The frames of a motion of any human figure, as `actOf` takes them. */
-export function numbersOf({ manifest, fps }: ControlModel, motion: Motion): number[] {
+export function numbersOf({ manifest, fps }: { manifest: Manifest; fps: number }, motion: Motion): number[] {
   let ground: Ground = [0, 0, 0];
   return framesFor(motion, manifest).flatMap((frame, at) => {
     const [forward, left, turn, height] = frame as [number, number, number, number];

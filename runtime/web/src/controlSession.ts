@@ -98,7 +98,7 @@ export class ControlSession {
     phases: readonly number[] | null,
   ) {
     const figures = Array.from({ length: characters }, (_, at) =>
-      standing(model, gait, undefined, phases?.[at]),
+      standing(model.steerer, gait, undefined, phases?.[at]),
     );
     this.state = { figures, room: 0, shown: null, ahead: 0, late: figures.map(() => []) };
   }
@@ -380,7 +380,7 @@ export class ControlSession {
       figure.target = this.model.abilities.target(figure.command).target;
       figure.going = null;
       figure.lock = newLock();
-      figure.acting = noAct(this.model, playback);
+      figure.acting = noAct(this.model.steerer, playback);
     });
     this.state.shown?.[1].forEach((pose, at) => this.state.late[at]!.push(...pose.events));
     this.state.shown = null; // nothing lies between there and here

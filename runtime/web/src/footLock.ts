@@ -1,28 +1,12 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
 import { LOCK, footLockSettings } from "./generated.js";
-import { BONES, HUMANOID, LEG, SIDES, SOLES } from "./humanoid.js";
-import { TwoBones } from "./twoBones.js";
-import {
-  about,
-  inverse,
-  minus,
-  plus,
-  product,
-  type Quaternion,
-  rotated,
-  type Vector,
-  X,
-  Y,
-} from "./rotations.js";
+import { LEG, SOLES } from "./humanoid.js";
+import { legOf, reach } from "./legs.js";
+import { about, minus, plus, product, rotated, type Vector, Y } from "./rotations.js";
 import { damped, dampingOf } from "./springs.js";
 import type { Settings } from "./settings.js";
 import type { Played } from "./steering.js";
 
-export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
-/** Where the joints of a leg begin in their parents' frames. */
-export const OFFSETS = LEGS.map((bones) =>
-  bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset),
-);
 /** Points of a sole, heel, ball and tip, and which joint of a leg carries each. */
 const POINTS = LEG.flatMap((part, joint) =>
   (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]),
@@ -77,24 +61,6 @@ export function held(lock: Lock, pose: Played, how: Settings<typeof footLockSett
   return { ...pose, rotations };
 }
 
-export interface Limb {
-  turned: Quaternion[];
-  places: Vector[];
-}
-
-/** Rotations and places in the world of the joints of a leg. */
-export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, root: Vector): Limb {
-  let [above, place] = [hips, root];
-  const [turned, places]: [Quaternion[], Vector[]] = [[], []];
-  LEGS[side]!.forEach((bone, joint) => {
-    place = plus(place, rotated(above, OFFSETS[side]![joint]!));
-    above = product(above, rotations[bone]!);
-    turned.push(above);
-    places.push(place);
-  });
-  return { turned, places };
-}
-
 /** Move a foot whose point that bears it was moved since the last tick; how far that is then shown to move. */
 function shift(
   foot: Foot,
@@ -116,23 +82,4 @@ function shift(
     [rateX, rateZ],
   ];
   return Math.hypot(offX - stay[0], offZ - stay[1]);
-}
-
-/** Turn thigh, shin and foot of a leg so that the ankle is moved; the foot stays as it is in the world. */
-export function reach(
-  rotations: Quaternion[],
-  side: number,
-  hips: Quaternion,
-  { turned, places }: Limb,
-  move: Vector,
-): void {
-  const [hip, knee, ankle] = places as [Vector, Vector, Vector];
-  const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
-  const leg = new TwoBones(hip, knee, ankle, rotated(shin, X));
-  const turns = leg.turns(leg.eased(plus(ankle, move)));
-  const [above, below] = [product(turns.thigh, thigh), product(turns.shin, shin)];
-  const bones = LEGS[side]!;
-  rotations[bones[0]!] = product(inverse(hips), above);
-  rotations[bones[1]!] = product(inverse(above), below);
-  rotations[bones[2]!] = product(inverse(below), foot);
 }

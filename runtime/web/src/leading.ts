@@ -2,13 +2,12 @@
 import { LEADING } from "./generated.js";
 import { aside, keptApart } from "./apart.js";
 import { faces, onward, settle } from "./arriving.js";
-import type { ControlModel } from "./control.js";
 import type { Command, Gaits } from "./gaits.js";
 import type { Target } from "./matching.js";
-import { hasten, type Steered } from "./steered.js";
+import { hasten, type Steered, type SteeringModel } from "./steered.js";
 
 /** Let those that are on a way go on, and those that move keep `room` metres apart, if it is not 0. */
-export function lead({ abilities, steerer, fps }: ControlModel, figures: Steered[], room: number): void {
+export function lead({ abilities, steerer, fps }: SteeringModel, figures: Steered[], room: number): void {
   const halfLife = steerer.matcher.how.velocity;
   const before = figures.map(({ target, command }) => ({ target, gait: command.gait }));
   for (const figure of figures) {

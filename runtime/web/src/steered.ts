@@ -1,16 +1,23 @@
 /* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
-import { type Acting, begin, laid, noAct } from "./acting.js";
+import type { footLockSettings } from "./generated.js";
+import { type Acting, type ActingModel, begin, laid, noAct } from "./acting.js";
 import type { Going } from "./arriving.js";
-import type { ControlModel } from "./control.js";
 import type { Happenings } from "./events.js";
 import { held, type Lock, newLock } from "./footLock.js";
-import type { Command } from "./gaits.js";
+import type { Command, Gaits } from "./gaits.js";
 import { ahead, type Look, looked } from "./looking.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "./planar.js";
 import { idle, type Reach, reached } from "./reaching.js";
 import { breathed, kept, notYet, type Standing } from "./standing.js";
-import type { Played } from "./steering.js";
+import type { Settings } from "./settings.js";
+import type { Played, Steerer } from "./steering.js";
+
+/** What figures are steered with. */
+export interface SteeringModel extends ActingModel {
+  readonly abilities: Gaits;
+  readonly lock: Settings<typeof footLockSettings>;
+}
 
 export interface Steered {
   playback: Playback;
@@ -29,9 +36,9 @@ export interface Steered {
 }
 
 /** A figure that stands still at a place; with a phase it searches in its turn alone, first after so many ticks. */
-export function standing(model: ControlModel, gait: number, place?: Ground, phase?: number): Steered {
+export function standing(steerer: Steerer, gait: number, place?: Ground, phase?: number): Steered {
   const facing = place?.[2] ?? 0;
-  const { matcher } = model.steerer;
+  const { matcher } = steerer;
   const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
   const told: Pick<Steered, "going" | "look" | "hands"> = {
@@ -41,7 +48,7 @@ export function standing(model: ControlModel, gait: number, place?: Ground, phas
   };
   return {
     playback,
-    acting: noAct(model, playback),
+    acting: noAct(steerer, playback),
     lock: newLock(),
     standing: notYet(),
     command,
@@ -66,7 +73,7 @@ export function hasten(playback: Playback): void {
 }
 
 /** The next pose, 1 / fps seconds later. raw: a target in place of the figure's own, gone for as it is. */
-export function tick(model: ControlModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
+export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
   const { playback, acting, command } = figure;
   const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
   const { steerer, lock: how, fps } = model;

@@ -1,7 +1,7 @@
 /* Legs go another way, hips turned with them and the spine back, and with other strides: docs/reference/bundle.md, the loop `matching`. */
 import { WARPING } from "./generated.js";
-import { legOf, OFFSETS, reach } from "./footLock.js";
 import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "./humanoid.js";
+import { legOf, OFFSETS, reach } from "./legs.js";
 import { about, inverse, plus, product, type Quaternion, rotated, Y } from "./rotations.js";
 
 /** Which bones turn back, each by the same share. */

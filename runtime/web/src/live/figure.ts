@@ -50,7 +50,7 @@ export class Figure {
     place: Ground,
     phase?: number,
   ) {
-    this.steered = standing(model, 0, place, phase);
+    this.steered = standing(model.steerer, 0, place, phase);
     this.before = this.now = tick(model, this.steered, true);
   }
 
