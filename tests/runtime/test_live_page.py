@@ -99,7 +99,7 @@ def page(tmp_path_factory: pytest.TempPathFactory, steer_model: SteerModel) -> A
 
 def ticks(page: Browser, count: int = 45) -> SimpleNamespace:
     """Where the steered figure is, and how its speed is, after so many ticks with what is pressed."""
-    told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.asked());"
+    told = f"(() => {{ for (let n = 0; n < {count}; n++) motet.tick(motet.command());"
     told += " const { root, velocity } = motet.figures[0]; return { root, velocity }; })()"
     figure = page.value(told)
     return SimpleNamespace(place=np.array(figure["root"][:2]), facing=figure["root"][2], going=figure["velocity"])
@@ -185,17 +185,17 @@ def test_buttons_and_the_stick(page: Browser) -> None:
     assert page.value("motet.figures.length") == 2
     page.value("document.querySelector('#others').focus()")  # letters steer there, too
     page.key("KeyS", "s", down=True)
-    assert page.value("Math.hypot(motet.asked().x, motet.asked().z)") > 1
+    assert page.value("Math.hypot(motet.command().x, motet.command().z)") > 1
     page.key("KeyS", "s", down=False)
     box = page.value("(({ x, y, width }) => [x, y, width])(document.querySelector('#stick').getBoundingClientRect())")
     x, y = box[0] + box[2] / 2, box[1] + box[2] / 2
     page.mouse("mousePressed", x, y)
     page.mouse("mouseMoved", x, y - 0.4 * box[2])
-    pushed = page.value("motet.asked()")
+    pushed = page.value("motet.command()")
     page.mouse("mouseReleased", x, y)
     usual = page.value("motet.net.speeds.run[1]")
     assert np.hypot(pushed["x"], pushed["z"]) == pytest.approx(0.8 * usual, rel=0.05)
-    assert page.value("motet.asked()")["x"] == 0
+    assert page.value("motet.command()")["x"] == 0
     assert page.errors == []
 
 
@@ -205,7 +205,7 @@ def test_a_jump_is_done_once_and_the_gait_goes_on(page: Browser, told: str) -> N
     jump = page.value("motet.net.gaits.indexOf('jump')")
     page.value("for (let n = 0; n < 120; n++) motet.tick({ gait: 0, x: 0, z: 1.3, facing: 0 })")
     if told:
-        assert page.value(f"motet.told('{told}')") == "jump"
+        assert page.value(f"motet.obey('{told}')") == "jump"
     else:
         page.value(f"document.querySelectorAll('#gaits button')[{jump}].click()")
     lowest = page.value("""(() => {
@@ -235,18 +235,18 @@ GAMEPAD = """(async () => {
   const pushes = [];
   for (const push of [0.16, 0.7, 1]) {
     await frames(given([], [0, -push, 0, 0]));
-    pushes.push(motet.asked());
+    pushes.push(motet.command());
   }
   await frames(given([], [0, 0.05, 0, 0]));
-  const yaw = motet.view.yaw, asked = [motet.asked()];
+  const yaw = motet.view.yaw, asked = [motet.command()];
   await frames(given([7], [0, -0.8, 1, 0]));
-  asked.push(motet.asked());
+  asked.push(motet.command());
   const turned = motet.view.yaw - yaw;
   await frames(given([5], [0, 0, 0, 0]));
   const gait = motet.state.gait;
   await frames(given([], [1, 0, 0, 0]));
   await frames([null]);
-  asked.push(motet.asked());
+  asked.push(motet.command());
   return { asked, turned, gait, pushes };
 })()"""
 """A gamepad: pushed ever farther; at rest; its trigger and both sticks pushed; a shoulder button; then it is gone."""

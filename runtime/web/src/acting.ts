@@ -42,7 +42,7 @@ export interface Acting {
   playing: Playing | null;
   /** Begun in the next tick, null to end what is played; upper: by the upper body alone, undefined: by the whole body where it stands, or where
    *  the act is one of the legs. */
-  asked: { act: Act | null; upper: boolean | undefined } | null;
+  request: { act: Act | null; upper: boolean | undefined } | null;
   /** Of the last tick without acts; as it was shown; and as it was shown in the tick before. */
   base: Body;
   shown: Body;
@@ -72,7 +72,7 @@ export function noAct(steerer: Steerer, playback: Playback): Acting {
   const body = { base, shown: base, before: base };
   return {
     playing: null,
-    asked: null,
+    request: null,
     ...body,
     led: false,
     offset: none(),
@@ -89,8 +89,8 @@ export interface Doing {
   left: number;
 }
 
-export function doing({ playing, asked }: Acting, fps: number): Doing | null {
-  if (asked) return asked.act && { name: asked.act.name, left: (asked.act.height.length - 1) / fps };
+export function doing({ playing, request }: Acting, fps: number): Doing | null {
+  if (request) return request.act && { name: request.act.name, left: (request.act.height.length - 1) / fps };
   return playing && { name: playing.act.name, left: (playing.act.height.length - 1 - playing.frame) / fps };
 }
 
@@ -102,19 +102,19 @@ export function begin(
   target: Target,
   gait: number,
 ): boolean {
-  const { playing: now, asked } = acting;
-  if (!now && !asked) return false;
+  const { playing: now, request } = acting;
+  if (!now && !request) return false;
   const goes = Math.hypot(target[0], target[1]) > 0;
-  const after = !asked
+  const after = !request
     ? next(now!, goes)
-    : asked.act && entered(model, acting, asked.act, asked.upper, playback, goes);
-  [acting.playing, acting.asked] = [after, null];
+    : request.act && entered(model, acting, request.act, request.upper, playback, goes);
+  [acting.playing, acting.request] = [after, null];
   if (now?.whole && !after?.whole) {
     const { steerer } = model;
     steerer.matcher.follow(playback, target, gait, steerer.matcher.scaled(now.act.features[now.frame]!));
     acting.base = steerer.body(playback);
   }
-  return !!asked || !after || after.whole !== now?.whole;
+  return !!request || !after || after.whole !== now?.whole;
 }
 
 function next(now: Playing, goes: boolean): Playing | null {
@@ -124,14 +124,14 @@ function next(now: Playing, goes: boolean): Playing | null {
 
 /** The act that is asked for, at the frame after the one that is most like the figure. */
 function entered(
-  { steerer: { matcher }, acts: how, fps }: ActingModel,
+  { steerer: { matcher }, acts: settings, fps }: ActingModel,
   { playing }: Acting,
   act: Act,
   upper: boolean | undefined,
   playback: Playback,
   goes: boolean,
 ): Playing {
-  const moves = goes || Math.hypot(playback.spring[0], playback.spring[1]) > matcher.how.idle;
+  const moves = goes || Math.hypot(playback.spring[0], playback.spring[1]) > matcher.settings.idle;
   const stays = moves && act.legs; // its legs go on as it ends
   const whole = upper === undefined ? stays || !moves : !upper;
   const isNow = matcher.now(playback);
@@ -139,7 +139,7 @@ function entered(
     matcher
       .scaled(playing.act.features[playing.frame]!)
       .forEach((value, i) => (playing.whole || i >= HANDS) && (isNow[i] = value));
-  const entries = Math.min(Math.round(how.entry * fps), Math.floor((act.height.length - 1) / 3)) + 1;
+  const entries = Math.min(Math.round(settings.entry * fps), Math.floor((act.height.length - 1) / 3)) + 1;
   let [best, least] = [0, Infinity];
   for (let frame = 0; frame < entries; frame++) {
     const off = matcher.scaled(act.features[frame]!).map((value, i) => value - isNow[i]!);
@@ -151,7 +151,7 @@ function entered(
 
 /** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */
 export function laid(
-  { acts: how, steerer: { matcher } }: ActingModel,
+  { acts: settings, steerer: { matcher } }: ActingModel,
   acting: Acting,
   pose: Played,
   playback: Playback,
@@ -164,7 +164,7 @@ export function laid(
   const step: Ground = playing?.whole
     ? stepOf(playing.act, playing.frame, root[2])
     : [playback.root[0] - root[0], playback.root[1] - root[1], wrapped(playback.root[2] - root[2])];
-  if (changed) lose(acting, how, base, step, dt);
+  if (changed) lose(acting, settings, base, step, dt);
   acting.before = acting.shown;
   acting.led = !!playing?.whole;
   if (!playing && !acting.offset.some((value) => value)) {
@@ -172,7 +172,7 @@ export function laid(
     acting.going = each((i) => step[i]! / dt);
     return pose;
   }
-  fade(acting, how, dt);
+  fade(acting, settings, dt);
   acting.shown = plus(source(acting, acting.base, 0), acting.offset);
   acting.going = each((i) => step[i]! / dt + acting.drift[i]!);
   const to = playing?.whole ? each((i) => root[i]! + step[i]!) : playback.root;
@@ -240,9 +240,9 @@ function source({ playing }: Acting, base: Body, back: number): Body {
   const { act, frame, whole } = playing;
   const rotations = act.rotations[frame - back]!;
   if (whole) return { rotations, height: act.height[frame - back]! };
-  const found = base.rotations.map((own, bone) => (UPPER[bone] ? rotations[bone]! : own));
-  found[SPINE] = product(inverse(base.rotations[0]!), product(rotations[0]!, rotations[SPINE]!));
-  return { rotations: found, height: base.height };
+  const blended = base.rotations.map((rotation, bone) => (UPPER[bone] ? rotations[bone]! : rotation));
+  blended[SPINE] = product(inverse(base.rotations[0]!), product(rotations[0]!, rotations[SPINE]!));
+  return { rotations: blended, height: base.height };
 }
 
 function vectorAt(more: number[], bone: number): Vector {
@@ -251,11 +251,15 @@ function vectorAt(more: number[], bone: number): Vector {
 
 /** What is to be added to another body to make it this one. */
 function since(body: Body, other: Body): number[] {
-  const turns = body.rotations.map((own, bone) => vectorOf(product(own, inverse(other.rotations[bone]!))));
+  const turns = body.rotations.map((rotation, bone) =>
+    vectorOf(product(rotation, inverse(other.rotations[bone]!))),
+  );
   return [...turns.flat(), body.height - other.height];
 }
 
 function plus({ rotations, height }: Body, more: number[]): Body {
-  const turned = rotations.map((own, bone): Quaternion => product(ofVector(vectorAt(more, bone)), own));
+  const turned = rotations.map((rotation, bone): Quaternion =>
+    product(ofVector(vectorAt(more, bone)), rotation),
+  );
   return { rotations: turned, height: height + more.at(-1)! };
 }

@@ -106,7 +106,7 @@ function byLegs(height: number[], ground: Ground[], features: number[][]): boole
   const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
   return (
     range([ACTS.STANDS, ...height]) > ACTS.BENT ||
-    Math.max(...features.map((one) => Math.max(one[1]!, one[4]!))) > ACTS.RAISED ||
+    Math.max(...features.map((feature) => Math.max(feature[1]!, feature[4]!))) > ACTS.RAISED ||
     range(turned) > ACTS.TURNED
   );
 }
@@ -138,9 +138,9 @@ function chunks(values: number[], width: number): number[][] {
 /** Poses, a tick after each other, as a motion of the humanoid. */
 export function motionOf(poses: Pick<Played, "ground" | "rotations" | "height">[], fps = 30): Motion {
   const rotations = poses.map((pose) => {
-    const own = HUMANOID.names.map((name): Quaternion => pose.rotations[BONES.indexOf(name)] ?? STILL);
-    own[0] = product(about(Y, pose.ground[2]), own[0]!);
-    return own;
+    const turns = HUMANOID.names.map((name): Quaternion => pose.rotations[BONES.indexOf(name)] ?? STILL);
+    turns[0] = product(about(Y, pose.ground[2]), turns[0]!);
+    return turns;
   });
   const translations = poses.map(({ ground: [x, z], height }) =>
     HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [x, height, z])),

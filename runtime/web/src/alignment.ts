@@ -33,9 +33,9 @@ export const RADIANS = Math.PI / 180;
 
 /** The rotation whose y axis is up, with x as near to left as it can be; or, not upright, x left and y as near to up. */
 export function frame(left: Vector, up: Vector, upright = true): Quaternion {
-  const [given, other] = upright ? [unit(up), left] : [unit(left), up];
-  const square = unit(minus(other, times(given, dot(other, given))));
-  const [x, y] = upright ? [square, given] : [given, square];
+  const [first, other] = upright ? [unit(up), left] : [unit(left), up];
+  const square = unit(minus(other, times(first, dot(other, first))));
+  const [x, y] = upright ? [square, first] : [first, square];
   return quaternionOf([x, y, cross(x, y)]);
 }
 
@@ -55,31 +55,31 @@ export function nearAxes(turn: Quaternion, degrees: number): Quaternion {
 export function bodyFrame(pose: Vector[], body: Body, exact = false): Quaternion | null {
   const [across, up] = [body.toLeft(pose, "UpperLeg"), body.legsUp(pose)];
   if (!size(across) || Math.abs(dot(unit(across), up)) > 0.9) return null;
-  const found = frame(across, up);
-  const own = exact ? found : nearAxes(found, 15);
-  const seen = (vector: Vector) => rotated(inverse(own), vector);
+  const axes = frame(across, up);
+  const bodyTurn = exact ? axes : nearAxes(axes, 15);
+  const seen = (vector: Vector) => rotated(inverse(bodyTurn), vector);
   const bones = (parts: string[]) =>
     SIDES.flatMap((side) => parts.map((part) => side + part)).filter((bone) => body.aimed(bone));
   const legs = bones(LEG.slice(0, 2)).every((bone) => seen(body.direction(pose, bone))[1] < -0.75);
-  const stands = legs && dot(body.trunkUp(pose), rotated(own, Y)) > 0.85;
+  const stands = legs && dot(body.trunkUp(pose), rotated(bodyTurn, Y)) > 0.85;
   const feet = bones(["Foot"]).every((bone) => seen(body.direction(pose, bone))[2] > 0.2);
   const arms = ["UpperArm", "LowerArm"].every((part) => seen(body.toLeft(pose, part))[0] > 0);
-  return stands && feet && arms ? own : null;
+  return stands && feet && arms ? bodyTurn : null;
 }
 
 /** Whether the rest pose is one out of a motion: limbs of left and right differ, and are not along axes. */
 export function restsInMotion(body: Body): boolean {
   const { rest } = body.skeleton;
-  const own = frame(body.toLeft(rest, "UpperLeg"), body.trunkUp(rest));
+  const bodyTurn = frame(body.toLeft(rest, "UpperLeg"), body.trunkUp(rest));
   const parts = [...LEG.slice(0, 2), ...ARM.slice(1, 3)].filter((part) => body.aimed(`left${part}`));
   const [left, right] = SIDES.map((side) => parts.map((part) => body.direction(rest, side + part))) as [
     Vector[],
     Vector[],
   ];
-  const seen = (vector: Vector) => rotated(inverse(own), vector);
+  const seen = (vector: Vector) => rotated(inverse(bodyTurn), vector);
   const mirrored = ([x, y, z]: Vector): Vector => [-x, y, z];
-  const alike = left.map((one, at) => dot(seen(one), mirrored(seen(right[at]!))));
-  const along = [...left, ...right].map((one) => Math.max(...one.map(Math.abs)));
+  const alike = left.map((direction, at) => dot(seen(direction), mirrored(seen(right[at]!))));
+  const along = [...left, ...right].map((direction) => Math.max(...direction.map(Math.abs)));
   return Math.min(...alike) < Math.cos(6 * RADIANS) && Math.min(...along) < Math.cos(18 * RADIANS);
 }
 
@@ -88,37 +88,42 @@ export function alignmentsOfPose(
   body: Body,
   turns: Quaternion[],
   pose: Vector[],
-  own: Quaternion,
+  bodyTurn: Quaternion,
 ): Quaternion[] {
   const { map, skeleton } = body;
   const bones = [...Object.keys(map.joints), "spine", "neck"];
-  const known = (bone: string) => product(own, ofVector(times(map.rest![bone] ?? [0, 0, 0], RADIANS)));
-  const found = map.rest
+  const known = (bone: string) => product(bodyTurn, ofVector(times(map.rest![bone] ?? [0, 0, 0], RADIANS)));
+  const wishes = map.rest
     ? Object.fromEntries(bones.map((bone) => [bone, known(bone)]))
-    : foundTurns(body, pose, own);
-  const wanted = new Map(Object.entries(map.joints).map(([bone, joint]) => [joint, found[bone]!]));
-  wanted.set(carrierOf(map, skeleton), found.hips!);
-  for (const joint of map.spine) wanted.set(joint, found.spine ?? own);
-  for (const joint of map.neck) wanted.set(joint, found.neck ?? own);
+    : foundTurns(body, pose, bodyTurn);
+  const wanted = new Map(Object.entries(map.joints).map(([bone, joint]) => [joint, wishes[bone]!]));
+  wanted.set(carrierOf(map, skeleton), wishes.hips!);
+  for (const joint of map.spine) wanted.set(joint, wishes.spine ?? bodyTurn);
+  for (const joint of map.neck) wanted.set(joint, wishes.neck ?? bodyTurn);
   return turns.map((turn, joint) => (wanted.has(joint) ? product(inverse(turn), wanted.get(joint)!) : STILL));
 }
 
 /** Rotations of the humanoid's bones that make its limbs point where those of the pose do, each carried by the last. */
-function foundTurns(body: Body, pose: Vector[], own: Quaternion): Record<string, Quaternion> {
-  const found: Record<string, Quaternion> = { hips: own, head: own, leftShoulder: own, rightShoulder: own };
+function foundTurns(body: Body, pose: Vector[], bodyTurn: Quaternion): Record<string, Quaternion> {
+  const turned: Record<string, Quaternion> = {
+    hips: bodyTurn,
+    head: bodyTurn,
+    leftShoulder: bodyTurn,
+    rightShoulder: bodyTurn,
+  };
   for (const limb of LIMBS) {
-    let carried = own;
-    for (const bone of limb.filter((one) => body.map.joints[one] !== undefined)) {
+    let carried = bodyTurn;
+    for (const bone of limb.filter((name) => body.map.joints[name] !== undefined)) {
       if (body.aimed(bone) && !bone.endsWith("Toes")) {
         const [target, start] = [body.direction(pose, bone), rotated(carried, directionOf(bone))];
-        if (bone.endsWith("Foot")) carried = footTurn(target, own, carried);
+        if (bone.endsWith("Foot")) carried = footTurn(target, bodyTurn, carried);
         else if (!bone.endsWith("Hand") || dot(start, target) > 0.8)
           carried = product(swing(start, target), carried);
       }
-      found[bone] = carried;
+      turned[bone] = carried;
     }
   }
-  return found;
+  return turned;
 }
 
 /** A foot's rotation: by its heading alone, rolled with the leg where it lies in the leg's plane. */
@@ -145,11 +150,11 @@ export function axesAgree(body: Body, { turns, places }: World): boolean {
   return (
     known.length > 0 &&
     known.every(([joint, direction, along]) => {
-      const own = meanDirection(
+      const pointing = meanDirection(
         turns.map((turned) => turned[joint]!),
         along,
       );
-      return dot(own, rotated(knownAxes(map.axes[joint]!), direction)) > 0.7;
+      return dot(pointing, rotated(knownAxes(map.axes[joint]!), direction)) > 0.7;
     })
   );
 }

@@ -52,10 +52,10 @@ export function readNpy(name: string, bytes: Uint8Array): NumberArray & { descr:
     throw new BundleError(`${name} is not a .npy file of version 1.0`);
   const start = 10 + bytes[8]! + 256 * bytes[9]!;
   const text = String.fromCharCode(...bytes.subarray(10, Math.min(start, 10 + LONGEST)));
-  const found = /^\{'descr': '([^']+)', 'fortran_order': False, 'shape': \(([0-9, ]*)\), \}\s*$/.exec(text);
-  if (!found) throw new BundleError(`${name}: its header is not one that motet writes`);
-  const descr = found[1]!;
-  const shape = found[2]!
+  const header = /^\{'descr': '([^']+)', 'fortran_order': False, 'shape': \(([0-9, ]*)\), \}\s*$/.exec(text);
+  if (!header) throw new BundleError(`${name}: its header is not one that motet writes`);
+  const descr = header[1]!;
+  const shape = header[2]!
     .split(",")
     .map((size) => size.trim())
     .filter(Boolean)
@@ -74,26 +74,26 @@ export function readNpy(name: string, bytes: Uint8Array): NumberArray & { descr:
 /** The arrays of an .npz file by name. */
 export async function readNpz(bytes: Uint8Array, limit: number): Promise<Map<string, NumberArray>> {
   const zip = openZip(bytes);
-  const found = new Map<string, NumberArray>();
+  const arrays = new Map<string, NumberArray>();
   for (const name of zip.names)
-    found.set(name.replace(/\.npy$/, ""), readNpy(name, await zip.read(name, limit)));
-  return found;
+    arrays.set(name.replace(/\.npy$/, ""), readNpy(name, await zip.read(name, limit)));
+  return arrays;
 }
 
 /** Numbers of half precision. */
 export function halves(bits: Uint16Array): Float32Array {
-  const found = new Float32Array(bits.length);
-  const words = new Uint32Array(found.buffer);
+  const values = new Float32Array(bits.length);
+  const words = new Uint32Array(values.buffer);
   for (let at = 0; at < bits.length; at++) {
     const half = bits[at]!;
     const exponent = half & 0x7c00;
     if (exponent && exponent < 0x7c00)
       words[at] = ((half & 0x8000) << 16) | (((half & 0x7fff) + 0x1c000) << 13);
     else
-      found[at] =
+      values[at] =
         (half & 0x8000 ? -1 : 1) * (exponent ? (half & 1023 ? NaN : Infinity) : (half & 1023) * 2 ** -24);
   }
-  return found;
+  return values;
 }
 
 /** Rows of a two-dimensional array without copies. */
@@ -103,15 +103,15 @@ export function rows<T extends Float32Array | Float64Array>({ data, shape }: Num
 }
 
 /** Rows of equal length as one array. */
-export function stacked(given: ArrayLike<number>[], ...shape: number[]): NumberArray<Float32Array> {
-  const width = given[0]?.length ?? 0;
-  const data = new Float32Array(given.length * width);
-  given.forEach((row, at) => data.set(row, at * width));
-  return { data, shape: shape.length ? shape : [given.length, width] };
+export function stacked(vectors: ArrayLike<number>[], ...shape: number[]): NumberArray<Float32Array> {
+  const width = vectors[0]?.length ?? 0;
+  const data = new Float32Array(vectors.length * width);
+  vectors.forEach((row, at) => data.set(row, at * width));
+  return { data, shape: shape.length ? shape : [vectors.length, width] };
 }
 
 /** Whole numbers as int64. */
-export function integers(given: Iterable<number>, ...shape: number[]): NumberArray<BigInt64Array> {
-  const data = BigInt64Array.from(Array.from(given, BigInt));
+export function integers(values: Iterable<number>, ...shape: number[]): NumberArray<BigInt64Array> {
+  const data = BigInt64Array.from(Array.from(values, BigInt));
   return { data, shape: shape.length ? shape : [data.length] };
 }

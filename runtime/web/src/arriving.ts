@@ -21,11 +21,11 @@ export interface Going {
 }
 
 /** On a path of two points or more. */
-export function sent(points: Point[], told: Pick<Going, "gait" | "speed" | "facing">): Going {
+export function sent(points: Point[], order: Pick<Going, "gait" | "speed" | "facing">): Going {
   const along = [0];
   for (let at = 1; at < points.length; at++)
     along.push(along[at - 1]! + distance(points[at - 1]!, points[at]!));
-  return { points, along, gone: 0, stops: false, arrived: false, ...told };
+  return { points, along, gone: 0, stops: false, arrived: false, ...order };
 }
 
 /** A tick later: the velocity at which the figure is to go, [0, 0] for standing. */
@@ -76,8 +76,8 @@ export function settle(
 
 /** The point of a path that is so many metres from its beginning. */
 function at({ points, along }: Going, gone: number): Point {
-  const found = along.findIndex((metres) => metres > gone);
-  const after = clamp(found < 0 ? along.length : found, 1, along.length - 1);
+  const beyond = along.findIndex((metres) => metres > gone);
+  const after = clamp(beyond < 0 ? along.length : beyond, 1, along.length - 1);
   const [start, stop] = [along[after - 1]!, along[after]!];
   const part = clamp((gone - start) / Math.max(stop - start, 1e-9), 0, 1);
   const [from, to] = [points[after - 1]!, points[after]!];

@@ -32,9 +32,9 @@ export async function beamSearch(
   const { start, end, banned, longest } = limits;
   let kept: Open[] = [{ ids: [], score: 0, ended: false }];
   let states = step.zeroState(1);
-  for (let length = 0; length <= longest && kept.some((one) => !one.ended); length++) {
-    const open = kept.filter((one) => !one.ended);
-    const word = integers(open.map((one) => one.ids.at(-1) ?? start));
+  for (let length = 0; length <= longest && kept.some((hypothesis) => !hypothesis.ended); length++) {
+    const open = kept.filter((hypothesis) => !hypothesis.ended);
+    const word = integers(open.map((hypothesis) => hypothesis.ids.at(-1) ?? start));
     const repeated = taken(
       { context },
       open.map(() => 0),
@@ -43,22 +43,22 @@ export async function beamSearch(
     const { data, shape } = outputs.log_probabilities!;
     const words = shape[1]!;
     const grown: (Open & { parent: number })[] = [];
-    for (const one of kept) {
-      if (one.ended) {
-        grown.push({ ...one, parent: -1 });
+    for (const hypothesis of kept) {
+      if (hypothesis.ended) {
+        grown.push({ ...hypothesis, parent: -1 });
         continue;
       }
-      const parent = open.indexOf(one);
+      const parent = open.indexOf(hypothesis);
       const gains = data.subarray(parent * words, (parent + 1) * words);
       const chosen = length === longest ? [end] : best(gains, beams, banned);
       for (const id of chosen) {
-        const ids = id === end ? one.ids : [...one.ids, id];
-        grown.push({ ids, score: one.score + gains[id]!, ended: id === end, parent });
+        const ids = id === end ? hypothesis.ids : [...hypothesis.ids, id];
+        grown.push({ ids, score: hypothesis.score + gains[id]!, ended: id === end, parent });
       }
     }
     const order = grown.map((_, at) => at).sort((a, b) => grown[b]!.score - grown[a]!.score || a - b);
     const winners = order.slice(0, beams).map((at) => grown[at]!);
-    const parents = winners.filter((one) => !one.ended).map((one) => one.parent);
+    const parents = winners.filter((winner) => !winner.ended).map((winner) => winner.parent);
     states = taken(next, parents);
     kept = winners;
   }

@@ -15,9 +15,9 @@ export async function between(
   frames: number,
 ) {
   const pose = poseOf(past.at(-1)!);
-  const [before, behind] = [past, after].map((given) => given.map((frame) => seenFrom(frame, pose)));
+  const [before, behind] = [past, after].map((part) => part.map((frame) => seenFrom(frame, pose)));
   const plain = bridge(before!, behind!, frames);
-  const batch = (given: ArrayLike<number>[]) => stacked(given, 1, given.length, given[0]!.length);
+  const batch = (part: ArrayLike<number>[]) => stacked(part, 1, part.length, part[0]!.length);
   const { data, shape } = (
     await filler.run({ past: batch(before!), plain: batch(plain), after: batch(behind!) })
   ).filled!;
@@ -32,17 +32,17 @@ function poseOf(frame: ArrayLike<number>): Vector {
 }
 
 function seenFrom(frame: ArrayLike<number>, [x, z, facing]: Vector): Float64Array {
-  const found = Float64Array.from(frame);
-  found[0]! -= x;
-  found[2]! -= z;
-  return turned(found, -facing);
+  const moved = Float64Array.from(frame);
+  moved[0]! -= x;
+  moved[2]! -= z;
+  return turned(moved, -facing);
 }
 
 function putAt(frame: ArrayLike<number>, [x, z, facing]: Vector): Float64Array {
-  const found = turned(Float64Array.from(frame), facing);
-  found[0]! += x;
-  found[2]! += z;
-  return found;
+  const moved = turned(Float64Array.from(frame), facing);
+  moved[0]! += x;
+  moved[2]! += z;
+  return moved;
 }
 
 /** Place and axes of the hips turned about the vertical axis. */
@@ -63,9 +63,9 @@ function bridge(past: Float64Array[], after: Float64Array[], frames: number): Fl
   const arrives = velocity(after.slice(0, STEPS + 1));
   return Array.from({ length: frames }, (_, at) => {
     const s = (at + 1) / (frames + 1);
-    const found = new Float64Array(start.length);
+    const frame = new Float64Array(start.length);
     for (let i = 0; i < PLACED.ROOT_PLACE; i++) {
-      found[i] =
+      frame[i] =
         (1 + 2 * s) * (1 - s) ** 2 * start[i]! +
         s * (1 - s) ** 2 * (frames + 1) * leaves[i]! +
         s ** 2 * (3 - 2 * s) * end[i]! -
@@ -73,10 +73,10 @@ function bridge(past: Float64Array[], after: Float64Array[], frames: number): Fl
     }
     for (let bone = PLACED.ROOT_PLACE; bone < start.length; bone += 6) {
       const [x, y] = partOfTheWay(rotationOf(start, bone), rotationOf(end, bone), s);
-      found.set(x, bone);
-      found.set(y, bone + 3);
+      frame.set(x, bone);
+      frame.set(y, bone + 3);
     }
-    return found;
+    return frame;
   });
 }
 

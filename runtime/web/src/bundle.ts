@@ -93,16 +93,16 @@ export class Bundle {
     const entry = this.manifest.tables[name];
     if (!entry)
       throw new BundleError(`the bundle ${this.manifest.name} has no table ${JSON.stringify(name)}`);
-    const found = readNpy(entry.file, await this.read(entry.file));
-    if (found.descr !== DTYPES[entry.dtype] || `${found.shape}` !== `${entry.shape}`) {
+    const array = readNpy(entry.file, await this.read(entry.file));
+    if (array.descr !== DTYPES[entry.dtype] || `${array.shape}` !== `${entry.shape}`) {
       throw new BundleError(
-        `table ${name} is ${found.descr} (${found.shape}), not ${entry.dtype} (${entry.shape})`,
+        `table ${name} is ${array.descr} (${array.shape}), not ${entry.dtype} (${entry.shape})`,
       );
     }
-    if (found.data.some((value) => typeof value === "number" && !Number.isFinite(value))) {
+    if (array.data.some((value) => typeof value === "number" && !Number.isFinite(value))) {
       throw new BundleError(`table ${name} has numbers that are not finite`);
     }
-    return found;
+    return array;
   }
 
   /** The golden vectors by name. */

@@ -54,7 +54,7 @@ function posed({ joints }: Skeleton, channels: { joint: number; kind: string }[]
       moved[joint]!["xyz".indexOf(kind[1]!)] = values[at]!;
     }
   });
-  return { turned: angles.map((own, at) => fromEuler(own, joints[at]!.order)), moved };
+  return { turned: angles.map((jointAngles, at) => fromEuler(jointAngles, joints[at]!.order)), moved };
 }
 
 /** The joints, and the number of the line MOTION after them. */
@@ -117,10 +117,10 @@ function place(node: Node, rest: string, line: number): void {
 function channel(node: Node, rest: string, line: number): void {
   const [count, ...words] = rest.split(/\s+/);
   node.channels = words.map((word) => {
-    const found = /^([xyz])(position|rotation)$/i.exec(word);
-    if (!found)
+    const match = /^([xyz])(position|rotation)$/i.exec(word);
+    if (!match)
       throw new FormatError(`line ${line}: channel ${quoted(word)}: expected one of Xposition ... Zrotation`);
-    return (found[2]!.toLowerCase() === "position" ? "t" : "r") + found[1]!.toLowerCase();
+    return (match[2]!.toLowerCase() === "position" ? "t" : "r") + match[1]!.toLowerCase();
   });
   if (count !== `${words.length}` || new Set(node.channels).size < words.length) {
     throw new FormatError(
@@ -152,10 +152,10 @@ function header(lines: string[], end: number): { start: number; frames: number; 
   let [frames, fps]: (number | undefined)[] = [];
   for (let at = end + 1; at < lines.length; at++) {
     const content = lines[at]!.trim();
-    const found = /^(frames|frame\s+time)\s*:\s*(\S+)$/i.exec(content);
-    if (found && found[1]!.toLowerCase() === "frames" && /^[0-9]{1,15}$/.test(found[2]!))
-      frames = Number(found[2]);
-    else if (found && found[1]!.toLowerCase() !== "frames") fps = rate(found[2]!, at + 1);
+    const match = /^(frames|frame\s+time)\s*:\s*(\S+)$/i.exec(content);
+    if (match && match[1]!.toLowerCase() === "frames" && /^[0-9]{1,15}$/.test(match[2]!))
+      frames = Number(match[2]);
+    else if (match && match[1]!.toLowerCase() !== "frames") fps = rate(match[2]!, at + 1);
     else if (content)
       throw new FormatError(
         `line ${at + 1}: expected 'Frames: N' and 'Frame Time: SECONDS', not ${quoted(content)}`,
@@ -176,21 +176,21 @@ function rate(word: string, line: number): number {
   const precision = 0.51 * 10 ** (Number(power) - digits.length);
   const near = [-1, 0, 1]
     .map((step) => Math.round(fps) + step)
-    .filter((one) => one > 0 && Math.abs(1 / one - seconds) <= precision);
+    .filter((candidate) => candidate > 0 && Math.abs(1 / candidate - seconds) <= precision);
   return near.length === 1 ? near[0]! : fps;
 }
 
 function valuesOf(lines: string[], start: number, width: number): Float64Array {
-  const found: number[] = [];
+  const values: number[] = [];
   if (!width) return new Float64Array();
   for (let at = start; at < lines.length; at++) {
-    for (const value of numbers(lines[at]!, at + 1)) found.push(value);
+    for (const value of numbers(lines[at]!, at + 1)) values.push(value);
   }
-  if (found.length % width)
+  if (values.length % width)
     throw new FormatError(
-      `${found.length} values do not make whole frames of ${width}: the file is cut short`,
+      `${values.length} values do not make whole frames of ${width}: the file is cut short`,
     );
-  return Float64Array.from(found);
+  return Float64Array.from(values);
 }
 
 function numbers(content: string, line: number): number[] {

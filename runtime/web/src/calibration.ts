@@ -25,16 +25,16 @@ import {
 
 /** A of all joints that are bones; alongAxes: whether joints have axes along bones and hinges. */
 export function calibrated(body: Body, world: World, alongAxes: boolean): Quaternion[] {
-  const found = new Calibration(body, world, alongAxes);
-  found.trunk();
+  const calibration = new Calibration(body, world, alongAxes);
+  calibration.trunk();
   SIDES.forEach((side, at) => {
-    found.leg(LEG.map((part) => side + part));
-    found.arm(
+    calibration.leg(LEG.map((part) => side + part));
+    calibration.arm(
       ARM.map((part) => side + part),
       at ? -1 : 1,
     );
   });
-  return found.aligned;
+  return calibration.aligned;
 }
 
 class Calibration {
@@ -48,13 +48,13 @@ class Calibration {
     this.aligned = body.skeleton.joints.map(() => STILL);
   }
 
-  private own(joint: number): Quaternion[] {
+  private turnsOf(joint: number): Quaternion[] {
     return this.world.turns.map((turned) => turned[joint]!);
   }
 
   /** Rotations of the humanoid's bone for a joint whose A is found. */
   private turned(joint: number): Quaternion[] {
-    return this.own(joint).map((turn) => product(turn, this.aligned[joint]!));
+    return this.turnsOf(joint).map((turn) => product(turn, this.aligned[joint]!));
   }
 
   private directions(bone: string): Vector[] {
@@ -66,7 +66,7 @@ class Calibration {
     const known = this.body.map.axes[joint];
     const mean = known
       ? STILL
-      : meanTurn(this.own(joint).map((turn, at) => product(inverse(turn), turns[at]!)));
+      : meanTurn(this.turnsOf(joint).map((turn, at) => product(inverse(turn), turns[at]!)));
     this.aligned[joint] = known ? knownAxes(known) : this.alongAxes ? nearAxes(mean, 30) : mean;
   }
 
@@ -74,7 +74,7 @@ class Calibration {
   private settleLimb(bone: string, along: Vector[], turns: Quaternion[]): void {
     const joint = this.body.map.joints[bone]!;
     this.settle(joint, turns);
-    const local = meanDirection(this.own(joint), along);
+    const local = meanDirection(this.turnsOf(joint), along);
     // feet count that lie along an axis of their joint
     if (/(Foot|Toes)$/.test(bone) && !(Math.max(...local.map(Math.abs)) > 0.995)) return;
     const start = rotated(this.aligned[joint]!, directionOf(bone));
@@ -129,7 +129,7 @@ class Calibration {
       hinge.map((axis, at) => frame(axis, times(shin[at]!, -1))),
     );
     const shins = this.turned(joints[bones[1]!]!);
-    for (const bone of bones.slice(2).filter((one) => joints[one] !== undefined)) {
+    for (const bone of bones.slice(2).filter((name) => joints[name] !== undefined)) {
       if (!this.body.aimed(bone)) {
         this.settle(joints[bone]!, shins);
         continue;
@@ -160,7 +160,7 @@ class Calibration {
       return plus(times(cross(along, lower[at]!), -sign), times(rotated(plain, Y), ALIGNMENT.HINGE));
     });
     const level = (along: Vector[], ups: Vector[]) =>
-      along.map((one, at) => frame(times(one, sign), ups[at]!, false));
+      along.map((axis, at) => frame(times(axis, sign), ups[at]!, false));
     this.settleLimb(upperArm!, upper, level(upper, up));
     this.settleLimb(lowerArm!, lower, level(lower, up));
     if (joints[hand!] === undefined) return;

@@ -62,7 +62,7 @@ function nearest([forward, left, turn]: Pose, book: Pose[]): number {
 /** Frames of steps of codes that are pushed as they come, from the origin or after the end of a motion. */
 export class StreamingDecoder {
   private codes: number[][];
-  private given: Frames | undefined;
+  private context: Frames | undefined;
   /** Steps of which frames were given; the last one of a context is decoded to be joined. */
   private count: number;
   private way: Pose = [0, 0, 0];
@@ -74,7 +74,7 @@ export class StreamingDecoder {
     context?: Context,
   ) {
     this.codes = [...(context?.codes ?? [])];
-    this.given = context?.frames.slice(-2);
+    this.context = context?.frames.slice(-2);
     this.count = Math.max(0, this.codes.length - 1);
   }
 
@@ -82,11 +82,11 @@ export class StreamingDecoder {
   async push(steps: number[][], last = false): Promise<Float32Array[]> {
     const { back, ahead } = this.codec;
     this.codes.push(...steps);
-    const found = await this.settled(this.codes.length - (last ? 0 : ahead));
+    const frames = await this.settled(this.codes.length - (last ? 0 : ahead));
     const over = Math.max(0, this.count - back); // out of sight
     this.codes = this.codes.slice(over);
     this.count -= over;
-    return found;
+    return frames;
   }
 
   private async settled(until: number): Promise<Float32Array[]> {
@@ -98,16 +98,16 @@ export class StreamingDecoder {
       codes: integers(part.flat(), 1, part.length, part[0]!.length),
     });
     const width = frames!.shape[3]!;
-    const found: Float32Array[] = [];
+    const decoded: Float32Array[] = [];
     const first = !this.pose;
     for (let step = this.count - start; step < until - start; step++) {
       for (let at = step * hop; at < (step + 1) * hop; at++)
-        found.push(this.led(frames!.data.slice(at * width, (at + 1) * width)));
+        decoded.push(this.led(frames!.data.slice(at * width, (at + 1) * width)));
       this.way = moved(this.way, pose(moves!.data, CODEC.PATH * step));
     }
-    if (first) found[0]!.set(found[1]!.subarray(0, CODEC.PATH)); // the first frame has the second one's rates
+    if (first) decoded[0]!.set(decoded[1]!.subarray(0, CODEC.PATH)); // the first frame has the second one's rates
     this.count = until;
-    return this.joined(found);
+    return this.joined(decoded);
   }
 
   /** A frame whose root is seen from the way, with its rates a second instead. */
@@ -121,9 +121,9 @@ export class StreamingDecoder {
   /** Frames that go on from the motion that is continued, if there is one. */
   private joined(frames: Float32Array[]): Float32Array[] {
     const { hop, fps, halfLife } = this.codec;
-    if (this.given) {
-      this.join = inertialized(this.given, frames.slice(hop - 2, hop), fps, halfLife);
-      this.given = undefined;
+    if (this.context) {
+      this.join = inertialized(this.context, frames.slice(hop - 2, hop), fps, halfLife);
+      this.context = undefined;
       frames = frames.slice(hop);
     }
     if (this.join) frames.forEach(this.join);
@@ -136,13 +136,13 @@ export class StreamingDecoder {
  * critically damped spring. What the root's rates are off by is a speed already, and has none.
  */
 function inertialized(
-  given: Frames,
-  found: Frames,
+  context: Frames,
+  frames: Frames,
   fps: number,
   halfLife: number,
 ): (frame: Float32Array) => void {
   const [before, off] = [0, 1].map((row) =>
-    Float64Array.from(given[row]!, (value, at) => value - found[row]![at]!),
+    Float64Array.from(context[row]!, (value, at) => value - frames[row]![at]!),
   ) as [Float64Array, Float64Array];
   const speed = off.map((value, at) => (at < CODEC.PATH ? 0 : (value - before[at]!) * fps));
   const y = (2 * Math.LN2) / halfLife;

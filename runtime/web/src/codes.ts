@@ -98,7 +98,7 @@ export class Writer {
    */
   async draw(actions: number[], ends: boolean, steps: number, whole: boolean): Promise<number[][]> {
     const known = await this.known(actions);
-    const uniform = this.noise.map((one) => one.uniform(this.source.parts + 2));
+    const uniform = this.noise.map((noise) => noise.uniform(this.source.parts + 2));
     const { memory } = this.source;
     const places = actions.map((action, row) =>
       this.remembered(action, row, ends, steps, whole, uniform[row]!),
@@ -110,7 +110,7 @@ export class Writer {
     const after = places.map((place, row) =>
       place === undefined ? undefined : memory.after(actions[row]!, place, whole),
     );
-    const given = places.map((place, row) =>
+    const remembered = places.map((place, row) =>
       place === undefined ? undefined : this.step(place, ends && after[row]!.end),
     );
     const begun = actions.map(
@@ -119,12 +119,12 @@ export class Writer {
     const { codes, again } = await this.drawn(
       known,
       uniform.map((block) => block.slice(2)),
-      given,
+      remembered,
       ends,
       begun,
     );
-    const age = from.map((one, row) => (again[row] ? 0 : one + 1));
-    const done = after.map((one, row) => (again[row] ? 0 : (one?.done ?? this.now.done[row]!)));
+    const age = from.map((before, row) => (again[row] ? 0 : before + 1));
+    const done = after.map((state, row) => (again[row] ? 0 : (state?.done ?? this.now.done[row]!)));
     this.now = { ...this.now, last: [...codes, ...codes], age, done };
     return codes;
   }
@@ -197,30 +197,30 @@ export class Writer {
   private async drawn(
     known: NumberArray<Float32Array>,
     uniform: number[][],
-    given: (number[] | undefined)[],
+    remembered: (number[] | undefined)[],
     ends: boolean,
     begun: boolean[],
   ): Promise<{ codes: number[][]; again: boolean[] }> {
     const { source, drawing } = this;
-    const again = given.map((step) => step?.[0] === source.end && !ends);
-    const drawn = given.flatMap((step, row) => (step && !again[row] ? [] : [row]));
-    const codes = given.map((step, row) =>
+    const again = remembered.map((step) => step?.[0] === source.end && !ends);
+    const drawn = remembered.flatMap((step, row) => (step && !again[row] ? [] : [row]));
+    const codes = remembered.map((step, row) =>
       step && !again[row] ? step : Array<number>(source.parts).fill(0),
     );
     for (let part = 0; drawn.length && part < source.parts; part++) {
       const chances = await this.chances(known, codes, drawn, part);
       drawn.forEach((row, at) => {
         const temperature = this.now.age[row] === 0 ? drawing.first_temperature : drawing.temperature;
-        const own = chances[at]!;
+        const chance = chances[at]!;
         let number = uniform[row]![part]!;
         if (part === 0 && (!ends || begun[row])) {
-          const ended = nucleus(own, number, temperature, drawing.top_p) === source.end;
+          const ended = nucleus(chance, number, temperature, drawing.top_p) === source.end;
           again[row] ||= ended && !ends;
-          own[source.end] = -Infinity;
+          chance[source.end] = -Infinity;
           // the same number would give a neighbour of the end
           if (again[row] || ended) number = (number * 1024) % 1;
         }
-        codes[row]![part] = nucleus(own, number, temperature, drawing.top_p);
+        codes[row]![part] = nucleus(chance, number, temperature, drawing.top_p);
       });
     }
     return { codes, again };
@@ -235,18 +235,21 @@ export class Writer {
   ): Promise<number[][]> {
     const { part: graph, parts } = this.source;
     const both = [...rows, ...rows.map((row) => row + codes.length)];
-    const asked = integers(
+    const actions = integers(
       [...rows, ...rows].flatMap((row) => codes[row]!),
       both.length,
       parts,
     );
-    const { data, shape } = (await graph.run({ known: taken({ known }, both).known!, codes: asked }))
+    const { data, shape } = (await graph.run({ known: taken({ known }, both).known!, codes: actions }))
       .log_probabilities!;
     const of = (at: number) =>
       data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
     return rows.map((_, at) => {
-      const [told, plain] = [of(at), of(at + rows.length)];
-      return Array.from(told, (value, id) => plain[id]! + this.drawing.guidance * (value - plain[id]!));
+      const [conditional, plain] = [of(at), of(at + rows.length)];
+      return Array.from(
+        conditional,
+        (value, id) => plain[id]! + this.drawing.guidance * (value - plain[id]!),
+      );
     });
   }
 }
@@ -281,11 +284,11 @@ export async function drawCodes(
   longest: number,
   exactly: boolean,
 ): Promise<number[][][]> {
-  const found: number[][][] = actions.map(() => []);
+  const drawn: number[][][] = actions.map(() => []);
   for await (const { rows, codes } of drawnSteps(writer, actions, longest, exactly)) {
-    rows.forEach((row, at) => found[row]!.push(codes[at]!));
+    rows.forEach((row, at) => drawn[row]!.push(codes[at]!));
   }
-  return found;
+  return drawn;
 }
 
 /** One of the likeliest things that make up `topP` together, by a uniform number. */
@@ -308,12 +311,12 @@ function nucleus(logWeights: number[], uniform: number, temperature: number, top
 function lately(
   states: Record<string, NumberArray<Float32Array>>,
 ): Record<string, NumberArray<Float32Array>> {
-  const found: Record<string, NumberArray<Float32Array>> = {};
+  const doubled: Record<string, NumberArray<Float32Array>> = {};
   for (const [name, array] of Object.entries(states)) {
     const axis = array.shape.length - 2;
     const [steps, width] = [array.shape[axis]!, array.shape[axis + 1]!];
     if (steps <= CODES.WINDOW) {
-      found[name] = array;
+      doubled[name] = array;
       continue;
     }
     const blocks = array.data.length / (steps * width);
@@ -322,7 +325,7 @@ function lately(
       const stop = (block + 1) * steps * width;
       data.set(array.data.subarray(stop - CODES.WINDOW * width, stop), block * CODES.WINDOW * width);
     }
-    found[name] = { data, shape: array.shape.with(axis, CODES.WINDOW) };
+    doubled[name] = { data, shape: array.shape.with(axis, CODES.WINDOW) };
   }
-  return found;
+  return doubled;
 }

@@ -44,7 +44,7 @@ export function partsOf(sentence: string, verbs: Set<string>): string[] {
 function beforeVerbs(text: string, verbs: Set<string>): string[] {
   const parts: string[] = [];
   let start = 0;
-  for (const { index, 0: found } of text.matchAll(ALSO)) {
+  for (const { index, 0: separator } of text.matchAll(ALSO)) {
     const done =
       text
         .slice(start, index)
@@ -52,13 +52,13 @@ function beforeVerbs(text: string, verbs: Set<string>): string[] {
         .match(/[\p{L}\p{N}_]+/gu) ?? [];
     const opened = /^[\p{L}\p{N}_]+/u.exec(
       text
-        .slice(index + found.length)
+        .slice(index + separator.length)
         .replace(OPENING, "")
         .toLowerCase(),
     );
     if (!opened || !verbs.has(stem(opened[0])) || !done.some((word) => verbs.has(stem(word)))) continue;
     parts.push(text.slice(start, index));
-    start = index + found.length;
+    start = index + separator.length;
   }
   return [...parts, text.slice(start)];
 }

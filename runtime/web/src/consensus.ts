@@ -56,7 +56,7 @@ async function drawSequences(
   let states = step.zeroState(1);
   const ended: Beginning[] = [];
   for (let length = 0; open.length; length++) {
-    const word = integers(open.map((one) => one.ids.at(-1) ?? limits.start));
+    const word = integers(open.map((beginning) => beginning.ids.at(-1) ?? limits.start));
     const { outputs, states: next } = await step.step(
       {
         word,
@@ -68,28 +68,32 @@ async function drawSequences(
       states,
     );
     const { data, shape } = outputs.log_probabilities!;
-    const grown = open.flatMap((one, row) => {
+    const grown = open.flatMap((beginning, row) => {
       const gains = data.subarray(row * shape[1]!, (row + 1) * shape[1]!);
-      return spread(one, gains, limits, length, temperature, uniform[length]!).map((own) => ({
-        ...own,
+      return spread(beginning, gains, limits, length, temperature, uniform[length]!).map((share) => ({
+        ...share,
         row,
       }));
     });
-    ended.push(...grown.filter((one) => one.ended));
-    const going = grown.filter((one) => !one.ended);
+    ended.push(...grown.filter((beginning) => beginning.ended));
+    const going = grown.filter((beginning) => !beginning.ended);
     states = taken(
       next,
-      going.map((one) => one.row),
+      going.map((beginning) => beginning.row),
     );
     open = going;
   }
   ended.sort((a, b) => a.draws[0]! - b.draws[0]!);
-  return ended.map(({ ids, score, draws: own }) => ({ ids, logProbability: score, times: own.length }));
+  return ended.map(({ ids, score, draws: members }) => ({
+    ids,
+    logProbability: score,
+    times: members.length,
+  }));
 }
 
 /** What the draws of a beginning go on with: each word as often as its share of them, rounded up or down. */
 function spread(
-  one: Beginning,
+  beginning: Beginning,
   gains: Float32Array,
   limits: Limits,
   length: number,
@@ -103,18 +107,18 @@ function spread(
   const most = left.reduce((a, b) => Math.max(a, b));
   let sum = 0;
   const shares = left.map((value) => (sum += Math.exp((value - most) / temperature)));
-  const found: Beginning[] = [];
+  const beginnings: Beginning[] = [];
   let id = 0;
   let last = -1;
-  one.draws.forEach((draw, rank) => {
-    const place = (rank + uniform[one.draws[0]!]!) / one.draws.length;
+  beginning.draws.forEach((draw, rank) => {
+    const place = (rank + uniform[beginning.draws[0]!]!) / beginning.draws.length;
     while (shares[id]! / sum <= place) id++;
-    if (id === last) return void found.at(-1)!.draws.push(draw);
+    if (id === last) return void beginnings.at(-1)!.draws.push(draw);
     last = id;
-    const ids = id === end ? one.ids : [...one.ids, id];
-    found.push({ ids, score: one.score + gains[id]!, draws: [draw], ended: id === end });
+    const ids = id === end ? beginning.ids : [...beginning.ids, id];
+    beginnings.push({ ids, score: beginning.score + gains[id]!, draws: [draw], ended: id === end });
   });
-  return found;
+  return beginnings;
 }
 
 /** What each sequence has in common with all, each as often as it came: the mean F1 of words and of their pairs. */
@@ -131,17 +135,17 @@ function agreement(drawn: Drawn[]): number[] {
 
 /** How often each run of `order` words comes. */
 function counted(ids: number[], order: number): Map<string, number> {
-  const found = new Map<string, number>();
+  const counts = new Map<string, number>();
   for (let at = 0; at + order <= ids.length; at++) {
     const gram = `${ids.slice(at, at + order)}`;
-    found.set(gram, (found.get(gram) ?? 0) + 1);
+    counts.set(gram, (counts.get(gram) ?? 0) + 1);
   }
-  return found;
+  return counts;
 }
 
-function f1(one: Map<string, number>, other: Map<string, number>): number {
+function f1(first: Map<string, number>, other: Map<string, number>): number {
   const size = (grams: Map<string, number>) => [...grams.values()].reduce((a, b) => a + b, 0);
   let both = 0;
-  for (const [gram, times] of one) both += Math.min(times, other.get(gram) ?? 0);
-  return (2 * both) / Math.max(size(one) + size(other), 1);
+  for (const [gram, times] of first) both += Math.min(times, other.get(gram) ?? 0);
+  return (2 * both) / Math.max(size(first) + size(other), 1);
 }

@@ -75,12 +75,12 @@ export class ControlModel extends Model {
 
   /** The take of a gait that goes nowhere that leads the farthest for a figure that moves, and the least far for others. */
   take(name: string, moves: boolean): Act {
-    const found = this.takes.get(name);
-    if (!found)
+    const acts = this.takes.get(name);
+    if (!acts)
       throw new ControlError(
         `no act ${JSON.stringify(name)}; expected a motion, or one of ${[...this.takes.keys()].join(", ")}`,
       );
-    return [...found].sort((a, b) => reachOf(a) - reachOf(b)).at(moves ? -1 : 0)!;
+    return [...acts].sort((a, b) => reachOf(a) - reachOf(b)).at(moves ? -1 : 0)!;
   }
 
   /** A session of figures that stand still. ControlError for what is out of range. */
@@ -110,20 +110,20 @@ export class ControlModel extends Model {
   }
 
   /** The phase of each figure; null for those that search after every command. */
-  phases(characters: number, given?: number | readonly number[]): number[] | null {
-    const every = this.steerer.matcher.how.search_every;
-    if (given === undefined && characters < STEER.SPREAD_FROM) return null;
-    const found = Array.from({ length: characters }, (_, at) =>
-      given === undefined ? at % every : Array.isArray(given) ? (given[at] as number) : (given as number),
+  phases(characters: number, phases?: number | readonly number[]): number[] | null {
+    const every = this.steerer.matcher.settings.search_every;
+    if (phases === undefined && characters < STEER.SPREAD_FROM) return null;
+    const all = Array.from({ length: characters }, (_, at) =>
+      phases === undefined ? at % every : Array.isArray(phases) ? (phases[at] as number) : (phases as number),
     );
     const fits =
-      (!Array.isArray(given) || given.length === characters) &&
-      found.every((phase) => Number.isInteger(phase) && phase >= 0 && phase < every);
+      (!Array.isArray(phases) || phases.length === characters) &&
+      all.every((phase) => Number.isInteger(phase) && phase >= 0 && phase < every);
     if (!fits)
       throw new ControlError(
         `phases must be whole numbers from 0 to ${every - 1}, for all or for each of ${characters}`,
       );
-    return found;
+    return all;
   }
 }
 
@@ -183,9 +183,9 @@ async function tablesOf(bundle: Bundle): Promise<Tables> {
     least = -FIELDS.LARGEST,
     most: (at: number) => number = () => FIELDS.LARGEST,
   ) => {
-    const own = bundle.manifest.tables?.[name];
-    if (own && (own.dtype !== dtype || `${own.shape}` !== `${shape}`)) {
-      throw new BundleError(`table ${name} is ${own.dtype} (${own.shape}), not ${dtype} (${shape})`);
+    const entry = bundle.manifest.tables?.[name];
+    if (entry && (entry.dtype !== dtype || `${entry.shape}` !== `${shape}`)) {
+      throw new BundleError(`table ${name} is ${entry.dtype} (${entry.shape}), not ${dtype} (${shape})`);
     }
     const { data } = await bundle.table(name);
     if (!data.every((value, at) => value >= least && value <= most(at))) {

@@ -7,7 +7,7 @@ import type { ControlModel, StartSettings } from "./control.js";
 import { ControlError } from "./errors.js";
 import { after, eventsOf, type FigureEvent } from "./events.js";
 import { newLock } from "./footLock.js";
-import { type Command, told } from "./gaits.js";
+import { type Command, changed } from "./gaits.js";
 import { BONES, SIDES } from "./humanoid.js";
 import { lead } from "./leading.js";
 import type { Target } from "./matching.js";
@@ -87,7 +87,7 @@ export interface ControlSnapshot {
 /** Figures that move together, each steered separately. Angles are degrees about the vertical: 0 along z, positive to the left. */
 export class ControlSession {
   private state: State;
-  private readonly said = new Set<number>();
+  private readonly warned = new Set<number>();
 
   constructor(
     readonly model: ControlModel,
@@ -124,27 +124,27 @@ export class ControlSession {
     if (moves && (speeds || directions))
       throw new ControlError("give a velocity, or speed and direction, not both");
     const commands = this.state.figures.map(({ command }, at) => {
-      const given: Partial<Command> = {};
-      if (gaits) given.gait = gaits[at]!;
-      if (facings) given.facing = facings[at]! * RADIANS;
-      if (moves) return byVelocity(command, given, moves[at]!);
-      if (speeds) given.speed = speeds[at]!;
-      if (directions) given.direction = directions[at]! * RADIANS;
-      return told(command, given);
+      const changes: Partial<Command> = {};
+      if (gaits) changes.gait = gaits[at]!;
+      if (facings) changes.facing = facings[at]! * RADIANS;
+      if (moves) return byVelocity(command, changes, moves[at]!);
+      if (speeds) changes.speed = speeds[at]!;
+      if (directions) changes.direction = directions[at]! * RADIANS;
+      return changed(command, changes);
     });
     this.tell(commands);
   }
 
   private tell(commands: Command[]): void {
-    const found = commands.map((command) => this.model.abilities.target(command));
-    found.forEach(({ beyond }, at) => {
+    const targets = commands.map((command) => this.model.abilities.target(command));
+    targets.forEach(({ beyond }, at) => {
       if (beyond && this.strict) throw new ControlError(beyond);
-      if (beyond && !this.said.has(commands[at]!.gait)) {
-        this.said.add(commands[at]!.gait);
+      if (beyond && !this.warned.has(commands[at]!.gait)) {
+        this.warned.add(commands[at]!.gait);
         console.warn(beyond);
       }
     });
-    this.state.figures.forEach((figure, at) => tell(figure, commands[at]!, found[at]!.target));
+    this.state.figures.forEach((figure, at) => tell(figure, commands[at]!, targets[at]!.target));
   }
 
   /**
@@ -159,23 +159,23 @@ export class ControlSession {
     what: Doable | readonly Doable[],
     { who, upper }: { who?: readonly number[]; upper?: boolean } = {},
   ): void {
-    const figures = this.who(who);
-    const given = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as Doable[];
-    if (given.length !== figures.length)
-      throw new ControlError(`${given.length} acts do not fit ${figures.length} figures`);
+    const figures = this.chosen(who);
+    const each = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as Doable[];
+    if (each.length !== figures.length)
+      throw new ControlError(`${each.length} acts do not fit ${figures.length} figures`);
     const made = new Map(
-      [...new Set(given)].map((one) => [
-        one,
-        one && typeof one === "object" && "skeleton" in one
-          ? actOf(this.model, "act", numbersOf(this.model, one))
-          : one,
+      [...new Set(each)].map((act) => [
+        act,
+        act && typeof act === "object" && "skeleton" in act
+          ? actOf(this.model, "act", numbersOf(this.model, act))
+          : act,
       ]),
     );
     const acts = figures.map((at, i) => {
-      const [what, [x, z]] = [made.get(given[i]!)!, this.state.figures[at]!.target];
+      const [what, [x, z]] = [made.get(each[i]!)!, this.state.figures[at]!.target];
       return typeof what === "string" ? this.model.take(what, !!(x || z)) : what;
     });
-    figures.forEach((at, i) => (this.state.figures[at]!.acting.asked = { act: acts[i]!, upper }));
+    figures.forEach((at, i) => (this.state.figures[at]!.acting.request = { act: acts[i]!, upper }));
   }
 
   /**
@@ -183,8 +183,8 @@ export class ControlSession {
    * they are. They slow down to the end, and `arrived` tells when they are there; `control` ends it. ControlError for what
    * does not fit, and for a gait that goes nowhere; nothing changes then.
    */
-  goTo(points: readonly number[] | readonly (readonly number[])[] | null, how: Way = {}): void {
-    const figures = this.who(how.who);
+  goTo(points: readonly number[] | readonly (readonly number[])[] | null, way: Way = {}): void {
+    const figures = this.chosen(way.who);
     const ends =
       points === null
         ? figures.map((at) => this.state.figures[at]!.playback.root.slice(0, 2))
@@ -192,20 +192,20 @@ export class ControlSession {
     this.send(
       figures,
       ends.map((end) => [end]),
-      how,
+      way,
     );
   }
 
   /** The same along a path, from where they are to its first point, and so on to its last: of 1 to 10,000 points, for all. */
-  goAlong(path: readonly (readonly number[])[], how: Way = {}): void {
+  goAlong(path: readonly (readonly number[])[], way: Way = {}): void {
     if (!Array.isArray(path) || path.length < 1 || path.length > GUIDED.LONGEST_PATH)
       throw new ControlError(`a path needs 1 to ${GUIDED.LONGEST_PATH} points of x and z`);
     const points = path.map((point) => this.rows("points", point, ["x", "z"], 1)[0]!);
-    const figures = this.who(how.who);
+    const figures = this.chosen(way.who);
     this.send(
       figures,
       figures.map(() => points),
-      how,
+      way,
     );
   }
 
@@ -217,12 +217,12 @@ export class ControlSession {
     const { abilities } = this.model;
     const facings = this.each("facing", facing, figures.length);
     const speeds = this.each("speed", speed, figures.length);
-    if (speeds?.some((one) => !(one > 0)))
+    if (speeds?.some((value) => !(value > 0)))
       throw new ControlError("speed must be above 0 m/s; points of null let figures stand");
     const gaits = figures.map((at) =>
       gait === undefined ? this.state.figures[at]!.command.gait : abilities.number(gait),
     );
-    const nowhere = gaits.find((one) => !abilities.speeds[one]![2]);
+    const nowhere = gaits.find((number) => !abilities.speeds[number]![2]);
     if (nowhere !== undefined)
       throw new ControlError(
         `${JSON.stringify(this.model.gaits[nowhere])} goes nowhere: give a gait such as ${JSON.stringify(this.model.gaits[0])}`,
@@ -230,12 +230,12 @@ export class ControlSession {
     figures.forEach((at, i) => {
       const figure = this.state.figures[at]!;
       const [x, z] = figure.playback.root;
-      const told = {
+      const order = {
         gait: gaits[i]!,
         speed: speeds?.[i] ?? abilities.speeds[gaits[i]!]![1],
         facing: facings ? wrapped(facings[i]! * RADIANS) : null,
       };
-      figure.going = sent([[x, z], ...(paths[i] as unknown as Point[])], told);
+      figure.going = sent([[x, z], ...(paths[i] as unknown as Point[])], order);
     });
   }
 
@@ -285,9 +285,9 @@ export class ControlSession {
   /** Numbers of figures, and a point in the world for each; null for none. */
   private pointed(
     points: readonly number[] | readonly (readonly number[])[] | null,
-    who?: readonly number[],
+    numbers?: readonly number[],
   ): [number, Vector | null][] {
-    const figures = this.who(who);
+    const figures = this.chosen(numbers);
     const rows = points && this.rows("points", points, ["x", "y", "z"], figures.length);
     return figures.map((at, i) => [at, rows && ([...rows[i]!] as Vector)]);
   }
@@ -419,10 +419,10 @@ export class ControlSession {
   }
 
   /** Remove figures by their numbers. Those behind move up. ControlError for figures that are not there, and for all: one stays. */
-  remove(who: readonly number[]): void {
-    if (!Array.isArray(who) || !who.length)
+  remove(numbers: readonly number[]): void {
+    if (!Array.isArray(numbers) || !numbers.length)
       throw new ControlError("who needs the numbers of the figures that go");
-    const gone = new Set(this.who(who));
+    const gone = new Set(this.chosen(numbers));
     if (gone.size === this.characters) throw new ControlError("a session keeps one figure at least");
     const stay = <One>(all: One[]) => all.filter((_, at) => !gone.has(at));
     const { figures, late, shown } = this.state;
@@ -449,8 +449,8 @@ export class ControlSession {
   }
 
   /** The numbers of figures. */
-  private who(given?: readonly number[]): number[] {
-    const figures = given ? [...given] : this.state.figures.map((_, at) => at);
+  private chosen(numbers?: readonly number[]): number[] {
+    const figures = numbers ? [...numbers] : this.state.figures.map((_, at) => at);
     const fits =
       figures.length === new Set(figures).size &&
       figures.every((at) => Number.isInteger(at) && at >= 0 && at < this.characters);
@@ -461,19 +461,19 @@ export class ControlSession {
     return figures;
   }
 
-  private gaits(given: ForAll<string>): number[] {
-    const names = Array.isArray(given)
-      ? (given as string[])
-      : Array<string>(this.characters).fill(given as string);
+  private gaits(gaits: ForAll<string>): number[] {
+    const names = Array.isArray(gaits)
+      ? (gaits as string[])
+      : Array<string>(this.characters).fill(gaits as string);
     if (names.length !== this.characters)
       throw new ControlError(`${names.length} gaits do not fit ${this.characters} characters`);
     return names.map((name) => this.model.abilities.number(name));
   }
 
   /** A number for each figure; none if none is given. */
-  private each(name: string, given?: ForAll<number>, count = this.characters): number[] | undefined {
-    if (given === undefined) return undefined;
-    const values = (Array.isArray(given) ? given : [given]) as number[];
+  private each(name: string, numbers?: ForAll<number>, count = this.characters): number[] | undefined {
+    if (numbers === undefined) return undefined;
+    const values = (Array.isArray(numbers) ? numbers : [numbers]) as number[];
     return this.rows(
       name,
       values.map((value) => [value]),
@@ -485,11 +485,11 @@ export class ControlSession {
   /** A row of numbers for each figure, of one for all or one for each. */
   private rows(
     what: string,
-    given: readonly number[] | readonly (readonly number[])[],
+    values: readonly number[] | readonly (readonly number[])[],
     columns: string[],
     count = this.characters,
   ): readonly (readonly number[])[] {
-    const rows = (Array.isArray(given?.[0]) ? given : [given]) as readonly (readonly number[])[];
+    const rows = (Array.isArray(values?.[0]) ? values : [values]) as readonly (readonly number[])[];
     const fits =
       rows.every((row) => row?.length === columns.length) && (rows.length === 1 || rows.length === count);
     if (!fits)
@@ -510,19 +510,19 @@ export class ControlSession {
 }
 
 /** A command with a velocity; one that stops leaves the direction, and how the figure faces. */
-function byVelocity(command: Command, given: Partial<Command>, [x, z]: readonly number[]): Command {
+function byVelocity(command: Command, changes: Partial<Command>, [x, z]: readonly number[]): Command {
   const speed = Math.hypot(x!, z!);
-  const found = told(command, {
-    ...given,
+  const moving = changed(command, {
+    ...changes,
     speed,
     direction: speed > 0 ? Math.atan2(x!, z!) : command.direction,
   });
-  return given.facing === undefined ? { ...found, facesWay: command.facesWay || speed > 0 } : found;
+  return changes.facing === undefined ? { ...moving, facesWay: command.facesWay || speed > 0 } : moving;
 }
 
-function poseOf({ ground, rotations: own, height, contacts, events }: Ticked): SteeredPose {
+function poseOf({ ground, rotations: local, height, contacts, events }: Ticked): SteeredPose {
   const rotations: Record<string, Quaternion> = {};
-  for (let at = 0; at < BONES.length; at++) rotations[BONES[at]!] = own[at]!;
-  rotations.hips = product(about(Y, ground[2]), own[0]!);
+  for (let at = 0; at < BONES.length; at++) rotations[BONES[at]!] = local[at]!;
+  rotations.hips = product(about(Y, ground[2]), local[0]!);
   return { hips: [ground[0], height, ground[1]], rotations, ground: [...ground], contacts, events };
 }

@@ -57,8 +57,8 @@ export class DescribeModel extends LanguageModel {
   async describe(frames: Frames, settings: DescribeSettings = {}): Promise<Description[]> {
     const decoding = settings.decoding ?? (this.known && settings.draws === undefined ? "known" : undefined);
     if (decoding === "known") return this.answers(frames, settings);
-    const found = await this.hypotheses(frames, settings);
-    return found.map(({ ids, logProbability, score }) => {
+    const hypotheses = await this.hypotheses(frames, settings);
+    return hypotheses.map(({ ids, logProbability, score }) => {
       return {
         text: this.vocabulary.decode(ids),
         logProbability,
@@ -76,13 +76,13 @@ export class DescribeModel extends LanguageModel {
     const beams = this.setting("beams", settings.beams);
     const { vector } = await this.graphs.space!.run(this.motion(frames));
     const { known, manifest } = this;
-    const found = known.answers(
+    const answers = known.answers(
       vector!.data as Float32Array,
       frames.length / this.fps,
       pathOf(frames, manifest.motion),
       beams,
     );
-    return found.map(({ text, probability }) => {
+    return answers.map(({ text, probability }) => {
       const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST));
       return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
     });
@@ -97,18 +97,18 @@ export class DescribeModel extends LanguageModel {
       : this.manifest.loop === "consensus";
     const draws = settings.draws ?? (drawing ? this.setting("draws") : undefined);
     if (draws === undefined) return beamSearch(this.graphs.step!, await this.context(frames), limits, beams);
-    const given = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
+    const source = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
     const temperature = this.setting("temperature", settings.temperature);
     const context = await this.context(frames);
-    const found = await consensus(
+    const beginnings = await consensus(
       this.graphs.step!,
       context,
       limits,
       this.setting("draws", draws),
       temperature,
-      given,
+      source,
     );
-    return found.slice(0, beams);
+    return beginnings.slice(0, beams);
   }
 
   /** The log-probability of a sentence given frames (T, D). */

@@ -14,7 +14,7 @@ export function fromEuler(angles: Vector, order: string): Quaternion {
 /** The angles of rotations one after the other, which do not leap; at a gimbal lock the last angle stays. */
 export function eulersOf(turns: Quaternion[], order: string): Vector[] {
   let free = 0;
-  const found = turns.map((turn): Vector => {
+  const angles = turns.map((turn): Vector => {
     const [first, middle, last] = toEuler(turn, order);
     if (Math.abs(middle) <= Math.PI / 2 - ROTATIONS.LOCKED) {
       free = last;
@@ -22,16 +22,16 @@ export function eulersOf(turns: Quaternion[], order: string): Vector[] {
     }
     return [first - handedness(order) * Math.sign(middle) * (free - last), middle, free];
   });
-  return continuous(found);
+  return continuous(angles);
 }
 
 /** Of the two solutions of each frame, each up to whole turns, the one nearest to the frame before. */
 function continuous(angles: Vector[]): Vector[] {
   let flipped = false;
   let last = angles[0]!;
-  return angles.map((own, at) => {
-    if (at === 0) return own;
-    const [same, other] = [near(solution(own, flipped), last), near(solution(own, !flipped), last)];
+  return angles.map((triple, at) => {
+    if (at === 0) return triple;
+    const [same, other] = [near(solution(triple, flipped), last), near(solution(triple, !flipped), last)];
     const changes = apart(other, last) < apart(same, last) - 1e-9;
     flipped = flipped !== changes;
     last = changes ? other : same;

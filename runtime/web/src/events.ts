@@ -48,15 +48,15 @@ export function eventsOf(
   gaits: readonly string[],
 ): FigureEvent[] {
   const before = earlier ?? { ...now, act: null };
-  const found: FigureEvent[] = [];
-  if (now.down[0] && !before.down[0]) found.push({ kind: "left foot" });
-  if (now.down[1] && !before.down[1]) found.push({ kind: "right foot" });
-  if (now.air >= EVENTS.FLIES && before.air < EVENTS.FLIES) found.push({ kind: "take-off" });
-  if (now.air === 0 && before.air >= EVENTS.FLIES) found.push({ kind: "landing" });
-  if (now.gait !== before.gait) found.push({ kind: "gait", name: gaits[now.gait]! });
-  if (now.arrived && !before.arrived) found.push({ kind: "arrived" });
+  const events: FigureEvent[] = [];
+  if (now.down[0] && !before.down[0]) events.push({ kind: "left foot" });
+  if (now.down[1] && !before.down[1]) events.push({ kind: "right foot" });
+  if (now.air >= EVENTS.FLIES && before.air < EVENTS.FLIES) events.push({ kind: "take-off" });
+  if (now.air === 0 && before.air >= EVENTS.FLIES) events.push({ kind: "landing" });
+  if (now.gait !== before.gait) events.push({ kind: "gait", name: gaits[now.gait]! });
+  if (now.arrived && !before.arrived) events.push({ kind: "arrived" });
   const begun = now.act?.age === 0 ? now.act : null;
-  if (before.act && (begun || !now.act)) found.push({ kind: "act ended", name: before.act.name });
-  if (begun) found.push({ kind: "act begun", name: begun.name });
-  return found;
+  if (before.act && (begun || !now.act)) events.push({ kind: "act ended", name: before.act.name });
+  if (begun) events.push({ kind: "act begun", name: begun.name });
+  return events;
 }

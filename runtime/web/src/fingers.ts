@@ -82,14 +82,14 @@ function bendFingers(
 
 /** The fingers of a hand by the names of its joints: the joints of each, from the knuckle on, from thumb to little finger. */
 function fingersOf(skeleton: Skeleton, hand: number): Map<number, number[]> {
-  const found = new Map<number, number[]>();
+  const chains = new Map<number, number[]>();
   for (const joint of skeleton.under(hand)) {
     const name = skeleton.names[joint]!.toLowerCase();
     const finger = SHARES.findIndex(([words]) => words.test(name));
     if (joint === hand || finger < 0 || (finger !== THUMB && /meta|carpal|palm|inhand/.test(name))) continue;
-    const chain = found.get(finger);
-    if (!chain) found.set(finger, [joint]);
+    const chain = chains.get(finger);
+    if (!chain) chains.set(finger, [joint]);
     else if (skeleton.joints[joint]!.parent === chain.at(-1)) chain.push(joint);
   }
-  return new Map([...found].sort(([a], [b]) => a - b));
+  return new Map([...chains].sort(([a], [b]) => a - b));
 }

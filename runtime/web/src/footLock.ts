@@ -31,7 +31,12 @@ export function newLock(): Lock {
 }
 
 /** The next pose, a tick later, with standing feet held in place and above the ground. */
-export function held(lock: Lock, pose: Played, how: Settings<typeof footLockSettings>, dt: number): Played {
+export function held(
+  lock: Lock,
+  pose: Played,
+  settings: Settings<typeof footLockSettings>,
+  dt: number,
+): Played {
   const [x, z, facing] = pose.ground;
   const hips = product(about(Y, facing), pose.rotations[0]!);
   const rotations = [...pose.rotations];
@@ -41,17 +46,17 @@ export function held(lock: Lock, pose: Played, how: Settings<typeof footLockSett
       plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)),
     );
     const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
-    const bears = soles[lowest]![1] < soles[BALL]![1] - how.bears ? lowest : BALL;
+    const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
     const contact = pose.contacts[side]!;
     const moved = shift(
       foot,
       minus(soles[bears]!, (foot.soles ?? soles)[bears]!),
-      contact > how.stands,
-      how,
+      contact > settings.stands,
+      settings,
       dt,
     );
     foot.soles = soles;
-    const steps = contact * how.steps * Math.min(1, moved / (how.swings * dt));
+    const steps = contact * settings.steps * Math.min(1, moved / (settings.swings * dt));
     const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(LOCK.LIFTS), dt);
     foot.height = [steps + off, rise];
     const lift = Math.max(0, steps + off - soles[lowest]![1]);
@@ -66,15 +71,15 @@ function shift(
   foot: Foot,
   [x, , z]: Vector,
   contact: boolean,
-  how: Settings<typeof footLockSettings>,
+  settings: Settings<typeof footLockSettings>,
   dt: number,
 ): number {
   const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
-  if (contact && Math.hypot(x, z) < how.swings * dt && Math.hypot(...stay) < how.farthest) {
+  if (contact && Math.hypot(x, z) < settings.swings * dt && Math.hypot(...stay) < settings.farthest) {
     [foot.shift, foot.drift] = [stay, [0, 0]];
     return 0;
   }
-  const damping = dampingOf(how.fade);
+  const damping = dampingOf(settings.fade);
   const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
   const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
   [foot.shift, foot.drift] = [

@@ -44,12 +44,12 @@ export function framesFor(motion: Motion, manifest: Manifest): number[][] {
   const bones = bonesOf(manifest);
   const prepared = manifest.verb !== "predict" && motion.fps === fps && isHumanoid(motion.skeleton);
   const whole = manifest.verb === "generate" || prepared ? checked(motion) : travelling(checked(motion));
-  const given = manifest.loop === "free_run" ? resampled(whole, fps, true) : whole;
-  const found = resampled(onFigure(given, fps), fps);
-  const metres = found.skeleton.metresPerUnit!;
-  const places = found.translations.map((moves) => times(moves[0]!, metres));
-  const turns = (bone: string) => found.rotations.map((row) => row[found.skeleton.index(bone)]!);
-  const root = found.rotations.map((row) => row[0]!);
+  const kept = manifest.loop === "free_run" ? resampled(whole, fps, true) : whole;
+  const figure = resampled(onFigure(kept, fps), fps);
+  const metres = figure.skeleton.metresPerUnit!;
+  const places = figure.translations.map((moves) => times(moves[0]!, metres));
+  const turns = (bone: string) => figure.rotations.map((row) => row[figure.skeleton.index(bone)]!);
+  const root = figure.rotations.map((row) => row[0]!);
   if (representation === "root_sixd") return sixd(root, places, bones.slice(1).map(turns), fps);
   const block = eulersOf(root, "yxz");
   const unit = representation === "root_angles" ? RADIANS : 1;
@@ -82,10 +82,10 @@ function bonesOf({ motion: { representation, channels, skeleton } }: Manifest): 
     .filter((name) => name.endsWith(kind === "x" ? ".xx" : `.${kind}x`))
     .map((name) => name.slice(0, -3));
   const whole = channels.length === (kind === "x" ? 4 + 6 * bones.length : 6 + 3 * bones.length);
-  const own =
+  const local =
     skeleton?.joints.length === HUMANOID.joints.length &&
     skeleton.joints.every(({ name }, at) => name === HUMANOID.names[at]);
-  if (!kind || !whole || !own)
+  if (!kind || !whole || !local)
     throw new DecodingError(
       `motions are made into frames of models on the humanoid, not of ${representation}`,
     );
@@ -112,19 +112,18 @@ function onFigure(motion: Motion, fps: number): Motion {
 
 /** Whether a skeleton has all bones by the humanoid's names, which point within 45 degrees of the humanoid's. */
 function hasBones(skeleton: Skeleton): boolean {
-  const at = (own: Skeleton, name: string) => own.rest[own.names.indexOf(name)]!;
+  const at = (figure: Skeleton, name: string) => figure.rest[figure.names.indexOf(name)]!;
   return (
     BONES.every((name) => skeleton.names.includes(name)) &&
     HUMANOID.joints.every(({ name, parent }) => {
       if (parent < 0 || !skeleton.names.includes(name)) return true;
       const above = HUMANOID.names[parent]!;
-      const [one, two] = [skeleton, HUMANOID].map((own) => minus(at(own, name), at(own, above))) as [
-        Vector,
-        Vector,
-      ];
+      const [bone, two] = [skeleton, HUMANOID].map((figure) =>
+        minus(at(figure, name), at(figure, above)),
+      ) as [Vector, Vector];
       return (
-        Math.min(size(one), size(two)) < 1e-6 ||
-        dot(one, two) >= Math.cos(45 * RADIANS) * size(one) * size(two)
+        Math.min(size(bone), size(two)) < 1e-6 ||
+        dot(bone, two) >= Math.cos(45 * RADIANS) * size(bone) * size(two)
       );
     })
   );
@@ -139,11 +138,11 @@ function degrees(turns: Quaternion[], bone: string): number[][] {
 
 /** Rotation vectors that do not leap: from the last frame backwards each is the one nearest to that after it. */
 function vectors(turns: Quaternion[]): number[][] {
-  const found = turns.map(vectorOf);
-  for (let at = found.length - 2; at >= 0; at--) {
-    found[at] = nearestTurn(found[at]!, found[at + 1]!);
+  const unwrapped = turns.map(vectorOf);
+  for (let at = unwrapped.length - 2; at >= 0; at--) {
+    unwrapped[at] = nearestTurn(unwrapped[at]!, unwrapped[at + 1]!);
   }
-  return found;
+  return unwrapped;
 }
 
 /** Forward and to the left in metres and the turn, a second; the first frame has the second one's. */
@@ -151,10 +150,10 @@ function velocities(places: Vector[], facing: number[], fps: number): Ground[] {
   if (places.length < 2) return [[0, 0, 0]];
   return places.map((_, at) => {
     const later = Math.max(at, 1);
-    const [from, to] = [later - 1, later].map((one): Ground => [
-      places[one]![0],
-      places[one]![2],
-      facing[one]!,
+    const [from, to] = [later - 1, later].map((time): Ground => [
+      places[time]![0],
+      places[time]![2],
+      facing[time]!,
     ]) as [Ground, Ground];
     return seenFrom(from, to).map((rate) => rate * fps) as Ground;
   });

@@ -20,11 +20,11 @@ export async function freeRun(
       for (let at = 0; at < ahead; at++) seen.push(whole.data.slice(at * width, (at + 1) * width));
       continue;
     }
-    const given = Object.entries(outputs).filter(([name]) => takes(name));
-    const fixed: Arrays = Object.fromEntries(given.filter(([name]) => !(name in step.spec.feedback)));
+    const kept = Object.entries(outputs).filter(([name]) => takes(name));
+    const fixed: Arrays = Object.fromEntries(kept.filter(([name]) => !(name in step.spec.feedback)));
     let states: Record<string, NumberArray<Float32Array>> = {
       ...step.zeroState(1),
-      ...Object.fromEntries(given.filter(([name]) => name in step.spec.feedback)),
+      ...Object.fromEntries(kept.filter(([name]) => name in step.spec.feedback)),
     };
     for (let at = 0; at < ahead; at++) {
       const next = await step.step(fixed, states);

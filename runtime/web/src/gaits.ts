@@ -29,23 +29,23 @@ export class Gaits {
   constructor(
     readonly names: readonly string[],
     readonly speeds: readonly Speeds[],
-    private readonly how: Settings<typeof steeringSettings>,
+    private readonly settings: Settings<typeof steeringSettings>,
   ) {}
 
   /** The number of a gait; ControlError for an unknown one. */
   number(name: string): number {
-    const found = this.names.indexOf(name);
-    if (found < 0)
+    const gait = this.names.indexOf(name);
+    if (gait < 0)
       throw new ControlError(
         `unknown gait ${JSON.stringify(name)}; expected one of ${this.names.join(", ")}`,
       );
-    return found;
+    return gait;
   }
 
   /** A facing from which a gait goes in a direction: not all go sideways and backwards. */
   facing(gait: number, direction: number, facing: number): number {
     const [, , , sideways, backwards] = this.speeds[gait]!;
-    const farthest = Math.min(sideways, backwards) > 0 ? Math.PI : this.how.ahead;
+    const farthest = Math.min(sideways, backwards) > 0 ? Math.PI : this.settings.ahead;
     return direction - clamp(wrapped(direction - facing), -farthest, farthest);
   }
 
@@ -54,17 +54,18 @@ export class Gaits {
   curved([x, z, to]: Target, gait: number, facing: number): Target {
     const [, , , sideways, backwards] = this.speeds[gait]!;
     if (Math.min(sideways, backwards) > 0 || !(x || z)) return [x, z, to];
-    const near = (angle: number) => facing + clamp(wrapped(angle - facing), -this.how.ahead, this.how.ahead);
+    const near = (angle: number) =>
+      facing + clamp(wrapped(angle - facing), -this.settings.ahead, this.settings.ahead);
     const [direction, speed] = [near(Math.atan2(x, z)), Math.hypot(x, z)];
     return [speed * Math.sin(direction), speed * Math.cos(direction), near(to)];
   }
 
   /** A command's target within the gait's limits, and what is said where it exceeds them. */
-  target({ gait, speed, direction, facing: told }: Command): { target: Target; beyond: string | null } {
+  target({ gait, speed, direction, facing: wanted }: Command): { target: Target; beyond: string | null } {
     const [slowest, , ...fastest] = this.speeds[gait]!;
-    const facing = speed > 0 ? this.facing(gait, direction, told) : told;
+    const facing = speed > 0 ? this.facing(gait, direction, wanted) : wanted;
     const aside = Math.abs(wrapped(direction - facing));
-    const high = fastest[[this.how.aside, this.how.back].filter((edge) => aside >= edge).length]!;
+    const high = fastest[[this.settings.aside, this.settings.back].filter((edge) => aside >= edge).length]!;
     const low = Math.min(slowest, high);
     const within = speed > 0 ? clamp(speed, low, high) : 0;
     const limits = `${JSON.stringify(this.names[gait])} allows 0 or ${low}-${high} m/s in this direction, not ${speed}`;
@@ -74,11 +75,11 @@ export class Gaits {
 }
 
 /** A command with what is told anew. Given a direction but no facing, the figure faces it once it moves. */
-export function told(command: Command, given: Partial<Omit<Command, "facesWay">>): Command {
+export function changed(command: Command, changes: Partial<Omit<Command, "facesWay">>): Command {
   const faces =
-    given.direction !== undefined || given.facing !== undefined
-      ? given.facing === undefined
+    changes.direction !== undefined || changes.facing !== undefined
+      ? changes.facing === undefined
       : command.facesWay;
-  const found = { ...command, ...given, facesWay: faces };
-  return { ...found, facing: faces && found.speed > 0 ? found.direction : found.facing };
+  const next = { ...command, ...changes, facesWay: faces };
+  return { ...next, facing: faces && next.speed > 0 ? next.direction : next.facing };
 }

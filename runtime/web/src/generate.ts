@@ -77,7 +77,7 @@ export interface Understood {
 }
 
 /** Sentences of a story, for each its seconds (0 where it ends by itself), whether they are whole, how it is drawn. */
-interface Told {
+interface Script {
   whole: boolean;
   strict: boolean;
   texts: string[];
@@ -131,8 +131,8 @@ export class GenerateModel extends LanguageModel {
     const count = this.setting("hypotheses", settings.hypotheses ?? 1);
     if (!settings.whole && (await this.parts(text)).length > 1) {
       const motions: Story[] = [];
-      for (const one of [seed, ...stateOf(seed, count - 1)])
-        motions.push(await this.story(text, { ...settings, seed: one }));
+      for (const value of [seed, ...stateOf(seed, count - 1)])
+        motions.push(await this.story(text, { ...settings, seed: value }));
       return motions;
     }
     const noise = Array.from({ length: count }, (_, at) => (at ? new Pcg64(seed, at - 1) : new Pcg64(seed)));
@@ -142,12 +142,12 @@ export class GenerateModel extends LanguageModel {
   /** What a text asks for one after another: docs/reference/bundle.md, "Several things in one text". */
   async parts(text: string): Promise<string[]> {
     this.words(text);
-    const found: string[] = [];
+    const lacking: string[] = [];
     for (const sentence of sentencesOf(text)) {
       const parts = partsOf(sentence, this.verbs);
-      found.push(...(parts.length > 1 && (await this.lacks(sentence)) ? parts : [sentence]));
+      lacking.push(...(parts.length > 1 && (await this.lacks(sentence)) ? parts : [sentence]));
     }
-    return found.length > 1 ? found : [text];
+    return lacking.length > 1 ? lacking : [text];
   }
 
   /** Whether the likeliest action lacks something of a sentence. */
@@ -163,7 +163,7 @@ export class GenerateModel extends LanguageModel {
     const lacks = (word: string) =>
       word &&
       !FUNCTION_WORDS.has(word) &&
-      ![word, this.vocabulary.near(word)].some((one) => have.has(stem(one)));
+      ![word, this.vocabulary.near(word)].some((form) => have.has(stem(form)));
     return [...words].filter(lacks).sort();
   }
 
@@ -184,14 +184,14 @@ export class GenerateModel extends LanguageModel {
   }
 
   /** The context of a sentence; strict: without the actions that leave out a word. TextError for what is refused then. */
-  private async asked(sentence: string, strict = false): Promise<Float32Array> {
+  private async contextOf(sentence: string, strict = false): Promise<Float32Array> {
     const context = await this.context(sentence);
     if (!strict) return context;
     const { unknown } = this.vocabulary.encode(sentence);
     if (unknown.length)
       throw new TextError(`the model does not know ${unknown.join(", ")} (in '${sentence}')`);
     const { confidence, confident, nearest } = this.known(sentence, context);
-    const near = nearest.map((one) => `'${one}'`).join(", ");
+    const near = nearest.map((example) => `'${example}'`).join(", ");
     if (!confident)
       throw new TextError(
         `'${sentence}' is outside the training data (confidence ${confidence.toFixed(2)}); nearest: ${near}`,
@@ -204,17 +204,17 @@ export class GenerateModel extends LanguageModel {
   }
 
   /** The same by noise that is given for each motion. */
-  async drawn(text: string, noise: Noise[], given: GenerateSettings): Promise<Generated[]> {
-    const drawing = this.drawing(given);
-    const seconds = given.seconds === undefined ? 0 : this.setting("seconds", given.seconds);
-    const longest = Math.max(1, this.steps(seconds || this.setting("max_seconds", given.max_seconds)));
-    const context = await this.asked(text, given.strict);
-    const actions = noise.map((one) => drawnAction(this.source, context, one, drawing.certainty));
+  async drawn(text: string, noise: Noise[], settings: GenerateSettings): Promise<Generated[]> {
+    const drawing = this.drawing(settings);
+    const seconds = settings.seconds === undefined ? 0 : this.setting("seconds", settings.seconds);
+    const longest = Math.max(1, this.steps(seconds || this.setting("max_seconds", settings.max_seconds)));
+    const context = await this.contextOf(text, settings.strict);
+    const actions = noise.map((source) => drawnAction(this.source, context, source, drawing.certainty));
     const codes = await drawCodes(new Writer(this.source, noise, drawing), actions, longest, seconds > 0);
     const shown = new Map([...new Set(actions)].map((action) => [action, this.shown(text, action, context)]));
     const motions: Generated[] = [];
-    for (const [at, one] of codes.entries()) {
-      const frames = await new StreamingDecoder(this.codec).push(one, true);
+    for (const [at, motion] of codes.entries()) {
+      const frames = await new StreamingDecoder(this.codec).push(motion, true);
       const last = seconds ? Math.max(1, Math.round(seconds * this.fps)) : frames.length;
       motions.push({ frames: frames.slice(0, last), ...shown.get(actions[at]!)! });
     }
@@ -223,31 +223,31 @@ export class GenerateModel extends LanguageModel {
 
   /** One motion for several sentences, each from where the last one ends, and when each is shown. */
   async story(sentences: string | string[], settings: StorySettings = {}): Promise<Story> {
-    const told = await this.parted(this.told(sentences, settings));
-    const steps = told.texts.map(() => 0);
+    const script = await this.parted(this.scriptOf(sentences, settings));
+    const steps = script.texts.map(() => 0);
     const shown: Shown[] = [];
     const frames: Float32Array[] = [];
-    for await (const piece of this.pieces(told, settings.after)) {
+    for await (const piece of this.pieces(script, settings.after)) {
       frames.push(...piece.frames);
       if (piece.shown) shown.push(piece.shown);
       steps[piece.sentence]! += piece.steps;
     }
     let [start, over] = [0, 0];
-    const passages = told.texts.map((text, at): Passage => {
+    const passages = script.texts.map((text, at): Passage => {
       over += steps[at]! * this.codec.hop;
       const passage = { text, start, stop: Math.min(over, frames.length) / this.fps, ...shown[at]! };
       start = passage.stop;
       return passage;
     });
     const action = passages.length > 1 ? "" : passages[0]!.action;
-    const confidence = Math.min(...passages.map((one) => one.confidence));
-    return { frames, action, lacking: passages.flatMap((one) => one.lacking), confidence, passages };
+    const confidence = Math.min(...passages.map((passage) => passage.confidence));
+    return { frames, action, lacking: passages.flatMap((passage) => passage.lacking), confidence, passages };
   }
 
   /** The frames of `story` in pieces, as they are drawn; what cannot be told is refused before the first one. */
   stream(sentences: string | string[], settings: StorySettings = {}): AsyncGenerator<Float32Array[], void> {
-    const told = this.told(sentences, settings);
-    const pieces = async () => this.pieces(await this.parted(told), settings.after);
+    const script = this.scriptOf(sentences, settings);
+    const pieces = async () => this.pieces(await this.parted(script), settings.after);
     return (async function* () {
       for await (const { frames } of await pieces()) if (frames.length) yield frames;
     })();
@@ -260,14 +260,14 @@ export class GenerateModel extends LanguageModel {
 
   private known(text: string, context: Float32Array): Understood {
     const actions = this.manifest.actions!;
-    const said = new Map<string, number>();
+    const counts = new Map<string, number>();
     for (const { words } of actions)
-      for (const word of new Set(words)) said.set(word, (said.get(word) ?? 0) + 1);
-    const rare = (word: string) => Math.log((1 + actions.length) / said.get(word)!);
+      for (const word of new Set(words)) counts.set(word, (counts.get(word) ?? 0) + 1);
+    const rare = (word: string) => Math.log((1 + actions.length) / counts.get(word)!);
     const unheard = Math.log(1 + actions.length);
-    const asked = [...new Set(this.vocabulary.split(text))];
-    const heard = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : 0), 0);
-    const all = asked.reduce((sum, word) => sum + (said.has(word) ? rare(word) : unheard), 0);
+    const textWords = [...new Set(this.vocabulary.split(text))];
+    const heard = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : 0), 0);
+    const all = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : unheard), 0);
     const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
     const { confident, doubt } = this.familiarity;
     const confidence = (heard / (all || 1)) * Math.exp(context[order[0]!]!) ** doubt;
@@ -279,14 +279,14 @@ export class GenerateModel extends LanguageModel {
     return (await this.encoder.run(this.words(text))).context!.data;
   }
 
-  private drawing(given: Partial<Drawing>): Drawing {
+  private drawing(settings: Partial<Drawing>): Drawing {
     return {
-      temperature: this.setting("temperature", given.temperature),
-      first_temperature: this.setting("first_temperature", given.first_temperature),
-      top_p: this.setting("top_p", given.top_p),
-      guidance: this.setting("guidance", given.guidance),
-      memory: this.setting("memory", given.memory),
-      certainty: this.setting("certainty", given.certainty),
+      temperature: this.setting("temperature", settings.temperature),
+      first_temperature: this.setting("first_temperature", settings.first_temperature),
+      top_p: this.setting("top_p", settings.top_p),
+      guidance: this.setting("guidance", settings.guidance),
+      memory: this.setting("memory", settings.memory),
+      certainty: this.setting("certainty", settings.certainty),
     };
   }
 
@@ -295,61 +295,61 @@ export class GenerateModel extends LanguageModel {
     return Math.ceil((seconds * this.fps) / this.codec.hop - 1e-9);
   }
 
-  private told(sentences: string | string[], given: StorySettings): Told {
+  private scriptOf(sentences: string | string[], settings: StorySettings): Script {
     const texts = typeof sentences === "string" ? [sentences] : [...sentences];
-    const each = Array.isArray(given.seconds)
-      ? given.seconds
-      : texts.map(() => (given.seconds as number | undefined) ?? null);
+    const each = Array.isArray(settings.seconds)
+      ? settings.seconds
+      : texts.map(() => (settings.seconds as number | undefined) ?? null);
     if (!texts.length) throw new TextError("a story needs a sentence");
     if (each.length !== texts.length)
       throw new DecodingError(`${texts.length} sentences have ${each.length} lengths`);
-    if (![undefined, "start", "end", "both"].includes(given.stand))
-      throw new DecodingError(`stand is start, end or both, not ${given.stand}`);
-    const seconds = each.map((one) => (one === null ? 0 : this.setting("seconds", one)));
+    if (![undefined, "start", "end", "both"].includes(settings.stand))
+      throw new DecodingError(`stand is start, end or both, not ${settings.stand}`);
+    const seconds = each.map((length) => (length === null ? 0 : this.setting("seconds", length)));
     for (const end of ["start", "end"] as const) {
-      if (given.stand !== end && given.stand !== "both") continue;
+      if (settings.stand !== end && settings.stand !== "both") continue;
       texts[end === "start" ? "unshift" : "push"](GENERATE_CODES.STANDING);
       seconds[end === "start" ? "unshift" : "push"](GENERATE_CODES.STANDING_SECONDS);
     }
     texts.forEach((text) => this.words(text));
-    const longest = this.steps(this.setting("max_seconds", given.max_seconds));
+    const longest = this.steps(this.setting("max_seconds", settings.max_seconds));
     return {
       texts,
       seconds,
-      whole: given.whole ?? false,
-      strict: given.strict ?? false,
+      whole: settings.whole ?? false,
+      strict: settings.strict ?? false,
       longest,
-      drawing: this.drawing(given),
-      noise: new Pcg64(this.setting("seed", given.seed ?? 0)),
+      drawing: this.drawing(settings),
+      noise: new Pcg64(this.setting("seed", settings.seed ?? 0)),
     };
   }
 
   /** The story with the parts of its sentences as passages. */
-  private async parted(told: Told): Promise<Told> {
-    const parts = told.whole
-      ? told.texts.map((text) => [text])
-      : await Promise.all(told.texts.map((text) => this.parts(text)));
+  private async parted(script: Script): Promise<Script> {
+    const parts = script.whole
+      ? script.texts.map((text) => [text])
+      : await Promise.all(script.texts.map((text) => this.parts(text)));
     const texts = parts.flat();
-    if (told.strict) for (const text of texts) await this.asked(text, true); // refused before anything is drawn
+    if (script.strict) for (const text of texts) await this.contextOf(text, true); // refused before anything is drawn
     return {
-      ...told,
+      ...script,
       texts,
-      seconds: parts.flatMap((own, at) => own.map(() => told.seconds[at]! / own.length)),
+      seconds: parts.flatMap((part, at) => part.map(() => script.seconds[at]! / part.length)),
     };
   }
 
   /** What each sentence is shown as, then for each step of codes the frames that become final with it; at last the remaining frames. */
   private async *pieces(
-    { texts, strict, seconds, longest, drawing, noise }: Told,
+    { texts, strict, seconds, longest, drawing, noise }: Script,
     after?: Frames,
   ): AsyncGenerator<Piece, void> {
     const writer = new Writer(this.source, [noise], drawing);
     const before = after && (await this.continued(after));
     if (before) await writer.see(before.codes);
     const decoder = new StreamingDecoder(this.codec, before);
-    let [done, given, end, limit] = [0, 0, 0, Infinity];
+    let [done, shown, end, limit] = [0, 0, 0, Infinity];
     for (const [sentence, text] of texts.entries()) {
-      const context = await this.asked(text, strict);
+      const context = await this.contextOf(text, strict);
       const action = drawnAction(this.source, context, noise, drawing.certainty);
       yield { sentence, shown: this.shown(text, action, context), frames: [], steps: 0 };
       const length = seconds[sentence]!;
@@ -362,15 +362,15 @@ export class GenerateModel extends LanguageModel {
         length > 0,
       )) {
         done++;
-        const frames = (await decoder.push(codes)).slice(0, limit - given);
-        given += frames.length;
+        const frames = (await decoder.push(codes)).slice(0, limit - shown);
+        shown += frames.length;
         yield { sentence, frames, steps: 1 };
       }
       if (!length) end = (done * this.codec.hop) / this.fps;
     }
     yield {
       sentence: texts.length - 1,
-      frames: (await decoder.push([], true)).slice(0, limit - given),
+      frames: (await decoder.push([], true)).slice(0, limit - shown),
       steps: 0,
     };
   }
@@ -415,8 +415,8 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
     decoder: decoder!,
     tokens: tokens!,
     moves: end,
-    back: ahead.reduce((sum, one) => sum + 2 - one, 0) + Math.ceil(4 / hop),
-    ahead: ahead.reduce((sum, one) => sum + one, 0),
+    back: ahead.reduce((sum, steps) => sum + 2 - steps, 0) + Math.ceil(4 / hop),
+    ahead: ahead.reduce((sum, steps) => sum + steps, 0),
     hop,
     fps: manifest.motion.fps,
     halfLife: settingsOf("continuation", continuationSettings, manifest.settings.continuation).half_life,

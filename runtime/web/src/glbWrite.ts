@@ -61,13 +61,13 @@ class Buffer {
   }
 
   bytes(): Uint8Array {
-    const found = new Uint8Array(this.length);
+    const bytes = new Uint8Array(this.length);
     let at = 0;
     for (const { buffer, byteLength } of this.parts) {
-      found.set(new Uint8Array(buffer), at);
+      bytes.set(new Uint8Array(buffer), at);
       at += byteLength;
     }
-    return found;
+    return bytes;
   }
 }
 

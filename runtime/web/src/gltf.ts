@@ -207,26 +207,26 @@ export class Gltf {
 
   /** Where some nodes are, all their ancestors among them, at rest or with what is moved. */
   world(wanted: Set<number>, moved?: Map<number, Local>): Map<number, Placed> {
-    const found = new Map<number, Placed>();
+    const placed = new Map<number, Placed>();
     for (const node of this.order.filter((at) => wanted.has(at))) {
       const { translation, rotation, scale } = { ...this.local(node), ...moved?.get(node) };
       const turn = normalised(rotation);
-      const own = [0, 1, 2].map((axis) =>
+      const axes = [0, 1, 2].map((axis) =>
         times(rotated(turn, [+(axis === 0), +(axis === 1), +(axis === 2)]), scale[axis]!),
       ) as Placed["linear"];
-      const above = found.get(this.parents[node]!);
-      found.set(
+      const above = placed.get(this.parents[node]!);
+      placed.set(
         node,
         above
           ? {
               turn: product(above.turn, turn),
-              linear: own.map((column) => mapped(above.linear, column)) as Placed["linear"],
+              linear: axes.map((column) => mapped(above.linear, column)) as Placed["linear"],
               place: plus(above.place, mapped(above.linear, translation)),
             }
-          : { turn, linear: own, place: translation },
+          : { turn, linear: axes, place: translation },
       );
     }
-    return found;
+    return placed;
   }
 
   /** The rows of an accessor; FormatError if it is not in the file. */
@@ -314,10 +314,10 @@ export class Gltf {
 
   /** Some nodes and all their ancestors. */
   above(nodes: Iterable<number>): Set<number> {
-    const found = new Set<number>();
+    const reached = new Set<number>();
     for (const node of nodes)
-      for (let at = node; at >= 0 && !found.has(at); at = this.parents[at]!) found.add(at);
-    return found;
+      for (let at = node; at >= 0 && !reached.has(at); at = this.parents[at]!) reached.add(at);
+    return reached;
   }
 }
 
@@ -333,15 +333,15 @@ export function inlined(uri: string): Uint8Array {
 /** The JSON text and the binary part of a GLB file. */
 function chunks(content: Uint8Array): { json: Uint8Array; binary: Uint8Array } {
   const view = new DataView(content.buffer, content.byteOffset, content.byteLength);
-  const found = new Map<number, Uint8Array>();
+  const parts = new Map<number, Uint8Array>();
   for (let at = 12; at + 8 <= content.length;) {
     const [length, kind] = [view.getUint32(at, true), view.getUint32(at + 4, true)];
     if (at + 8 + length > content.length)
       throw new FormatError("cut short: the GLB file ends within a chunk");
-    if (!found.has(kind)) found.set(kind, content.subarray(at + 8, at + 8 + length));
+    if (!parts.has(kind)) parts.set(kind, content.subarray(at + 8, at + 8 + length));
     at += 8 + length;
   }
-  const json = found.get(0x4e4f534a);
+  const json = parts.get(0x4e4f534a);
   if (!json) throw new FormatError("cut short: the GLB file has no JSON chunk");
-  return { json, binary: found.get(0x004e4942) ?? new Uint8Array() };
+  return { json, binary: parts.get(0x004e4942) ?? new Uint8Array() };
 }

@@ -42,13 +42,13 @@ export function clipsOf(content: Uint8Array): string[] {
 export function readGLB(content: Uint8Array, clip: number | string = 0): Motion {
   return guarded(() => {
     const gltf = Gltf.parse(content);
-    const found = figures(gltf);
-    const animations = clips(gltf, found);
+    const groups = figures(gltf);
+    const animations = clips(gltf, groups);
     const at = typeof clip === "number" ? clip : animations.findIndex(({ name }) => name === clip);
     const animation = animations[at];
     if (!animation && (animations.length || clip !== 0))
       throw new FormatError(`no clip ${JSON.stringify(clip)}: the file has ${animations.length}`);
-    return taken(gltf, found, animation);
+    return taken(gltf, groups, animation);
   });
 }
 
@@ -71,9 +71,9 @@ function moves({ channels = [] }: Partial<Animation>): Set<number> {
   return new Set(targets.map(({ node }) => node!));
 }
 
-function clips(gltf: Gltf, found: Set<number>[]): Animation[] {
+function clips(gltf: Gltf, groups: Set<number>[]): Animation[] {
   const animations = gltf.document.animations ?? [];
-  const near = gltf.above(found.flatMap((joints) => [...joints]));
+  const near = gltf.above(groups.flatMap((joints) => [...joints]));
   const moving = animations.filter((animation) => [...moves(animation)].some((node) => near.has(node)));
   if (animations.length && !moving.length)
     throw new FormatError("its animations move no joint of its skeleton");
@@ -90,47 +90,47 @@ function figures(gltf: Gltf): Set<number>[] {
     throw new FormatError(`it has ${skins.length} skins: expected at most ${GLTF.MAX_SKINS}`);
   const bones = new Set(gltf.humanoid().values());
   const moved = new Set((gltf.document.animations ?? []).flatMap((animation) => [...moves(animation)]));
-  const given = [bones, ...skins.map(({ joints }) => new Set(joints))].filter((joints) => joints.size);
-  const strange = given.flatMap((joints) => [...joints]).filter((node) => !gltf.nodes[node]);
+  const sets = [bones, ...skins.map(({ joints }) => new Set(joints))].filter((joints) => joints.size);
+  const strange = sets.flatMap((joints) => [...joints]).filter((node) => !gltf.nodes[node]);
   if (strange.length) throw new FormatError(`joints that are not nodes: ${strange.slice(0, 5).join(", ")}`);
   const roots = heads(gltf, new Set(gltf.order.filter((node) => gltf.parents[node]! < 0)));
   const alone = animated(gltf, moved, roots);
-  if (!given.length) {
+  if (!sets.length) {
     if (!alone.size)
       throw new FormatError(
         "no skeleton: expected a skin with joints or a VRM humanoid; export the armature, too",
       );
     return grouped(gltf, [alone], moved, roots);
   }
-  const found = grouped(gltf, given, moved, roots);
-  if (bones.size) return found.filter((joints) => [...joints].some((node) => bones.has(node)));
-  const inside = gltf.above(found.flatMap((joints) => [...joints]));
-  if ([...alone].every((node) => inside.has(node)) || humans(gltf, found).length) return found;
-  const wider = humans(gltf, grouped(gltf, [...given, alone], moved, roots));
-  return wider.length ? wider : found;
+  const groups = grouped(gltf, sets, moved, roots);
+  if (bones.size) return groups.filter((joints) => [...joints].some((node) => bones.has(node)));
+  const inside = gltf.above(groups.flatMap((joints) => [...joints]));
+  if ([...alone].every((node) => inside.has(node)) || humans(gltf, groups).length) return groups;
+  const wider = humans(gltf, grouped(gltf, [...sets, alone], moved, roots));
+  return wider.length ? wider : groups;
 }
 
 /** Sets of joints put together that belong to one figure. */
 function grouped(
   gltf: Gltf,
-  given: Set<number>[],
+  sets: Set<number>[],
   moved: Set<number>,
   roots: Map<number, number>,
 ): Set<number>[] {
-  const parts = given.flatMap((joints) => byHead(joints, roots));
+  const parts = sets.flatMap((joints) => byHead(joints, roots));
   const tops = parts.map((part) => top(gltf, part));
   const above = heads(gltf, new Set([...moved, ...tops]));
-  const found = new Map<number, Set<number>>();
+  const groups = new Map<number, Set<number>>();
   parts.forEach((part, at) => {
     const head = above.get(tops[at]!)!;
-    found.set(head, new Set([...(found.get(head) ?? []), ...part]));
+    groups.set(head, new Set([...(groups.get(head) ?? []), ...part]));
   });
-  return [...found.values()];
+  return [...groups.values()];
 }
 
 /** Those figures, of the ten with the most joints, that have names of a human's. */
-function humans(gltf: Gltf, found: Set<number>[]): Set<number>[] {
-  return [...found]
+function humans(gltf: Gltf, groups: Set<number>[]): Set<number>[] {
+  return [...groups]
     .sort((a, b) => b.size - a.size)
     .slice(0, 10)
     .filter((joints) => isHuman(gltf, joints));
@@ -149,10 +149,10 @@ function isHuman(gltf: Gltf, joints: Set<number>): boolean {
 }
 
 function byHead(joints: Set<number>, roots: Map<number, number>): Set<number>[] {
-  const found = new Map<number, Set<number>>();
+  const sizes = new Map<number, Set<number>>();
   for (const node of joints)
-    found.set(roots.get(node)!, (found.get(roots.get(node)!) ?? new Set()).add(node));
-  return [...found.values()];
+    sizes.set(roots.get(node)!, (sizes.get(roots.get(node)!) ?? new Set()).add(node));
+  return [...sizes.values()];
 }
 
 /** In each tree the moved nodes and the bones below them, if some are below others; empty if none are. */
@@ -173,12 +173,12 @@ function animated(gltf: Gltf, moved: Set<number>, roots: Map<number, number>): S
 
 /** The highest of some nodes that each node is or is below. */
 function heads(gltf: Gltf, among: Set<number>): Map<number, number> {
-  const found = new Map<number, number>();
+  const numbers = new Map<number, number>();
   for (const node of gltf.order) {
-    const above = found.get(gltf.parents[node]!);
-    if (above !== undefined || among.has(node)) found.set(node, above ?? node);
+    const above = numbers.get(gltf.parents[node]!);
+    if (above !== undefined || among.has(node)) numbers.set(node, above ?? node);
   }
-  return found;
+  return numbers;
 }
 
 /** The lowest node that all of a part are or are below. */
@@ -195,7 +195,7 @@ export function restOf(gltf: Gltf): { skeleton: Skeleton; joints: number[]; rest
   return guarded(() => {
     const joints = jointsOf(
       gltf,
-      figures(gltf).reduce((best, one) => (one.size > best.size ? one : best)),
+      figures(gltf).reduce((best, group) => (group.size > best.size ? group : best)),
     );
     const rest = gltf.world(new Set(gltf.order));
     return { skeleton: skeletonOf(gltf, joints, rest), joints, rest };
@@ -203,13 +203,13 @@ export function restOf(gltf: Gltf): { skeleton: Skeleton; joints: number[]; rest
 }
 
 /** The figure that an animation moves most, counting its ancestors, else that with the most joints, in the animation's frames. */
-function taken(gltf: Gltf, found: Set<number>[], animation?: Animation): Motion {
+function taken(gltf: Gltf, groups: Set<number>[], animation?: Animation): Motion {
   const moved = animation ? moves(animation) : new Set<number>();
   const weight = (joints: Set<number>) =>
     [...gltf.above(joints)].filter((node) => moved.has(node)).length * GLTF.MAX_JOINTS + joints.size;
   const joints = jointsOf(
     gltf,
-    found.reduce((best, one) => (weight(one) > weight(best) ? one : best)),
+    groups.reduce((best, group) => (weight(group) > weight(best) ? group : best)),
   );
   const near = gltf.above(joints);
   const rest = gltf.world(near);
@@ -259,11 +259,14 @@ function turnedOnto(turn: Quaternion, bones: [atRest: Vector, bone: Vector][]): 
   const long = bones
     .filter(([atRest, bone]) => size(atRest) > 0 && size(bone) > 0)
     .map(([atRest, bone]) => [unit(atRest), unit(bone)] as const);
-  let found = turn;
+  let result = turn;
   for (let step = 0; step < 30 && long.length; step++) {
-    found = product(ofVector(mean(long.map(([atRest, bone]) => cross(rotated(found, atRest), bone)))), found);
+    result = product(
+      ofVector(mean(long.map(([atRest, bone]) => cross(rotated(result, atRest), bone)))),
+      result,
+    );
   }
-  return normalised(found);
+  return normalised(result);
 }
 
 /** The joints and the nodes between them, with the ends attached to them, parents first. */
@@ -274,26 +277,26 @@ function jointsOf(gltf: Gltf, joints: Set<number>): number[] {
     gltf.name(node).endsWith(SKELETON.END_SUFFIX) &&
     inside.has(gltf.parents[node]!) &&
     !gltf.nodes[node]!.children?.length;
-  const found = gltf.order.filter((node) => inside.has(node) || ends(node));
-  if (found.length > GLTF.MAX_JOINTS)
-    throw new FormatError(`its skeleton has ${found.length} joints: expected at most ${GLTF.MAX_JOINTS}`);
-  return found;
+  const nodes = gltf.order.filter((node) => inside.has(node) || ends(node));
+  if (nodes.length > GLTF.MAX_JOINTS)
+    throw new FormatError(`its skeleton has ${nodes.length} joints: expected at most ${GLTF.MAX_JOINTS}`);
+  return nodes;
 }
 
 function skeletonOf(gltf: Gltf, joints: number[], rest: Map<number, Placed>): Skeleton {
   const bones = new Map(
     [...gltf.humanoid()].filter(([bone]) => BONES.includes(bone)).map(([bone, node]) => [node, bone]),
   );
-  const [own, given] = [new Set<string>(), new Set<string>(bones.values())];
-  const found = joints.map((node): Joint => {
-    const name = unique(gltf.name(node), own);
+  const [used, reserved] = [new Set<string>(), new Set<string>(bones.values())];
+  const chain = joints.map((node): Joint => {
+    const name = unique(gltf.name(node), used);
     const parent = joints.indexOf(gltf.parents[node]!);
     const place = rest.get(node)!.place;
     const offset = parent < 0 ? place : minus(place, rest.get(joints[parent]!)!.place);
-    return { name: bones.get(node) ?? unique(name, given), parent, offset, order: "zyx" };
+    return { name: bones.get(node) ?? unique(name, reserved), parent, offset, order: "zyx" };
   });
   return new Skeleton(
-    found,
+    chain,
     1,
     joints.map((node) => restNode(gltf, node, rest)),
   );
@@ -311,16 +314,16 @@ function restNode(gltf: Gltf, node: number, rest: Map<number, Placed>): RestNode
 
 /** Translations in their parents' frames of the root, and of joints that leave their offset. */
 function moving(skeleton: Skeleton, turns: Quaternion[][], places: Vector[][]): Map<number, Vector[]> {
-  const found = new Map([[0, places.map((pose) => pose[0]!)]]);
+  const moved = new Map([[0, places.map((pose) => pose[0]!)]]);
   const still = 1e-4 * Math.max(skeleton.height, 1e-9);
   skeleton.joints.forEach(({ parent, offset }, at) => {
     if (parent < 0) return;
     const local = places.map((pose, frame) =>
       rotated(inverse(turns[frame]![parent]!), minus(pose[at]!, pose[parent]!)),
     );
-    if (local.some((move) => Math.max(...minus(move, offset).map(Math.abs)) > still)) found.set(at, local);
+    if (local.some((move) => Math.max(...minus(move, offset).map(Math.abs)) > still)) moved.set(at, local);
   });
-  return found;
+  return moved;
 }
 
 interface Keys {

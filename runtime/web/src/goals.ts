@@ -48,30 +48,30 @@ export class Goals {
   }
 
   /** What the features at a place of an array cost: half the squared distance to those asked, and the lag. */
-  cost(asked: Int16Array, features: Int16Array, at: number): number {
-    const way = this.way(asked);
+  cost(query: Int16Array, features: Int16Array, at: number): number {
+    const way = this.way(query);
     let cost = Math.max(0, way[2] - way[0] * features[at + LEFT]! - way[1] * features[at + FORWARD]!);
-    for (let i = 0; i < this.width; i++) cost += (features[at + i]! - asked[i]!) ** 2;
+    for (let i = 0; i < this.width; i++) cost += (features[at + i]! - query[i]!) ** 2;
     return cost;
   }
 
   /** The row that costs the least, less than `bound`, as it is or as its mirror image; none if there is none. */
   nearest(
-    asked: Int16Array,
+    query: Int16Array,
     image: Int16Array,
     bound: number,
   ): { row: number; mirror: boolean; cost: number } | null {
-    const own = this.least(asked, bound);
-    const other = this.least(image, own.cost);
-    const at = other.at < 0 ? own.at : other.at;
+    const straight = this.least(query, bound);
+    const other = this.least(image, straight.cost);
+    const at = other.at < 0 ? straight.at : other.at;
     return at < 0 ? null : { row: this.rows[at]!, mirror: other.at >= 0, cost: other.cost };
   }
 
   /** By how much it costs to lead less than half as far: of the steps left and forward, and of being there. */
-  private way(asked: Int16Array): [left: number, forward: number, half: number] {
+  private way(query: Int16Array): [left: number, forward: number, half: number] {
     const { mean, scale, lag } = this;
-    const left = asked[LEFT]! / MATCHING.STEPS / scale[LEFT]! + mean[LEFT]!;
-    const forward = asked[FORWARD]! / MATCHING.STEPS / scale[FORWARD]! + mean[FORWARD]!;
+    const left = query[LEFT]! / MATCHING.STEPS / scale[LEFT]! + mean[LEFT]!;
+    const forward = query[FORWARD]! / MATCHING.STEPS / scale[FORWARD]! + mean[FORWARD]!;
     const far = Math.hypot(left, forward);
     const [x, z] = [(lag * left) / Math.max(far, 1e-6), (lag * forward) / Math.max(far, 1e-6)];
     const half = (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!;
@@ -82,31 +82,31 @@ export class Goals {
     ];
   }
 
-  private least(asked: Int16Array, bound: number): { at: number; cost: number } {
+  private least(query: Int16Array, bound: number): { at: number; cost: number } {
     const { width, features, small, large, rows } = this;
-    const [left, forward, half] = this.way(asked);
+    const [left, forward, half] = this.way(query);
     let [best, cost] = [-1, bound];
     for (let first = 0, outer = 0; first < rows.length; first += SIZES[1], outer += width) {
-      if (outside(asked, large, outer, width, left, forward, half, cost) >= cost) continue;
+      if (outside(query, large, outer, width, left, forward, half, cost) >= cost) continue;
       const last = Math.min(first + SIZES[1], rows.length);
       for (
         let from = first, inner = (first / SIZES[0]) * width;
         from < last;
         from += SIZES[0], inner += width
       ) {
-        if (outside(asked, small, inner, width, left, forward, half, cost) >= cost) continue;
+        if (outside(query, small, inner, width, left, forward, half, cost) >= cost) continue;
         const end = Math.min(from + SIZES[0], last);
         for (let at = from, place = from * width; at < end; at++, place += width) {
           const lag = half - left * features[place + LEFT]! - forward * features[place + FORWARD]!;
-          let own = lag > 0 ? lag : 0;
-          for (let i = 0; i < width && own < cost; i += 2) {
-            const off = features[place + i]! - asked[i]!;
-            const next = features[place + i + 1]! - asked[i + 1]!;
-            own += off * off + next * next;
+          let total = lag > 0 ? lag : 0;
+          for (let i = 0; i < width && total < cost; i += 2) {
+            const off = features[place + i]! - query[i]!;
+            const next = features[place + i + 1]! - query[i + 1]!;
+            total += off * off + next * next;
           }
-          if (own < cost) {
+          if (total < cost) {
             best = at;
-            cost = own;
+            cost = total;
           }
         }
       }
@@ -117,7 +117,7 @@ export class Goals {
 
 /** What the rows of a box cost at least, or a part of that which is as much as `cost`. */
 function outside(
-  asked: Int16Array,
+  query: Int16Array,
   { low, high }: Boxes,
   at: number,
   width: number,
@@ -130,10 +130,10 @@ function outside(
     half - left * (left > 0 ? high : low)[at + LEFT]! - forward * (forward > 0 ? high : low)[at + FORWARD]!;
   let least = lag > 0 ? lag : 0;
   for (let i = 0; i < width && least < cost; i += 2) {
-    const under = low[at + i]! - asked[i]!;
-    const over = asked[i]! - high[at + i]!;
-    const below = low[at + i + 1]! - asked[i + 1]!;
-    const above = asked[i + 1]! - high[at + i + 1]!;
+    const under = low[at + i]! - query[i]!;
+    const over = query[i]! - high[at + i]!;
+    const below = low[at + i + 1]! - query[i + 1]!;
+    const above = query[i + 1]! - high[at + i + 1]!;
     const off = under > 0 ? under : over > 0 ? over : 0;
     const next = below > 0 ? below : above > 0 ? above : 0;
     least += off * off + next * next;

@@ -48,15 +48,15 @@ export class Graph {
     const session = await runtime.InferenceSession.create(model, settings).catch((error: unknown) => {
       throw new BundleError(`graph ${role}: ONNX Runtime cannot load it: ${String(error)}`);
     });
-    for (const [wanted, given] of [
+    for (const [wanted, present] of [
       [spec.inputs, session.inputNames],
       [spec.outputs, session.outputNames],
     ] as const) {
       const names = wanted.map((tensor) => tensor.name);
-      if (`${[...names].sort()}` !== `${[...given].sort()}`) {
+      if (`${[...names].sort()}` !== `${[...present].sort()}`) {
         await session.release();
         throw new BundleError(
-          `graph ${role}: it has ${given.join(", ")}, and its manifest ${names.join(", ")}`,
+          `graph ${role}: it has ${present.join(", ")}, and its manifest ${names.join(", ")}`,
         );
       }
     }
@@ -67,34 +67,34 @@ export class Graph {
   async run(inputs: Arrays): Promise<Record<string, NumberArray<Float32Array>>> {
     const feeds: Record<string, TypedTensor<"float32"> | TypedTensor<"int64">> = {};
     for (const { name, dtype, shape } of this.spec.inputs) {
-      const given = inputs[name];
-      if (!given) throw new BundleError(`graph ${this.role}: the input ${name} is missing`);
+      const input = inputs[name];
+      if (!input) throw new BundleError(`graph ${this.role}: the input ${name} is missing`);
       const fits =
-        given.shape.length === shape.length &&
-        shape.every((size, i) => typeof size === "string" || size === given.shape[i]);
-      if (!fits || (dtype === "int64") !== given.data instanceof BigInt64Array) {
+        input.shape.length === shape.length &&
+        shape.every((size, i) => typeof size === "string" || size === input.shape[i]);
+      if (!fits || (dtype === "int64") !== input.data instanceof BigInt64Array) {
         throw new BundleError(
-          `graph ${this.role}: ${name} is (${given.shape}), expected ${dtype} (${shape})`,
+          `graph ${this.role}: ${name} is (${input.shape}), expected ${dtype} (${shape})`,
         );
       }
       feeds[name] =
-        given.data instanceof BigInt64Array
-          ? new this.runtime.Tensor("int64", given.data, given.shape)
-          : new this.runtime.Tensor("float32", singles(given.data), given.shape);
+        input.data instanceof BigInt64Array
+          ? new this.runtime.Tensor("int64", input.data, input.shape)
+          : new this.runtime.Tensor("float32", singles(input.data), input.shape);
     }
     const outputs = await this.session.run(feeds).catch((error: unknown) => {
       throw new BundleError(
         `graph ${this.role}: ONNX Runtime cannot compute it: ${String(error).slice(0, 200)}`,
       );
     });
-    const found: Record<string, NumberArray<Float32Array>> = {};
+    const results: Record<string, NumberArray<Float32Array>> = {};
     for (const [name, tensor] of Object.entries(outputs)) {
       const data = tensor.data as Float32Array | BigInt64Array;
-      found[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
-      if (!bounded(found[name].data))
+      results[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
+      if (!bounded(results[name].data))
         throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${FIELDS.LARGEST}`);
     }
-    return found;
+    return results;
   }
 
   /** Give back the memory of ONNX Runtime; the graph is of no use then. */
@@ -104,14 +104,14 @@ export class Graph {
 
   /** The states of so many rows before the first step: zeros. */
   zeroState(rows: number): Record<string, NumberArray<Float32Array>> {
-    const found: Record<string, NumberArray<Float32Array>> = {};
+    const zeros: Record<string, NumberArray<Float32Array>> = {};
     for (const name of Object.keys(this.spec.feedback)) {
       const tensor = this.spec.inputs.find((input) => input.name === name);
       const sizes = this.spec.start?.[name] ?? tensor?.shape.slice(1).map(Number) ?? [];
       const shape = [rows, ...sizes];
-      found[name] = { data: new Float32Array(shape.reduce((product, size) => product * size, 1)), shape };
+      zeros[name] = { data: new Float32Array(shape.reduce((product, size) => product * size, 1)), shape };
     }
-    return found;
+    return zeros;
   }
 
   /** One step: its outputs, and the states for the next one. */
@@ -135,17 +135,17 @@ function bounded(data: Float32Array): boolean {
 
 /** Rows of all states, in a new order, with any repeated or left out. */
 export function taken(states: Record<string, NumberArray<Float32Array>>, order: number[]) {
-  const found: Record<string, NumberArray<Float32Array>> = {};
+  const reordered: Record<string, NumberArray<Float32Array>> = {};
   for (const [name, array] of Object.entries(states)) {
     const { data, shape } = array;
     if (order.length === shape[0] && order.every((row, at) => row === at)) {
-      found[name] = array;
+      reordered[name] = array;
       continue;
     }
     const width = data.length / shape[0]!;
     const picked = new Float32Array(order.length * width);
     order.forEach((row, at) => picked.set(data.subarray(row * width, (row + 1) * width), at * width));
-    found[name] = { data: picked, shape: [order.length, ...shape.slice(1)] };
+    reordered[name] = { data: picked, shape: [order.length, ...shape.slice(1)] };
   }
-  return found;
+  return reordered;
 }

@@ -44,10 +44,10 @@ export function holdFeet(motion: Motion): Motion {
 /** Where the ankle shall be, of points of the sole over ground at 0. */
 function targets(legs: TwoBones[], points: Vector[][], fps: number): Vector[] {
   const shifts = shiftsOf(points, fps);
-  const found = legs.map((leg, at) =>
+  const eased = legs.map((leg, at) =>
     leg.eased([leg.ankle[0] + shifts[at]![0], leg.ankle[1], leg.ankle[2] + shifts[at]![1]]),
   );
-  const depth = found.map((target, at) =>
+  const depth = eased.map((target, at) =>
     Math.max(0, -(Math.min(...points[at]!.map((point) => point[1])) + target[1] - legs[at]!.ankle[1])),
   );
   // a mean over the window in which each is the deepest is as high as the one in the middle
@@ -60,21 +60,21 @@ function targets(legs: TwoBones[], points: Vector[][], fps: number): Vector[] {
   const total = bell.reduce((sum, weight) => sum + weight);
   return windows(deepest, reach).map((window, at) => {
     const lift = window.reduce((sum, value, i) => sum + value * bell[i]!, 0) / total;
-    return [found[at]![0], found[at]![1] + Math.min(lift, holdSettings.farthest), found[at]![2]];
+    return [eased[at]![0], eased[at]![1] + Math.min(lift, holdSettings.farthest), eased[at]![2]];
   });
 }
 
 /** The shift of a foot over the ground, x and z by frame, that undoes its sliding. */
 function shiftsOf(points: Vector[][], fps: number): [number, number][] {
   const touch = contacts(points, fps);
-  const strongest = touch.map((own) => Math.max(...own));
-  const undone = touch.map((own, at) => {
+  const strongest = touch.map((row) => Math.max(...row));
+  const undone = touch.map((row, at) => {
     const total = Math.max(
-      own.reduce((sum, value) => sum + value),
+      row.reduce((sum, value) => sum + value),
       1e-9,
     );
     const step = (axis: 0 | 2) =>
-      own.reduce(
+      row.reduce(
         (sum, value, k) => sum + (value / total) * (points[at + 1]![k]![axis] - points[at]![k]![axis]),
         0,
       );
@@ -118,14 +118,14 @@ export function contacts(points: Vector[][], fps: number): number[][] {
 
 /** First and last frame of each stance; those with less between them than a lifted foot are one. */
 function stances(contact: number[], lifted: number): [number, number][] {
-  const found: [number, number][] = [];
+  const spans: [number, number][] = [];
   contact.forEach((value, at) => {
     if (!(value > 0)) return;
-    const last = found.at(-1);
+    const last = spans.at(-1);
     if (last && (at === last[1] || at - last[1] < lifted)) last[1] = at + 1;
-    else found.push([at, at + 1]);
+    else spans.push([at, at + 1]);
   });
-  return found;
+  return spans;
 }
 
 /** Values that are known in stances, go to 0 between them and come back in so many frames, smoothly. */

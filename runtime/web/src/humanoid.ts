@@ -60,8 +60,8 @@ export const LEG_LENGTH = ["LowerLeg", "Foot"].reduce(
 /** Points of both soles by frame: of the left foot two, of its toes one, and the same of the right. */
 export function solePoints({ turns, places }: World): Vector[][] {
   const points = SIDES.flatMap((side) =>
-    Object.entries(SOLES).flatMap(([part, own]) =>
-      own.map((point): [number, Vector] => [HUMANOID.index(side + part), point]),
+    Object.entries(SOLES).flatMap(([part, sole]) =>
+      sole.map((point): [number, Vector] => [HUMANOID.index(side + part), point]),
     ),
   );
   return turns.map((turned, frame) =>
@@ -83,11 +83,11 @@ export const HIPS = SIDES.map((side) => HUMANOID.index(`${side}UpperLeg`));
 /** Whether a skeleton is the humanoid itself, but for the rounding of files. */
 export function isHumanoid({ joints, metresPerUnit }: Skeleton): boolean {
   const same = (joint: Joint, at: number) => {
-    const own = HUMANOID.joints[at]!;
+    const expected = HUMANOID.joints[at]!;
     return (
-      joint.name === own.name &&
-      joint.parent === own.parent &&
-      (!at || size(minus(joint.offset, own.offset)) < 1e-6)
+      joint.name === expected.name &&
+      joint.parent === expected.parent &&
+      (!at || size(minus(joint.offset, expected.offset)) < 1e-6)
     );
   };
   return metresPerUnit === 1 && joints.length === HUMANOID.joints.length && joints.every(same);

@@ -95,16 +95,16 @@ function conventionOf(table: Table, words: [string, string]): Convention {
 
 /** Vectors of the left side and, mirrored by signs, of the right. */
 function bothSides(ofLeft: Record<string, Vector>, signs: Vector): Record<string, Vector> {
-  const found: Record<string, Vector> = {};
-  for (const [bone, own] of Object.entries(ofLeft)) {
-    if (UNSIDED.includes(bone)) found[bone] = own;
+  const axes: Record<string, Vector> = {};
+  for (const [bone, direction] of Object.entries(ofLeft)) {
+    if (UNSIDED.includes(bone)) axes[bone] = direction;
     else
-      [found[`left${bone}`], found[`right${bone}`]] = [
-        own,
-        own.map((value, axis) => signs[axis]! * value) as Vector,
+      [axes[`left${bone}`], axes[`right${bone}`]] = [
+        direction,
+        direction.map((value, axis) => signs[axis]! * value) as Vector,
       ];
   }
-  return found;
+  return axes;
 }
 
 /** A name without what differs between files: case, separators, and how letters are encoded. */
@@ -124,8 +124,8 @@ export function mapOf(skeleton: Skeleton): JointMap {
   );
   matches.sort((a, b) => b.known - a.known || b.spelled - a.spelled || a.absent - b.absent);
   const fullest = matches[0]!;
-  const told = onOneSide(missing(fullest.map), fullest.map);
-  const best = told ? fullest : (matches.find(({ map }) => !missing(map).length) ?? fullest);
+  const reason = onOneSide(missing(fullest.map), fullest.map);
+  const best = reason ? fullest : (matches.find(({ map }) => !missing(map).length) ?? fullest);
   const lacking = missing(best.map);
   if (
     lacking.length &&
@@ -152,15 +152,15 @@ function match(convention: Convention, skeleton: Skeleton, written: string[]) {
   );
   if (hips.length > 1) throw new MotionError("this file has two hips: put each figure in a file of its own");
   const limbs = Object.entries(convention.names).filter(([bone]) => !CHAINS.includes(bone));
-  const found = limbs.map(
+  const roles = limbs.map(
     ([bone, known]) => [bone, known.map((name) => names.indexOf(name)).find((at) => at >= 0)] as const,
   );
   const joints = Object.fromEntries(
-    found.filter((pair): pair is readonly [string, number] => pair[1] !== undefined),
+    roles.filter((pair): pair is readonly [string, number] => pair[1] !== undefined),
   );
-  const own = new Set([...Object.values(convention.names).flat(), ...convention.aside]);
+  const accepted = new Set([...Object.values(convention.names).flat(), ...convention.aside]);
   const isMarked = !convention.marks.length || convention.marks.some((name) => names.includes(name));
-  const known = isMarked ? names.filter((name) => own.has(name)).length : 0;
+  const known = isMarked ? names.filter((name) => accepted.has(name)).length : 0;
   const spelled = bare.filter((name) => convention.spelled.has(name)).length;
   const chains = CHAINS.filter(
     (bone) => convention.names[bone] && !(convention.optional.has(bone) && !chain(bone).length),
@@ -221,9 +221,9 @@ function withoutFirstWords(names: string[]): string[] {
 }
 
 /** A map of a user's own: bone -> the joint's name, of spine and neck all names, upwards. MotionError says what is wrong. */
-export function mapFrom(skeleton: Skeleton, given: Record<string, string | string[]>): JointMap {
+export function mapFrom(skeleton: Skeleton, named: Record<string, string | string[]>): JointMap {
   const places: Record<string, number[]> = {};
-  for (const [bone, names] of Object.entries(given)) {
+  for (const [bone, names] of Object.entries(named)) {
     const known =
       UNSIDED.includes(bone) || SIDES.some((side) => [...LEG, ...ARM].some((part) => side + part === bone));
     if (!known) throw new MotionError(`${JSON.stringify(bone)} is not a bone of the humanoid`);

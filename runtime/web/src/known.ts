@@ -20,7 +20,8 @@ interface Tables {
   actions: Int16Array;
   shown: Uint8Array;
   sentences: string[];
-  said: Int16Array;
+  /** Of each sentence the action that it is said of. */
+  actionOf: Int16Array;
   names: Uint8Array;
   ways: Int16Array;
 }
@@ -36,39 +37,39 @@ export class Known {
     private readonly tables: Tables,
     private readonly shape: number[],
     private readonly kinds: number,
-    given?: Record<string, number>,
+    values?: Record<string, number>,
   ) {
-    this.settings = settingsOf("answer", answerSettings, given);
+    this.settings = settingsOf("answer", answerSettings, values);
     const rows = tables.sentences.map((_, row) =>
       tables.names.subarray(row * kinds, (row + 1) * kinds).join(),
     );
     const order = [...new Set(rows)].sort(); // as zeros and ones they sort like numbers
-    this.sets = order.map((one) => one.split(",").flatMap((said, kind) => (said === "1" ? [kind] : [])));
-    const places = new Map(order.map((one, place) => [one, place]));
+    this.sets = order.map((row) => row.split(",").flatMap((flag, kind) => (flag === "1" ? [kind] : [])));
+    const places = new Map(order.map((row, place) => [row, place]));
     this.named = rows.map((row) => places.get(row)!);
   }
 
   /** Those of a bundle that has any. */
   static async of(bundle: Bundle): Promise<Known | undefined> {
     if (!bundle.manifest.graphs.space) return undefined;
-    const [vectors, actions, shown, letters, said, names, ways] = await Promise.all(
+    const [vectors, actions, shown, letters, actionOf, names, ways] = await Promise.all(
       ["vectors", "actions", "shown", "sentences", "said", "names", "ways"].map((name) =>
         bundle.table(`known_${name}`),
       ),
     );
     const sentences = new TextDecoder().decode(letters!.data as Uint8Array).split("\n");
     const [count, kinds] = shown!.shape as [number, number];
-    for (const rows of [actions!, said!]) {
-      if (!rows.data.length || (rows.data as Int16Array).some((one) => one < 0 || one >= count)) {
+    for (const rows of [actions!, actionOf!]) {
+      if (!rows.data.length || (rows.data as Int16Array).some((action) => action < 0 || action >= count)) {
         throw new BundleError(`tables of known motions have numbers that are none of ${count} actions`);
       }
     }
     const fits =
-      [said!, names!, ways!].every((table) => table.shape[0] === sentences.length) &&
+      [actionOf!, names!, ways!].every((table) => table.shape[0] === sentences.length) &&
       names!.shape[1] === kinds;
     if (!fits || vectors!.shape[0] !== actions!.shape[0] || !vectors!.data.length)
       throw new BundleError("tables of known motions do not fit each other");
-    const tables = Object.entries({ vectors, actions, shown, said, names, ways }).map(([name, table]) => [
+    const tables = Object.entries({ vectors, actions, shown, actionOf, names, ways }).map(([name, table]) => [
       name,
       table!.data,
     ]);
@@ -112,8 +113,10 @@ export class Known {
     });
     const order = [...alike].sort((a, b) => b - a);
     const least = order[Math.min(near, motions) - 1]!;
-    const weights = alike.map((one) => (one >= least ? Math.exp((one - order[0]!) / temperature) : 0));
-    const total = weights.reduce((sum, one) => sum + one, 0);
+    const weights = alike.map((similarity) =>
+      similarity >= least ? Math.exp((similarity - order[0]!) / temperature) : 0,
+    );
+    const total = weights.reduce((sum, weight) => sum + weight, 0);
     const counted = new Array<number>(this.tables.shown.length / this.kinds).fill(0);
     weights.forEach((weight, motion) => {
       counted[this.tables.actions[motion]!]! += weight / total;
@@ -123,10 +126,10 @@ export class Known {
 
   /** Of each set of kinds the share of near motions that it is right about; 0 where none of them is said to show it. */
   private shares(counted: number[]): number[] {
-    const asked = new Set(this.named.filter((_, row) => counted[this.tables.said[row]!]! > 0));
+    const sets = new Set(this.named.filter((_, row) => counted[this.tables.actionOf[row]!]! > 0));
     const near = [...counted.keys()].filter((action) => counted[action]! > 0);
     return this.sets.map((set, place) => {
-      if (!asked.has(place)) return 0;
+      if (!sets.has(place)) return 0;
       return near.reduce((sum, action) => sum + (this.right(set, action) ? counted[action]! : 0), 0);
     });
   }
@@ -144,12 +147,14 @@ export class Known {
 
   /** The sentence that names a set of kinds: one whose way fits if there is any, and then the one that counts most. If it is about going, what it lacks of the way is added. */
   private sentence(set: number, counted: number[], { turn, ahead }: Path): string {
-    const { said, ways, sentences } = this.tables;
+    const { actionOf, ways, sentences } = this.tables;
     const side =
       turn === undefined || Math.abs(turn) < this.settings.turned ? 0 : turn > 0 ? KNOWN.LEFT : KNOWN.RIGHT;
-    const rows = this.named.flatMap((one, row) => (one === set && counted[said[row]!]! > 0 ? [row] : []));
+    const rows = this.named.flatMap((kinds, row) =>
+      kinds === set && counted[actionOf[row]!]! > 0 ? [row] : [],
+    );
     const [best] = rows
-      .map((row) => ({ row, fit: this.fit(row, turn, side), counts: counted[said[row]!]! }))
+      .map((row) => ({ row, fit: this.fit(row, turn, side), counts: counted[actionOf[row]!]! }))
       .sort((a, b) => b.fit - a.fit || b.counts - a.counts || a.row - b.row);
     const text = sentences[best!.row]!;
     if (!ways[3 * best!.row + 2]) return text;

@@ -8,7 +8,7 @@ import { hasten, type Steered, type SteeringModel } from "./steered.js";
 
 /** Let those that are on a way go on, and those that move keep `room` metres apart, if it is not 0. */
 export function lead({ abilities, steerer, fps }: SteeringModel, figures: Steered[], room: number): void {
-  const halfLife = steerer.matcher.how.velocity;
+  const halfLife = steerer.matcher.settings.velocity;
   const before = figures.map(({ target, command }) => ({ target, gait: command.gait }));
   for (const figure of figures) {
     if (figure.going) follow(abilities, figure, halfLife, 1 / fps);
@@ -43,11 +43,11 @@ function slowed({ speeds }: Gaits, gait: number, speed: number): number {
 
 function keepApart(gaits: Gaits, figures: Steered[], room: number): void {
   const walkers = figures.map(({ playback: { root, spring } }) => ({ root, velocity: spring }));
-  const found = figures.map(({ command, target }, at): Target => {
+  const targets = figures.map(({ command, target }, at): Target => {
     if (!(command.speed > 0)) return target;
     return gaits.target(around(command, target, keptApart(walkers[at]!, walkers, room))).target;
   });
-  figures.forEach((figure, at) => (figure.target = found[at]!));
+  figures.forEach((figure, at) => (figure.target = targets[at]!));
 }
 
 /** A command that goes around others by a change of the target's velocity. */

@@ -129,9 +129,9 @@ function check(fits: boolean, place: string, fault: string): asserts fits {
 }
 
 function entries(object: unknown): [string, Fields][] {
-  const found = Object.entries(object as Fields);
-  for (const [key, value] of found) check(isObject(value), key, "is no object");
-  return found as [string, Fields][];
+  const pairs = Object.entries(object as Fields);
+  for (const [key, value] of pairs) check(isObject(value), key, "is no object");
+  return pairs as [string, Fields][];
 }
 
 function isCount(value: unknown): value is number {

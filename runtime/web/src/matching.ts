@@ -100,59 +100,59 @@ export class Matcher {
   readonly goals: Goals[];
   /** Which gaits are faster than a creep. */
   private readonly creeps: boolean[];
-  private readonly asked = new Int16Array(MATCHING.FEATURES);
+  private readonly query = new Int16Array(MATCHING.FEATURES);
   private readonly image = new Int16Array(MATCHING.FEATURES);
 
   constructor(
     readonly tables: Tables,
     odd: number,
     readonly gaits: number,
-    readonly how: Settings<typeof steeringSettings>,
+    readonly settings: Settings<typeof steeringSettings>,
     readonly fps: number,
   ) {
     this.rows = tables.left.length;
     this.codes = tables.codes.length / this.rows;
     this.dt = 1 / fps;
     this.ways = waysOf(tables);
-    this.reserve = Math.ceil((how.search_every + 1) * how.fastest) + 2;
+    this.reserve = Math.ceil((settings.search_every + 1) * settings.fastest) + 2;
     this.codeSigns = Float64Array.from({ length: this.codes }, (_, k) => (k < this.codes - odd ? 1 : -1));
     this.features = Int16Array.from(tables.features, (step) => (step * MATCHING.STEPS) / STEER.FEATURE_STEPS);
     const lasts = (row: number) =>
-      tables.left[row]! >= Math.max(this.reserve, how.lasting) && !this.flies(row);
+      tables.left[row]! >= Math.max(this.reserve, settings.lasting) && !this.flies(row);
     // what is played at its own rate leads to a leap, with arms that swing: it is entered well before
-    const soon = Array.from({ length: how.prepares + 1 }, (_, at) => at);
+    const soon = Array.from({ length: settings.prepares + 1 }, (_, at) => at);
     const leaps = (row: number) =>
       !tables.moves[6 * row + 3] && soon.some((at) => row + at < this.rows && this.flies(row + at));
     const all = [...Array(this.rows).keys()].filter((row) => lasts(row) && !leaps(row));
     this.goals = Array.from({ length: gaits }, (_, gait) => {
-      const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % how.row_step === 0);
+      const rows = all.filter((row) => this.shows(row, gait)).filter((_, at) => at % settings.row_step === 0);
       return new Goals(
         this.features,
         MATCHING.FEATURES,
         rows,
         tables.feature_mean,
         tables.feature_scale,
-        how.lag,
+        settings.lag,
       );
     });
     this.creeps = Array.from({ length: gaits }, (_, gait) => {
       const speeds = Float32Array.from({ length: this.rows }, (_, row) =>
         this.shows(row, gait) ? tables.moves[6 * row + 3]! : 0,
       );
-      const moving = speeds.filter((speed) => speed > how.idle).sort();
-      return moving.length > 0 && moving[moving.length >> 1]! > how.creep;
+      const moving = speeds.filter((speed) => speed > settings.idle).sort();
+      return moving.length > 0 && moving[moving.length >> 1]! > settings.creep;
     });
   }
 
   /** Whether a figure is to go slower than recordings do. */
   creeping([x, z]: Target, gait: number): boolean {
     const pace = Math.hypot(x, z);
-    return this.creeps[gait]! && pace >= MATCHING.LEAST_PACE / 2 && pace < this.how.creep;
+    return this.creeps[gait]! && pace >= MATCHING.LEAST_PACE / 2 && pace < this.settings.creep;
   }
 
   /** What a velocity over the ground is multiplied by to be as fast as recordings. */
   private hurry(x: number, z: number): number {
-    const { creep } = this.how;
+    const { creep } = this.settings;
     const pace = Math.hypot(x, z);
     return pace < creep ? creep / Math.max(pace, Math.min(MATCHING.LEAST_PACE, creep)) : 1;
   }
@@ -187,14 +187,14 @@ export class Matcher {
 
   /** Whether no foot stands. */
   private flies(row: number): boolean {
-    return Math.max(this.tables.moves[6 * row + 4]!, this.tables.moves[6 * row + 5]!) < this.how.stands;
+    return Math.max(this.tables.moves[6 * row + 4]!, this.tables.moves[6 * row + 5]!) < this.settings.stands;
   }
 
   /** Let a figure whose search is due jump to the row that fits best, where another than its own does. */
   search(figure: Playback, target: Target, gait: number): void {
     if (figure.ticksToSearch-- > 0) return;
-    const { how } = this;
-    figure.ticksToSearch = how.search_every - 1;
+    const { settings } = this;
+    figure.ticksToSearch = settings.search_every - 1;
     const row = figure.row + (figure.part > 0.5 ? 1 : 0);
     const lasts = this.tables.left[row]! >= this.reserve;
     if (lasts && this.flies(row)) return; // who flies lands first
@@ -202,34 +202,34 @@ export class Matcher {
     const goals = this.goals[gait]!;
     const creeps = this.creeping(target, gait);
     this.ask(figure, row, target, creeps);
-    const here = figure.mirror ? this.image : this.asked;
-    const bias = creeps ? 0 : how.continuing * UNIT;
+    const here = figure.mirror ? this.image : this.query;
+    const bias = creeps ? 0 : settings.continuing * UNIT;
     const bound = stays ? goals.cost(here, this.features, row * MATCHING.FEATURES) - bias : Infinity;
-    const found = goals.nearest(this.asked, this.image, bound);
-    if (!found) return;
-    const ahead = found.row - row;
-    if (!stays || ahead < -how.jump_back || ahead > how.jump_ahead)
-      this.jump(figure, found.row, found.mirror);
+    const nearest = goals.nearest(this.query, this.image, bound);
+    if (!nearest) return;
+    const ahead = nearest.row - row;
+    if (!stays || ahead < -settings.jump_back || ahead > settings.jump_ahead)
+      this.jump(figure, nearest.row, nearest.mirror);
   }
 
   /** What is asked for, as steps of features, and their mirror image: the row's own but for where it goes. */
   private ask(figure: Playback, row: number, target: Target, creeps: boolean): void {
-    const { asked } = this;
+    const { query } = this;
     const at = row * MATCHING.FEATURES;
     for (let i = MATCHING.TRAJECTORY; i < MATCHING.FEATURES; i++) {
-      asked[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
+      query[i] = figure.mirror ? this.features[at + COLUMNS[i]!]! * SIGNS[i]! : this.features[at + i]!;
     }
     this.lead(figure, target, creeps);
   }
 
   /** Ask for where the springs lead, and for the mirror image of all that is asked. */
   private lead(figure: Playback, target: Target, creeps: boolean): void {
-    const { asked, image } = this;
+    const { query, image } = this;
     const { feature_mean: mean, feature_scale: scale } = this.tables;
     this.trajectory(figure, target, creeps).forEach(
-      (value, i) => (asked[i] = stepsOf((value - mean[i]!) * scale[i]!)),
+      (value, i) => (query[i] = stepsOf((value - mean[i]!) * scale[i]!)),
     );
-    for (let i = 0; i < MATCHING.FEATURES; i++) image[i] = asked[COLUMNS[i]!]! * SIGNS[i]!;
+    for (let i = 0; i < MATCHING.FEATURES; i++) image[i] = query[COLUMNS[i]!]! * SIGNS[i]!;
   }
 
   /** Where the springs lead, as features that are not yet scaled. */
@@ -242,7 +242,7 @@ export class Matcher {
       springRate[0] * by,
       springRate[1] * by,
     ];
-    const { velocity, facing: halfLife, half_speed, horizon } = this.how;
+    const { velocity, facing: halfLife, half_speed, horizon } = this.settings;
     const [slow, calm] = [dampingOf(velocity), dampingOf(halfLife)];
     const [cos, sin] = [Math.cos(root[2]), Math.sin(root[2])];
     const [offX, offZ, off] = [spring[0] * by - toX, spring[1] * by - toZ, wrapped(spring[2] - toFacing)];
@@ -282,9 +282,9 @@ export class Matcher {
 
   /** Let a figure go on from the row that fits best after being so, features after those of the trajectory, scaled. */
   follow(figure: Playback, target: Target, gait: number, now: number[]): void {
-    now.forEach((value, i) => (this.asked[MATCHING.TRAJECTORY + i] = stepsOf(value)));
+    now.forEach((value, i) => (this.query[MATCHING.TRAJECTORY + i] = stepsOf(value)));
     this.lead(figure, target, this.creeping(target, gait));
-    const { row, mirror } = this.goals[gait]!.nearest(this.asked, this.image, Infinity)!;
+    const { row, mirror } = this.goals[gait]!.nearest(this.query, this.image, Infinity)!;
     Object.assign(figure, { row, part: 0, mirror, rate: 1, warp: 0, warpRate: 0, stride: 1, strideRate: 0 });
     figure.offset.fill(0);
     figure.offsetRate.fill(0);

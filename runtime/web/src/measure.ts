@@ -48,16 +48,16 @@ export interface Fitted {
 
 /** Measure a figure from its rest pose and its frames; MotionError where it is no human's. */
 export function fit(skeleton: Skeleton, map: JointMap, world: World): Fitted {
-  const found = fitted(new Body(skeleton, map), world);
+  const measured = fitted(new Body(skeleton, map), world);
   const hips = map.joints.hips!;
-  const axis = rotated(found.aligned[hips]!, X);
+  const axis = rotated(measured.aligned[hips]!, X);
   const cosines = world.turns.map((turned, at) =>
-    dot(rotated(turned[hips]!, axis), unit(found.body.toLeft(world.places[at]!, "UpperLeg"))),
+    dot(rotated(turned[hips]!, axis), unit(measured.body.toLeft(world.places[at]!, "UpperLeg"))),
   );
   const apart = Math.acos(Math.max(-1, Math.min(1, median(cosines)))) / RADIANS;
-  if (apart <= 30) return found;
+  if (apart <= 30) return measured;
   const note = `the legs' joints lie ${Math.round(apart)} degrees off the turn of ${skeleton.names[hips]}: the pelvis is turned as they lie`;
-  return { ...found, pelvis: false, notes: [...found.notes, note] };
+  return { ...measured, pelvis: false, notes: [...measured.notes, note] };
 }
 
 function fitted(body: Body, world: World): Fitted {
@@ -68,24 +68,24 @@ function fitted(body: Body, world: World): Fitted {
   const moving = places.length > 1 && restsInMotion(body);
   if (stands && !moving) return fittedAtRest(body, leg, stands);
   const known = axesAgree(body, world);
-  const own = known ? body : new Body(skeleton, { ...map, axes: {} });
-  const first = known ? null : bodyFrame(places[0]!, own, true);
-  if (first && (places.length === 1 || isTPose(own, places[0]!, first))) {
-    const aligned = alignmentsOfPose(own, turns[0]!, places[0]!, first);
+  const plain = known ? body : new Body(skeleton, { ...map, axes: {} });
+  const first = known ? null : bodyFrame(places[0]!, plain, true);
+  if (first && (places.length === 1 || isTPose(plain, places[0]!, first))) {
+    const aligned = alignmentsOfPose(plain, turns[0]!, places[0]!, first);
     const rise = heightsOver(places[0]!, rotated(first, Y));
     const notes = ["the rest pose is not a standing body: the first frame's pose was used in its place"];
     return {
-      body: own,
+      body: plain,
       aligned,
       leg,
-      heights: heights(own, leg, rise),
+      heights: heights(plain, leg, rise),
       up: null,
       confidence: 0.95,
       notes,
       pelvis: true,
     };
   }
-  return fittedInFrames(own, world, leg, known, moving);
+  return fittedInFrames(plain, world, leg, known, moving);
 }
 
 function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
@@ -93,9 +93,9 @@ function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
   const points = Object.entries(map.points).map(([bone, at]): [string, Vector] => [bone, unit(at)]);
   const known =
     map.rest !== undefined && agreement(body, skeleton.rest, stands, points) > Math.cos(4 * RADIANS);
-  const own = known || !map.rest ? body : new Body(skeleton, { ...map, rest: undefined });
+  const plain = known || !map.rest ? body : new Body(skeleton, { ...map, rest: undefined });
   const aligned = alignmentsOfPose(
-    own,
+    plain,
     skeleton.joints.map(() => STILL),
     skeleton.rest,
     stands,
@@ -103,10 +103,10 @@ function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
   const notes = known ? ["the rest pose is one that the convention knows, which was made up for"] : [];
   const up = rotated(stands, Y);
   return {
-    body: own,
+    body: plain,
     aligned,
     leg,
-    heights: heights(own, leg, heightsOver(skeleton.rest, up)),
+    heights: heights(plain, leg, heightsOver(skeleton.rest, up)),
     up,
     confidence: 1,
     notes,
@@ -146,15 +146,15 @@ function fittedInFrames(body: Body, world: World, leg: number, known: boolean, m
 }
 
 /** Whether a pose is a T-pose: upright in its frame, and limbs within 16 degrees of the humanoid's. */
-function isTPose(body: Body, pose: Vector[], own: Quaternion): boolean {
+function isTPose(body: Body, pose: Vector[], turn: Quaternion): boolean {
   const bones = LIMBS.flatMap((limb) => limb.slice(0, 2)).filter((bone) => body.aimed(bone));
   const limbs = bones.map((bone): [string, Vector] => [bone, directionOf(bone)]);
-  return Math.min(agreement(body, pose, own, limbs), rotated(own, Y)[1]) > 0.96;
+  return Math.min(agreement(body, pose, turn, limbs), rotated(turn, Y)[1]) > 0.96;
 }
 
 /** The least cosine between where bones point in a pose, seen in a frame, and where they are said to. */
-function agreement(body: Body, pose: Vector[], own: Quaternion, points: [string, Vector][]): number {
-  return Math.min(1, ...points.map(([bone, along]) => dot(body.direction(pose, bone), rotated(own, along))));
+function agreement(body: Body, pose: Vector[], turn: Quaternion, points: [string, Vector][]): number {
+  return Math.min(1, ...points.map(([bone, along]) => dot(body.direction(pose, bone), rotated(turn, along))));
 }
 
 function heightsOver(pose: Vector[], up: Vector): number[] {
@@ -163,25 +163,27 @@ function heightsOver(pose: Vector[], up: Vector): number[] {
 
 /** Heights of feet and toes over the sole: over the lowest joint at rest, else as the humanoid's. */
 function heights(body: Body, leg: number, rise?: number[]): Record<string, number> {
-  const found: Record<string, number> = {};
+  const rises: Record<string, number> = {};
   for (const bone of SIDES.flatMap((side) => Object.keys(SOLES).map((part) => side + part))) {
     const joint = body.map.joints[bone];
     if (joint === undefined) continue;
     const usual = (-SOLES[partOf(bone)]![0]![1] * leg) / LEG_LENGTH;
-    const below = rise ? rise[joint]! - Math.min(...body.skeleton.under(joint).map((one) => rise[one]!)) : 0;
-    found[bone] = below > 0.3 * usual || bone.endsWith("Toes") ? below : usual;
+    const below = rise
+      ? rise[joint]! - Math.min(...body.skeleton.under(joint).map((under) => rise[under]!))
+      : 0;
+    rises[bone] = below > 0.3 * usual || bone.endsWith("Toes") ? below : usual;
   }
-  return found;
+  return rises;
 }
 
 /** Points of the soles in one frame, of the rotations of the humanoid's feet and toes and the figure's positions. */
 export function solesOf(
-  { body, heights: own, leg }: Fitted,
+  { body, heights: rises, leg }: Fitted,
   bones: Record<string, Quaternion>,
   pose: Vector[],
 ): Vector[] {
   const scale = leg / LEG_LENGTH;
-  return Object.entries(own).flatMap(([bone, height]) =>
+  return Object.entries(rises).flatMap(([bone, height]) =>
     SOLES[partOf(bone)]!.map(([x, , z]) =>
       plus(pose[body.map.joints[bone]!]!, rotated(bones[bone]!, [x * scale, -height, z * scale])),
     ),
@@ -276,7 +278,8 @@ export function upright(
   const axis = mean.map(Math.abs).indexOf(Math.max(...mean.map(Math.abs)));
   const up = times([X, Y, Z][axis]!, Math.sign(mean[axis]!));
   const along = 0.82; // the cosine from which on a body stands along an axis
-  const share = (axis: Vector) => trunk.filter((one) => dot(one, axis) > along).length / trunk.length;
+  const share = (axis: Vector) =>
+    trunk.filter((direction) => dot(direction, axis) > along).length / trunk.length;
   if (axis === 1 || share(up) < 0.5 || share(Y) > 0.1) return { turn: STILL };
   if (median(places.map((pose) => dot(body.legsUp(pose), up))) < along) return { turn: STILL };
   const path = places

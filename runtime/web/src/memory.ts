@@ -43,7 +43,7 @@ export class Memory {
       const steps = rows.map((row) => this.ages[this.lasts[row]!]!);
       this.shortest.set(
         action,
-        steps.reduce((least, one) => Math.min(least, one)),
+        steps.reduce((least, count) => Math.min(least, count)),
       );
     }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
@@ -55,14 +55,14 @@ export class Memory {
 
   /** How much the numbers of the body change before each step, squared; none before a motion's first and its end. */
   private changes(ways: number, end: number): Float64Array {
-    const found = new Float64Array(this.steps);
+    const changes = new Float64Array(this.steps);
     for (let row = 0; row < this.steps; row++) {
       for (let at = ways; at < this.width && this.ages[row]! > 0 && this.column(row, 0) !== end; at++) {
-        found[row]! +=
+        changes[row]! +=
           (this.numbers[row * this.width + at]! - this.numbers[(row - 1) * this.width + at]!) ** 2;
       }
     }
-    return found;
+    return changes;
   }
 
   /** The share of what the steps of each motion count that is over before each step, 0 to 1. */
@@ -85,17 +85,17 @@ export class Memory {
    */
   private rarity(values: number, end: number): Float64Array {
     const columns = this.table.shape[1]!;
-    const found = new Float64Array(this.steps);
-    const real = [...found.keys()].filter((row) => this.column(row, 0) !== end);
+    const sums = new Float64Array(this.steps);
+    const real = [...sums.keys()].filter((row) => this.column(row, 0) !== end);
     for (let column = 1; column < columns - 2; column++) {
       const has = Array.from({ length: values }, () => new Set<number>());
       for (const row of real) has[this.column(row, column)]!.add(this.column(row, columns - 2));
-      for (const row of real) found[row]! += Math.log(this.rows.size / has[this.column(row, column)]!.size);
+      for (const row of real) sums[row]! += Math.log(this.rows.size / has[this.column(row, column)]!.size);
     }
-    const mean = real.reduce((sum, row) => sum + found[row]!, 0) / real.length;
-    const spread = Math.sqrt(real.reduce((sum, row) => sum + (found[row]! - mean) ** 2, 0) / real.length);
+    const mean = real.reduce((sum, row) => sum + sums[row]!, 0) / real.length;
+    const spread = Math.sqrt(real.reduce((sum, row) => sum + (sums[row]! - mean) ** 2, 0) / real.length);
     const rare = new Float64Array(this.steps).fill(-Infinity);
-    for (const row of real) rare[row] = (found[row]! - mean) / Math.max(spread, 1e-12);
+    for (const row of real) rare[row] = (sums[row]! - mean) / Math.max(spread, 1e-12);
     return rare;
   }
 
@@ -179,8 +179,8 @@ export class Memory {
   /** The ages of an action's rows and the shares that are over; unless all is shown those of its acts, which end at 1. */
   private course(action: number, whole: boolean): Course {
     const rows = this.rows.get(action)!;
-    const found = { ages: rows.map((row) => this.ages[row]!), over: rows.map((row) => this.parts[row]!) };
-    if (whole) return found;
+    const course = { ages: rows.map((row) => this.ages[row]!), over: rows.map((row) => this.parts[row]!) };
+    if (whole) return course;
     const known = this.shown.get(action);
     if (known) return known;
     for (const { take, pieces } of this.takes(rows)) {
@@ -190,12 +190,12 @@ export class Memory {
         if (!pieces.has(this.lasts[row]!)) return;
         const age = this.ages[row]! - this.ages[take[first]!]!;
         const inside = age >= 0 && age <= last - first;
-        found.ages[at] = inside ? age : MEMORY.FAR;
-        found.over[at] = inside ? age / (last - first) : Infinity;
+        course.ages[at] = inside ? age : MEMORY.FAR;
+        course.over[at] = inside ? age / (last - first) : Infinity;
       });
     }
-    this.shown.set(action, found);
-    return found;
+    this.shown.set(action, course);
+    return course;
   }
 
   /** The rows of each recording, and the last rows of its pieces, each of which begins within the one before. */
@@ -203,23 +203,23 @@ export class Memory {
     const motions = [...new Set(rows.map((row) => this.lasts[row]!))].map((last) =>
       rows.filter((row) => this.lasts[row] === last),
     );
-    const found: { take: number[]; pieces: Set<number> }[] = [];
+    const takes: { take: number[]; pieces: Set<number> }[] = [];
     for (const piece of motions.sort((a, b) => this.ages[a[0]!]! - this.ages[b[0]!]!)) {
       const codes = (some: number[]) => some.map((row) => this.codes(row)).join();
       const place = (take: number[]) => this.ages[piece[0]!]! - this.ages[take[0]!]!;
       const begin = codes(piece.slice(0, MEMORY.PAST.length));
-      const before = found.find(
+      const before = takes.find(
         ({ take }) =>
           place(take) > 0 && codes(take.slice(place(take), place(take) + MEMORY.PAST.length)) === begin,
       );
       const last = this.lasts[piece[0]!]!;
-      if (!before) found.push({ take: piece, pieces: new Set([last]) });
+      if (!before) takes.push({ take: piece, pieces: new Set([last]) });
       else {
         before.take = [...before.take, ...piece.slice(before.take.length - place(before.take))];
         before.pieces.add(last);
       }
     }
-    return found;
+    return takes;
   }
 
   /** From which to which place the rows of a recording are an act: what shows most of it, is short, and begins and ends as it. */
@@ -233,21 +233,21 @@ export class Memory {
     const edge = (to: number, at: number) => Math.min(apart[to]![at]! / MEMORY.ALIKE, 1);
     const shown = take.map(() => end + 1); // where each step is first shown, from a place on
     let least = Infinity;
-    const found: [number, number, number][] = [];
+    const spans: [number, number, number][] = [];
     for (let first = end; first >= 0; first--) {
       take.forEach((_, at) => (shown[at] = apart[first]![at]! <= MEMORY.ALIKE ? first : shown[at]!));
       const order = [...take.keys()].sort((a, b) => shown[a]! - shown[b]! || a - b);
       let [sum, k] = [0, 0];
       while (k < end && (sum += this.particular[take[order[k]!]!]!) < enough) k++;
       for (let last = Math.max(shown[order[k]!]! + 1, first + MEMORY.WHOLE); last <= end; last++) {
-        found.push([
+        spans.push([
           last - first + MEMORY.UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))),
           first,
           last,
         ]);
       }
     }
-    for (const [cost, first, last] of found.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
+    for (const [cost, first, last] of spans.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
       if (cost < least) [least, best] = [cost, [first, last]];
     }
     return best;
@@ -256,20 +256,20 @@ export class Memory {
   /** The row at which an action is taken up to show the most of it in a number of steps. recent: as for `next`. */
   busiest(action: number, recent: Float32Array[], steps: number, uniform: number): number {
     const all = this.rows.get(action)!;
-    const found: number[] = [];
+    const entries: number[] = [];
     for (let at = 0; at < all.length;) {
       const [start, last] = [all[at]!, this.lasts[all[at]!]!];
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
       const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
       const most = shown.reduce((a, b) => Math.max(a, b));
       const good = starts.filter((_, at) => shown[at]! >= MEMORY.GOOD * most);
-      found.push(good[Math.floor(good.length / 2)]!);
+      entries.push(good[Math.floor(good.length / 2)]!);
       while (at < all.length && all[at]! <= last) at++;
     }
-    if (!recent.length) return found[Math.floor(uniform * found.length)]!;
+    if (!recent.length) return entries[Math.floor(uniform * entries.length)]!;
     return this.near(
-      found,
-      found.map((row) => this.ages[row]!),
+      entries,
+      entries.map((row) => this.ages[row]!),
       recent,
       0,
       false,
@@ -307,10 +307,10 @@ export class Memory {
     let sum = 0;
     for (let back = 0; back < MEMORY.PAST.length; back++) {
       const seen = recent[Math.min(back, recent.length - 1)]!;
-      const own = this.past(row, back);
+      const remembered = this.past(row, back);
       let apart = 0;
       for (let at = 0; at < this.width; at++) {
-        const off = own[at]! - seen[at]!;
+        const off = remembered[at]! - seen[at]!;
         apart += off * off;
       }
       sum += MEMORY.PAST[back]! * apart;

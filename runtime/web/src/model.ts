@@ -45,9 +45,9 @@ export abstract class Model {
   }
 
   /** A setting that is given, or else the bundle's default, or the usual one; DecodingError where it is out of range. */
-  protected setting(name: string, given?: number): number {
+  protected setting(name: string, choice?: number): number {
     const range = RANGES[name]!;
-    const value = given ?? this.manifest.defaults[name] ?? range.default;
+    const value = choice ?? this.manifest.defaults[name] ?? range.default;
     if (value === null || !fits(value, range)) {
       throw new DecodingError(
         `${name} must be ${range.whole ? "a whole number " : ""}from ${range.low} to ${range.high}, not ${value}`,
@@ -73,12 +73,15 @@ export abstract class LanguageModel extends Model {
   }
 
   protected motion(frames: Frames) {
-    const given = this.checked(frames, this.manifest.motion.channels.length, 2);
+    const checked = this.checked(frames, this.manifest.motion.channels.length, 2);
     const most = Math.floor(LANGUAGE.MAX_SECONDS * this.fps + 1e-9) + 1;
-    if (given.length > most)
+    if (checked.length > most)
       throw new DecodingError(
-        `the motion has ${given.length} frames, but the model takes at most ${most}: cut it`,
+        `the motion has ${checked.length} frames, but the model takes at most ${most}: cut it`,
       );
-    return { frames: stacked(given, 1, given.length, given[0]!.length), lengths: integers([given.length]) };
+    return {
+      frames: stacked(checked, 1, checked.length, checked[0]!.length),
+      lengths: integers([checked.length]),
+    };
   }
 }

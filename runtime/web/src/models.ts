@@ -37,7 +37,7 @@ export async function release(model: AnyModel): Promise<void> {
  */
 export async function load<T extends AnyModel = AnyModel>(
   source: string | URL | Uint8Array,
-  kind?: new (...given: never[]) => T,
+  kind?: new (...parameters: never[]) => T,
   settings?: SessionSettings,
 ): Promise<T> {
   const bytes = source instanceof Uint8Array ? source : await fetched(source);

@@ -59,11 +59,11 @@ export function worldOf({
 }: Pick<Motion, "skeleton" | "rotations" | "translations">): World {
   const turns: Quaternion[][] = [];
   const places: Vector[][] = [];
-  rotations.forEach((own, frame) => {
+  rotations.forEach((local, frame) => {
     const [turned, placed]: [Quaternion[], Vector[]] = [[], []];
     skeleton.joints.forEach(({ parent }, at) => {
       const move = translations[frame]![at]!;
-      turned.push(parent < 0 ? own[at]! : product(turned[parent]!, own[at]!));
+      turned.push(parent < 0 ? local[at]! : product(turned[parent]!, local[at]!));
       placed.push(parent < 0 ? move : plus(placed[parent]!, rotated(turned[parent]!, move)));
     });
     turns.push(turned);

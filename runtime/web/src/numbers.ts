@@ -44,8 +44,8 @@ export function smoothed(rows: number[][], deviation: number): number[][] {
       : row > last
         ? 2 * rows[last]![column]! - value(2 * last - row, column)
         : rows[row]![column]!;
-  return rows.map((own, row) =>
-    own.map(
+  return rows.map((values, row) =>
+    values.map(
       (_, column) =>
         window.reduce((sum, weight, at) => sum + weight * value(row + at - reach, column), 0) / total,
     ),

@@ -52,8 +52,8 @@ export function framesOf(poses: (Pose & { ground: Ground })[], fps: number): num
   return poses.map(({ hips, rotations, ground }, at) => {
     const [forward, left, turn] = seenFrom(poses[Math.max(at - 1, 0)]!.ground, ground);
     const axes = Object.entries(rotations).flatMap(([bone, turned]) => {
-      const own = bone === "hips" ? product(inverse(about(Y, ground[2])), turned) : turned;
-      return [...rotated(own, X), ...rotated(own, Y)];
+      const local = bone === "hips" ? product(inverse(about(Y, ground[2])), turned) : turned;
+      return [...rotated(local, X), ...rotated(local, Y)];
     });
     return [forward * fps, left * fps, wrapped(turn) * fps, hips[1], ...axes];
   });

@@ -33,7 +33,7 @@ export class PredictModel extends Model {
     const seed = this.seed(frames);
     const known = { frames: stacked(seed, 1, seed.length, seed[0]!.length) };
     const metres = (await error.run({ ...known, ...(await encoder!.run(known)) })).error!.data;
-    return metres.map((one) => 100 * one);
+    return metres.map((metre) => 100 * metre);
   }
 
   /** The last frames, as many as the encoder takes. */

@@ -66,8 +66,8 @@ export function stateOf(seed: number, count: number, spawned?: number): number[]
     return (value ^ (value >>> 16)) >>> 0;
   };
   const mix = (x: number, y: number): number => {
-    const found = (Math.imul(0xca01f9dd, x) - Math.imul(0x4973f715, y)) >>> 0;
-    return (found ^ (found >>> 16)) >>> 0;
+    const mixed = (Math.imul(0xca01f9dd, x) - Math.imul(0x4973f715, y)) >>> 0;
+    return (mixed ^ (mixed >>> 16)) >>> 0;
   };
   const pool = [0, 1, 2, 3].map((at) => hash(words[at] ?? 0));
   for (let from = 0; from < 4; from++) {

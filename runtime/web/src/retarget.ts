@@ -102,14 +102,14 @@ function hingesOf({ body, aligned }: Fitted, { turns }: World): Record<string, V
 
 function retargeted(fitted: Fitted, world: World, turn: Quaternion, { fps, travels }: Motion): Motion {
   const factor = LEG_LENGTH / fitted.leg;
-  const turns = world.turns.map((own, frame) =>
-    humanoidTurns(own, world.places[frame]!, fitted).map((one) => product(turn, one)),
+  const turns = world.turns.map((frameTurns, frame) =>
+    humanoidTurns(frameTurns, world.places[frame]!, fitted).map((local) => product(turn, local)),
   );
   const places = turns.map((turned, frame) => {
     const legs = times(rotated(turn, fitted.body.middle(world.places[frame]!, "UpperLeg")), factor);
-    const found = placesOf(HUMANOID, turned);
-    const move = minus(legs, mean(HIPS.map((joint) => found[joint]!)));
-    return found.map((place) => plus(place, move));
+    const placed = placesOf(HUMANOID, turned);
+    const move = minus(legs, mean(HIPS.map((joint) => placed[joint]!)));
+    return placed.map((place) => plus(place, move));
   });
   const ground = groundUnder(solePoints({ turns, places }));
   const root = places.map((pose) => minus(pose[0]!, [0, ground, 0]));
@@ -119,20 +119,28 @@ function retargeted(fitted: Fitted, world: World, turn: Quaternion, { fps, trave
 /** Rotations in the world of the humanoid's joints, in one frame of a figure. */
 function humanoidTurns(turns: Quaternion[], pose: Vector[], { body, aligned, pelvis }: Fitted): Quaternion[] {
   const { joints, spine, neck } = body.map;
-  const own = (joint: number) => product(turns[joint]!, aligned[joint]!);
-  const found: Record<string, Quaternion> = {};
-  for (const [bone, joint] of Object.entries(joints)) found[bone] = own(joint);
+  const alignedTurn = (joint: number) => product(turns[joint]!, aligned[joint]!);
+  const rotations: Record<string, Quaternion> = {};
+  for (const [bone, joint] of Object.entries(joints)) rotations[bone] = alignedTurn(joint);
   if (!pelvis)
-    found.hips = product(swing(rotated(found.hips!, X), body.toLeft(pose, "UpperLeg")), found.hips!);
-  const above = [...neck.map(own), ...(found.head ? [found.head] : [])];
-  shared([found.hips!, ...spine.map(own)], SPINE.length).forEach((turn, at) => (found[SPINE[at]!] = turn));
+    rotations.hips = product(
+      swing(rotated(rotations.hips!, X), body.toLeft(pose, "UpperLeg")),
+      rotations.hips!,
+    );
+  const above = [...neck.map(alignedTurn), ...(rotations.head ? [rotations.head] : [])];
+  shared([rotations.hips!, ...spine.map(alignedTurn)], SPINE.length).forEach(
+    (turn, at) => (rotations[SPINE[at]!] = turn),
+  );
   if (above.length)
-    shared([own(spine.at(-1)!), ...above], NECK.length).forEach((turn, at) => (found[NECK[at]!] = turn));
+    shared([alignedTurn(spine.at(-1)!), ...above], NECK.length).forEach(
+      (turn, at) => (rotations[NECK[at]!] = turn),
+    );
   for (const bone of BONES.slice(1)) {
-    found[bone] ??= found[HUMANOID.names[HUMANOID.joints[HUMANOID.index(bone)]!.parent]!]!;
+    rotations[bone] ??= rotations[HUMANOID.names[HUMANOID.joints[HUMANOID.index(bone)]!.parent]!]!;
   }
   return HUMANOID.names.map(
-    (name) => found[name.endsWith(SKELETON.END_SUFFIX) ? name.slice(0, -SKELETON.END_SUFFIX.length) : name]!,
+    (name) =>
+      rotations[name.endsWith(SKELETON.END_SUFFIX) ? name.slice(0, -SKELETON.END_SUFFIX.length) : name]!,
   );
 }
 
@@ -177,7 +185,7 @@ export function fromHumanoid(
     turns: turns.map((turned) => turned.map((turn) => product(front, turn))),
     places: places.map((pose) => pose.map((place) => rotated(front, place))),
   };
-  const turned = source.turns.map((own) => figureTurns(own, fitted, skeleton, still));
+  const turned = source.turns.map((frameTurns) => figureTurns(frameTurns, fitted, skeleton, still));
   const carrier = carrierOf(fitted.body.map, skeleton);
   return motionFrom(
     skeleton,

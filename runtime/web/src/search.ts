@@ -32,7 +32,7 @@ export class SearchModel extends LanguageModel {
       vectors.push((await this.graphs.motion!.run(this.motion(frames.slice(edges[at]!, edge)))).vector!.data);
     }
     if (count === 1) return vectors[0]!;
-    const sum = vectors[0]!.map((_, i) => vectors.reduce((all, one) => all + one[i]!, 0));
+    const sum = vectors[0]!.map((_, i) => vectors.reduce((all, vector) => all + vector[i]!, 0));
     const length = Math.hypot(...sum);
     return sum.map((value) => value / length);
   }
@@ -59,9 +59,9 @@ export class SearchModel extends LanguageModel {
     vectors: Float32Array[],
     count = this.setting("count"),
   ): { index: number; score: number }[] {
-    const scores = vectors.map((one, index) => ({
+    const scores = vectors.map((candidate, index) => ({
       index,
-      score: one.reduce((sum, value, i) => sum + value * vector[i]!, 0),
+      score: candidate.reduce((sum, value, i) => sum + value * vector[i]!, 0),
     }));
     return scores
       .sort((a, b) => b.score - a.score || a.index - b.index)

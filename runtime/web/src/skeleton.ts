@@ -63,30 +63,30 @@ export class Skeleton {
   }
 
   index(name: string): number {
-    const found = this.places.get(name);
-    if (found === undefined) throw new MotionError(`the skeleton has no joint ${JSON.stringify(name)}`);
-    return found;
+    const joint = this.places.get(name);
+    if (joint === undefined) throw new MotionError(`the skeleton has no joint ${JSON.stringify(name)}`);
+    return joint;
   }
 
   /** A joint and all that hang on it, in order. */
   under(joint: number): number[] {
-    const found = [joint];
-    for (const one of found) found.push(...this.children[one]!);
-    return found.sort((a, b) => a - b);
+    const joints = [joint];
+    for (const child of joints) joints.push(...this.children[child]!);
+    return joints.sort((a, b) => a - b);
   }
 
   /** A joint and all that it hangs on, up to the root. */
   above(joint: number): number[] {
-    const found: number[] = [];
-    for (let at = joint; at >= 0; at = this.joints[at]!.parent) found.push(at);
-    return found;
+    const joints: number[] = [];
+    for (let at = joint; at >= 0; at = this.joints[at]!.parent) joints.push(at);
+    return joints;
   }
 }
 
 /** A name, with a number behind it if it is taken; the result is then taken, too. */
 export function unique(name: string, taken: Set<string>): string {
-  let found = name;
-  for (let number = 2; taken.has(found); number++) found = `${name}_${number}`;
-  taken.add(found);
-  return found;
+  let free = name;
+  for (let number = 2; taken.has(free); number++) free = `${name}_${number}`;
+  taken.add(free);
+  return free;
 }

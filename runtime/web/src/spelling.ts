@@ -7,14 +7,14 @@ export function corrected(word: string, ...known: string[][]): string {
   const most = size >= 8 ? 2 : 1;
   for (let off = 1; off <= most; off++) {
     for (const words of known) {
-      const found = words.filter(
-        (one) =>
-          one[0] === word[0] &&
-          one.length >= 4 &&
-          Math.abs(one.length - size) <= most &&
-          distance(word, one) === off,
+      const near = words.filter(
+        (candidate) =>
+          candidate[0] === word[0] &&
+          candidate.length >= 4 &&
+          Math.abs(candidate.length - size) <= most &&
+          distance(word, candidate) === off,
       );
-      if (found.length) return new Set(found.map(stem)).size === 1 ? found[0]! : "";
+      if (near.length) return new Set(near.map(stem)).size === 1 ? near[0]! : "";
     }
   }
   return "";

@@ -58,9 +58,9 @@ export function breathed({ ticks, share }: Standing, pose: Played, dt: number): 
   const rotations = [...pose.rotations];
   let above: Quaternion = STILL;
   for (const { bone, times } of TURNS) {
-    const own = pose.rotations[bone]!;
-    if (times) rotations[bone] = product(about(rotated(inverse(above), X), times * angle), own);
-    if (TRUNK.includes(bone)) above = product(above, own);
+    const local = pose.rotations[bone]!;
+    if (times) rotations[bone] = product(about(rotated(inverse(above), X), times * angle), local);
+    if (TRUNK.includes(bone)) above = product(above, local);
   }
   return { ...pose, rotations };
 }

@@ -41,7 +41,7 @@ export function standing(steerer: Steerer, gait: number, place?: Ground, phase?:
   const { matcher } = steerer;
   const playback = matcher.playing(matcher.stillest(gait), place, phase);
   const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
-  const told: Pick<Steered, "going" | "look" | "hands"> = {
+  const orders: Pick<Steered, "going" | "look" | "hands"> = {
     going: null,
     look: ahead(),
     hands: [idle(), idle()],
@@ -53,7 +53,7 @@ export function standing(steerer: Steerer, gait: number, place?: Ground, phase?:
     standing: notYet(),
     command,
     target: [0, 0, facing],
-    ...told,
+    ...orders,
     happenings: null,
   };
 }
@@ -76,7 +76,7 @@ export function hasten(playback: Playback): void {
 export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
   const { playback, acting, command } = figure;
   const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
-  const { steerer, lock: how, fps } = model;
+  const { steerer, lock: settings, fps } = model;
   const [{ root }, dt] = [playback, 1 / fps];
   const changed = begin(model, acting, playback, target, command.gait);
   const whole = acting.playing?.whole ?? false;
@@ -86,7 +86,7 @@ export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, r
   if (whole && !command.speed) stand(figure);
   return guided(
     figure,
-    holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), how, dt) : pose,
+    holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), settings, dt) : pose,
     dt,
   );
 }
@@ -94,7 +94,7 @@ export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, r
 /** A pose with head and arms as the figure is told. */
 function guided({ look, hands }: Steered, pose: Played, seconds: number): Played {
   return hands.reduce(
-    (found, hand, side) => reached(hand, side, found, seconds),
+    (shown, hand, side) => reached(hand, side, shown, seconds),
     looked(look, pose, seconds),
   );
 }

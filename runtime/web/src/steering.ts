@@ -36,16 +36,16 @@ export class Steerer {
   /** The next pose, 1 / fps seconds later. */
   tick(figure: Playback, target: Target, gait: number): Played {
     const { matcher } = this;
-    const { how, dt } = matcher;
+    const { settings, dt } = matcher;
     matcher.search(figure, target, gait);
     const at = figure.part + figure.rate;
     figure.row += Math.floor(at);
     figure.part = at - Math.floor(at);
     const moves = this.moves(figure);
-    approach(figure, target, dampingOf(how.velocity), dampingOf(how.facing), dt);
+    approach(figure, target, dampingOf(settings.velocity), dampingOf(settings.facing), dt);
     this.warp(figure, moves[3]!);
     this.move(figure, moves, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
-    this.fade(figure, dampingOf(how.blend));
+    this.fade(figure, dampingOf(settings.blend));
     const [left, right] = [Math.fround(moves[4]!), Math.fround(moves[5]!)]; // so bounds are passed in the same ticks as in Python
     const contacts: [number, number] = figure.mirror ? [right, left] : [left, right];
     return { ground: figure.root, ...this.body(figure), contacts };
@@ -83,19 +83,19 @@ export class Steerer {
   /** By how much hips and legs are turned towards where the springs go, a tick later; by nothing if the row stands or goes elsewhere. */
   private warp(figure: Playback, recorded: number): void {
     const { matcher } = this;
-    const { how } = matcher;
+    const { settings } = matcher;
     const [x, z] = figure.spring;
     const angle = wrapped(Math.atan2(x, z) - figure.root[2] - matcher.way(figure));
-    const warps = Math.min(recorded, Math.hypot(x, z)) > how.idle && Math.abs(angle) <= Math.PI / 2;
-    const target = warps ? clamp(angle, -how.warp, how.warp) : 0;
-    const [off, rate] = damped(figure.warp - target, figure.warpRate, dampingOf(how.blend), matcher.dt);
+    const warps = Math.min(recorded, Math.hypot(x, z)) > settings.idle && Math.abs(angle) <= Math.PI / 2;
+    const target = warps ? clamp(angle, -settings.warp, settings.warp) : 0;
+    const [off, rate] = damped(figure.warp - target, figure.warpRate, dampingOf(settings.blend), matcher.dt);
     figure.warp = target + off;
     figure.warpRate = rate;
   }
 
   /** The next root, rate of playback and stride of the legs, of a figure that creeps or does not. */
   private move(figure: Playback, moves: number[], creeps: boolean): void {
-    const { how, dt } = this.matcher;
+    const { settings, dt } = this.matcher;
     const {
       root: [x, z, facing],
       rate,
@@ -105,28 +105,28 @@ export class Steerer {
     const recorded = moves[3]!;
     const side = mirror ? -1 : 1;
     const pace = Math.hypot(spring[0], spring[1]);
-    const moving = creeps || Math.min(recorded, pace) > how.idle;
-    const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : how.idle);
-    const stride = moving ? clamp(ratio / rate, creeps ? 0 : how.shortest, how.longest) : 1;
+    const moving = creeps || Math.min(recorded, pace) > settings.idle;
+    const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : settings.idle);
+    const stride = moving ? clamp(ratio / rate, creeps ? 0 : settings.shortest, settings.longest) : 1;
     const by = rate * dt * stride;
     const [forward, left, turn] = [moves[0]! * by, side * moves[1]! * by, side * moves[2]! * rate * dt];
     const error = wrapped(spring[2] - facing);
     const most =
-      (how.turn_still + how.turn_moving * Math.min(pace, how.turn_speed)) * dt +
-      how.turn_turning * Math.abs(turn);
-    const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / how.turn)), -most, most));
+      (settings.turn_still + settings.turn_moving * Math.min(pace, settings.turn_speed)) * dt +
+      settings.turn_turning * Math.abs(turn);
+    const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / settings.turn)), -most, most));
     const [sin, cos] = [Math.sin(facing + figure.warp), Math.cos(facing + figure.warp)];
     const [stepX, stepZ] = [sin * forward + cos * left, cos * forward - sin * left];
     // turned towards the velocity by a small angle, where the two do not go apart
     const along = stepX * spring[0] + stepZ * spring[1];
     const across = stepZ * spring[0] - stepX * spring[1];
-    const veers = moving && along > how.veer_within * Math.abs(across);
-    const angle = veers ? clamp(Math.atan(across / Math.max(along, 1e-6)), -how.veer, how.veer) : 0;
+    const veers = moving && along > settings.veer_within * Math.abs(across);
+    const angle = veers ? clamp(Math.atan(across / Math.max(along, 1e-6)), -settings.veer, settings.veer) : 0;
     figure.root = [x + stepX + angle * stepZ, z + stepZ - angle * stepX, turned];
-    const slowest = creeps ? how.creep_slowest : how.slowest;
-    figure.rate = moving ? clamp(creeps ? Math.sqrt(ratio) : ratio, slowest, how.fastest) : 1;
+    const slowest = creeps ? settings.creep_slowest : settings.slowest;
+    figure.rate = moving ? clamp(creeps ? Math.sqrt(ratio) : ratio, slowest, settings.fastest) : 1;
     const target = creeps ? Math.min(stride, 1) : 1;
-    const [off, slower] = damped(figure.stride - target, figure.strideRate, dampingOf(how.blend), dt);
+    const [off, slower] = damped(figure.stride - target, figure.strideRate, dampingOf(settings.blend), dt);
     figure.stride = target + off;
     figure.strideRate = slower;
   }
@@ -182,14 +182,14 @@ export function between(pose: Played, other: Played, part: number): Played {
   const rotations = pose.rotations.map(([a, b, c, d], at): Quaternion => {
     const [e, f, g, h] = other.rotations[at]!;
     const side = a * e + b * f + c * g + d * h < 0 ? -1 : 1;
-    const found: Quaternion = [
+    const quaternion: Quaternion = [
       mixed(a, side * e),
       mixed(b, side * f),
       mixed(c, side * g),
       mixed(d, side * h),
     ];
-    const size = Math.hypot(...found);
-    return [found[0] / size, found[1] / size, found[2] / size, found[3] / size];
+    const size = Math.hypot(...quaternion);
+    return [quaternion[0] / size, quaternion[1] / size, quaternion[2] / size, quaternion[3] / size];
   });
   return {
     ground: [mixed(x, toX), mixed(z, toZ), facing + part * wrapped(toFacing - facing)],

@@ -108,13 +108,13 @@ export class Vocabulary {
   }
 
   private withDigits(words: string[]): string[] {
-    const found: string[] = [];
+    const split: string[] = [];
     for (let at = 0; at < words.length;) {
       const [value, used] = this.number(words.slice(at, at + 5));
-      found.push(used ? `${value}` : words[at]!);
+      split.push(used ? `${value}` : words[at]!);
       at += used || 1;
     }
-    return found;
+    return split;
   }
 
   /** The number that words begin with, and how many of them it takes: 0 for none. */

@@ -35,9 +35,9 @@ export function isInPlace(motion: Motion): boolean {
  * sway stay. MotionError where it is no human's.
  */
 export function withTravel(motion: Motion): Motion {
-  const { motion: found, toFile } = seen(motion);
-  const root = found.translations.map((moves) => moves[0]!);
-  const path = pathOf(found);
+  const { motion: figure, toFile } = seen(motion);
+  const root = figure.translations.map((moves) => moves[0]!);
+  const path = pathOf(figure);
   const translations = motion.translations.map((moves, at) => {
     const laid: Vector = [
       path[at]![0] - root[at]![0] + root[0]![0],
@@ -52,9 +52,9 @@ export function withTravel(motion: Motion): Motion {
 /** The motion on the humanoid, and what brings its paths to the file's world. */
 function seen(motion: Motion): { motion: Motion; toFile: (path: Vector) => Vector } {
   if (isHumanoid(motion.skeleton)) return { motion, toFile: (path) => path };
-  const { motion: found, figure, turn } = toHumanoid(motion);
+  const { motion: humanoid, figure, turn } = toHumanoid(motion);
   return {
-    motion: found,
+    motion: humanoid,
     toFile: (path) => times(rotated(inverse(turn), path), figure.fitted.leg / LEG_LENGTH),
   };
 }
@@ -91,14 +91,14 @@ function strides(motion: Motion): boolean {
     root.slice(1).map((place, at) => flat([times(minus(place, root[at]!), fps)])[0]!),
     treadmillSettings.span * fps,
   );
-  const way = (velocity: Plane) => velocity.reduce((sum, one) => sum + Math.hypot(...one), 0);
+  const way = (velocity: Plane) => velocity.reduce((sum, step) => sum + Math.hypot(...step), 0);
   const [left, right] = [0, 3].map((first) =>
     slid.map(([x, z], at) => {
       const foot = minus(mean(soles[at + 1]!.slice(first, first + 3)), root[at + 1]!);
       return (foot[0] * x + foot[2] * z) / Math.max(Math.hypot(x, z), 1e-9);
     }),
   ) as [number[], number[]];
-  const apart = left.map((one, at) => one - right[at]!);
+  const apart = left.map((place, at) => place - right[at]!);
   const hips = average(root.map((place) => place[1])) - average(soles.flat().map((point) => point[1]));
   return (
     way(slid) >= treadmillSettings.speed * slid.length &&
@@ -136,8 +136,8 @@ function averaged(velocity: Plane, frames: number): Plane {
   const window = Math.max(1, Math.min(rounded(frames), velocity.length));
   const before = Math.floor(window / 2);
   return velocity.map((_, at) => {
-    const own = velocity.slice(Math.max(0, at - before), at - before + window);
-    return [average(own.map(([x]) => x)), average(own.map(([, z]) => z))];
+    const near = velocity.slice(Math.max(0, at - before), at - before + window);
+    return [average(near.map(([x]) => x)), average(near.map(([, z]) => z))];
   });
 }
 
@@ -146,7 +146,7 @@ function average(values: number[]): number {
 }
 
 /** The covariance of two rows. */
-function together(one: number[], other: number[]): number {
-  const [a, b] = [average(one), average(other)];
-  return average(one.map((value, at) => (value - a) * (other[at]! - b)));
+function together(first: number[], other: number[]): number {
+  const [a, b] = [average(first), average(other)];
+  return average(first.map((value, at) => (value - a) * (other[at]! - b)));
 }

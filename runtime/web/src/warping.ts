@@ -10,15 +10,15 @@ const BACK = SPINE.map((name) => BONES.indexOf(name));
 /** Local rotations with hips and legs turned to the left by an angle; all that the spine carries stays as it is. */
 export function warped(rotations: Quaternion[], angle: number): Quaternion[] {
   if (Math.abs(angle) <= WARPING.LEAST) return rotations;
-  const found = [...rotations];
+  const turned = [...rotations];
   let above = rotations[0]!;
-  found[0] = product(about(Y, angle), above);
+  turned[0] = product(about(Y, angle), above);
   for (const bone of BACK) {
     // about the vertical, as the parent has it
-    found[bone] = product(about(rotated(inverse(above), Y), -angle / BACK.length), rotations[bone]!);
+    turned[bone] = product(about(rotated(inverse(above), Y), -angle / BACK.length), rotations[bone]!);
     above = product(above, rotations[bone]!);
   }
-  return found;
+  return turned;
 }
 
 /** Of the sole, in the frame of the foot. */
@@ -32,7 +32,7 @@ const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
  */
 export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
   if (Math.abs(stride - 1) <= WARPING.LEAST) return rotations;
-  const found = [...rotations];
+  const turned = [...rotations];
   SIDES.forEach((_, side) => {
     const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);
     const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
@@ -41,7 +41,7 @@ export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
       0,
       (z - UNDER) * (stride - 1),
     ];
-    reach(found, side, rotations[0]!, leg, led);
+    reach(turned, side, rotations[0]!, leg, led);
   });
-  return found;
+  return turned;
 }

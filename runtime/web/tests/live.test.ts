@@ -11,7 +11,7 @@ const net = {
   gaits: ["walk", "run", "jump"],
   speeds: { walk: [0.7, 1.3, 1.9], run: [1.8, 3, 4], jump: [0, 0, 2] },
 } as unknown as Net;
-const figure = { asked: { gait: 0, x: 0, z: 1.2, facing: 0 }, root: [0, 0, 0] } as unknown as Figure;
+const figure = { wanted: { gait: 0, x: 0, z: 1.2, facing: 0 }, root: [0, 0, 0] } as unknown as Figure;
 const order = (text: string) => {
   const found = orderOf(text, net, figure);
   return found && [found.gait, Math.round(100 * found.speed) / 100, Math.round((found.way * 180) / Math.PI)];

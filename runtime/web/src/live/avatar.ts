@@ -49,11 +49,11 @@ export class Avatar {
   /** Of a pose a matrix for each slot of the mesh, columns first, from where it is at rest; and where the humanoid's joints are. */
   posed(shown: Shown): { matrices: Float32Array; places: Vector[] } {
     const { turns, places } = worldOf(fromHumanoid(motionOf([shown]), this.measured));
-    const found = new Float32Array(16 * this.movers.length);
+    const matrices = new Float32Array(16 * this.movers.length);
     this.movers.forEach((joint, slot) => {
       const turn = turns[0]![joint]!;
       const move = minus(places[0]![joint]!, rotated(turn, this.rest[joint]!));
-      found.set(
+      matrices.set(
         columns(
           AXES.map((axis) => rotated(turn, axis)),
           move,
@@ -61,7 +61,7 @@ export class Avatar {
         16 * slot,
       );
     });
-    return { matrices: found, places: shown.places.map((place) => times(place, 1 / this.scale)) };
+    return { matrices, places: shown.places.map((place) => times(place, 1 / this.scale)) };
   }
 }
 
@@ -124,16 +124,17 @@ async function primitivesOf(gltf: Gltf, slots: Slots): Promise<Primitive[]> {
   const rows = new Map<number, number[][]>(); // parts of a mesh share their vertices
   const array = (at: number) => rows.get(at) ?? rows.set(at, gltf.array(at)).get(at)!;
   const images = new Map<number, Promise<ImageBitmap | null>>();
-  const found: Promise<Primitive>[] = [];
+  const primitives: Promise<Primitive>[] = [];
   gltf.nodes.forEach(({ mesh, skin }, node) => {
     if (mesh === undefined || !gltf.order.includes(node)) return;
     const slot = skin === undefined ? slots.add(node) : slots.ofSkin(skin);
     const parts = gltf.document.meshes![mesh]!.primitives.filter(
       (part) => (part.mode ?? TRIANGLES) === TRIANGLES,
     );
-    for (const part of parts) found.push(primitiveOf(gltf, part, array, slot, skin !== undefined, images));
+    for (const part of parts)
+      primitives.push(primitiveOf(gltf, part, array, slot, skin !== undefined, images));
   });
-  return Promise.all(found);
+  return Promise.all(primitives);
 }
 
 type Images = Map<number, Promise<ImageBitmap | null>>;

@@ -115,7 +115,7 @@ function addText(page: Page): void {
   const text = element<HTMLInputElement>("text");
   element<HTMLFormElement>("say").onsubmit = (event) => {
     event.preventDefault();
-    if (text.value.trim()) reply(page.told(text.value));
+    if (text.value.trim()) reply(page.obey(text.value));
     text.select();
   };
   element("known").append(
@@ -189,7 +189,7 @@ async function take(page: Page, files: FileList | null): Promise<void> {
   if (!file) return;
   reply(`reading ${file.name}`);
   await dropped(file, page.net.fps)
-    .then((found) => page.show(found))
+    .then((shown) => page.show(shown))
     .then(reply, (error: Error) => reply(error.message));
 }
 

@@ -91,10 +91,10 @@ export function towards(
   const [vx, vz] = aside([((toX - x) / away) * pace, ((toZ - z) / away) * pace], change);
   const wanted = Math.hypot(vx, vz);
   const fast = fastest(net);
-  const gait = wanted > (figure.asked.gait === fast ? 0.8 : 1) * net.speeds[net.gaits[0]!]![2]! ? fast : 0;
+  const gait = wanted > (figure.wanted.gait === fast ? 0.8 : 1) * net.speeds[net.gaits[0]!]![2]! ? fast : 0;
   const speed = wanted < SLOWEST ? 0 : inRange(net.model, gait, wanted);
   const ratio = wanted ? speed / wanted : 0;
-  return { gait, x: vx * ratio, z: vz * ratio, facing: speed ? Math.atan2(vx, vz) : figure.asked.facing };
+  return { gait, x: vx * ratio, z: vz * ratio, facing: speed ? Math.atan2(vx, vz) : figure.wanted.facing };
 }
 
 /** The usual speed of a gait. */

@@ -15,7 +15,7 @@ const RADIANS = Math.PI / 180;
 
 /** What is in a file; told: a sentence about it. The motion is of the humanoid, at the page's rate. */
 export interface Dropped {
-  told: string;
+  text: string;
   motion?: Motion;
   avatar?: Avatar;
 }
@@ -49,32 +49,32 @@ async function opened(name: string, content: Uint8Array, fps: number): Promise<D
   if (!document.meshes?.length || document.extensions?.VRMC_vrm_animation)
     return played(name, readGLB(content), fps);
   const avatar = await Avatar.read(content);
-  const told = `${name} is who moves now.`;
-  if (!moves) return { avatar, told };
+  const text = `${name} is who moves now.`;
+  if (!moves) return { avatar, text };
   const motion = played(name, readGLB(content), fps);
-  return { avatar, ...motion, told: `${told} ${motion.told}` };
+  return { avatar, ...motion, text: `${text} ${motion.text}` };
 }
 
-function played(name: string, given: Motion, fps: number): Dropped {
+function played(name: string, source: Motion, fps: number): Dropped {
   const {
     rotations: { length },
     fps: rate,
-  } = given;
+  } = source;
   if (length < 3) throw new MotionError("it has a figure but no motion");
-  const own = isHumanoid(given.skeleton);
+  const humanoid = isHumanoid(source.skeleton);
   const cut = {
-    ...given,
-    rotations: given.rotations.slice(0, MOST_SECONDS * rate),
-    translations: given.translations.slice(0, MOST_SECONDS * rate),
+    ...source,
+    rotations: source.rotations.slice(0, MOST_SECONDS * rate),
+    translations: source.translations.slice(0, MOST_SECONDS * rate),
   };
-  const found = own
+  const result = humanoid
     ? { motion: cut, convention: "motet's humanoid", notes: [] }
     : toHumanoid(cut.fps > fps ? resampled(cut, fps) : cut);
-  const motion = resampled(found.motion, fps);
-  const figure = `${given.skeleton.joints.length} joints${own || found.convention ? `, ${found.convention}` : ""}`;
+  const motion = resampled(result.motion, fps);
+  const figure = `${source.skeleton.joints.length} joints${humanoid || result.convention ? `, ${result.convention}` : ""}`;
   const shown = length > cut.rotations.length ? `, of which the first ${MOST_SECONDS} s are shown` : "";
-  const told = `${name}: a figure of ${figure}; ${(length / rate).toFixed(1)} s at ${Math.round(rate)} frames a second${shown}. ${way(motion)}`;
-  return { motion, told };
+  const text = `${name}: a figure of ${figure}; ${(length / rate).toFixed(1)} s at ${Math.round(rate)} frames a second${shown}. ${way(motion)}`;
+  return { motion, text };
 }
 
 /** How far a motion of the humanoid goes and how it turns, in words. */

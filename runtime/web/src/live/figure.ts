@@ -34,8 +34,8 @@ export interface Asked {
 }
 
 /** The model of a page. */
-export async function modelOf(given: Given): Promise<ControlModel> {
-  return new ControlModel(given.manifest, (await unpacked(given)) as unknown as Tables);
+export async function modelOf(embedded: Given): Promise<ControlModel> {
+  return new ControlModel(embedded.manifest, (await unpacked(embedded)) as unknown as Tables);
 }
 
 /** A figure of the page, and the last two ticks, between which it is shown. */
@@ -70,15 +70,15 @@ export class Figure {
   }
 
   /** What it was asked, within the limits of its gait. */
-  get asked(): Asked {
+  get wanted(): Asked {
     const [x, z, facing] = this.steered.target;
     return { gait: this.steered.command.gait, x, z, facing };
   }
 
   /** A tick later, asked anew or led along a path. */
-  tick(asked: Asked | Going): void {
-    if ("points" in asked) this.lead(asked);
-    else this.tell(asked);
+  tick(command: Asked | Going): void {
+    if ("points" in command) this.lead(command);
+    else this.tell(command);
     [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
   }
 
@@ -94,7 +94,7 @@ export class Figure {
 
   /** Do something, from the next tick on, or null: end what it does. `upper` as in a session's `act`. Meanwhile a whole body faces as the act does. */
   act(act: Act | null, upper?: boolean): void {
-    this.steered.acting.asked = { act, upper };
+    this.steered.acting.request = { act, upper };
   }
 
   /** What it does, and the seconds that are left of it. */
@@ -108,7 +108,7 @@ export class Figure {
       playback: { root, spring, springRate },
       target,
     } = this.steered;
-    const { velocity, facing } = this.model.steerer.matcher.how;
+    const { velocity, facing } = this.model.steerer.matcher.settings;
     const slow = dampingOf(velocity);
     const [x, z] = [0, 1].map(
       (i) =>

@@ -44,16 +44,16 @@ const colourOf = (bin: number) => [10, 5, 0].map((shift) => ((bin >> shift) & 31
 function paletteOf(pictures: Uint8ClampedArray[]): { palette: number[][]; nearest: Uint8Array } {
   const counts = new Float64Array(1 << 15);
   for (const picture of pictures) for (let at = 0; at < picture.length; at += 4) counts[bin(picture, at)]!++;
-  const used = [...counts.keys()].filter((one) => counts[one]);
+  const used = [...counts.keys()].filter((index) => counts[index]);
   const palette = used
     .sort((a, b) => counts[b]! - counts[a]!)
     .slice(0, CLEAR)
     .map(colourOf);
   const nearest = new Uint8Array(1 << 15);
-  for (const one of used) {
-    const colour = colourOf(one);
+  for (const index of used) {
+    const colour = colourOf(index);
     const off = palette.map((other) => other.reduce((sum, value, i) => sum + (value - colour[i]!) ** 2, 0));
-    nearest[one] = off.indexOf(Math.min(...off));
+    nearest[index] = off.indexOf(Math.min(...off));
   }
   while (palette.length <= CLEAR) palette.push([0, 0, 0]);
   return { palette, nearest };

@@ -85,14 +85,14 @@ export class Hands {
 
   /** The left stick goes, the right one looks, a trigger hurries. */
   private readPad(seconds: number): void {
-    const found = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.mapping === "standard");
-    if (!found) {
+    const pad = [...(navigator.getGamepads?.() ?? [])].find((gamepad) => gamepad?.mapping === "standard");
+    if (!pad) {
       this.pad = { ...this.pad, x: 0, y: 0, hurries: false };
       return;
     }
-    const [x, y, ...looks] = found.axes as [number, number, number, number];
+    const [x, y, ...looks] = pad.axes as [number, number, number, number];
     const [lookX, lookY] = looks.map((axis) => (Math.abs(axis) < DEAD ? 0 : axis)) as [number, number];
-    const down = found.buttons.map((button) => button.pressed);
+    const down = pad.buttons.map((button) => button.pressed);
     if (lookX || lookY) this.stage.turn(-PAD_ASIDE * seconds * lookX, PAD_UP * seconds * lookY);
     for (const [button, act] of Object.entries(this.buttons))
       if (down[Number(button)] && !this.pad.down[Number(button)]) act();

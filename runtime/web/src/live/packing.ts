@@ -23,7 +23,7 @@ export async function unpacked({ tables, bytes: text }: Packed): Promise<Record<
   for (let at = 0; at < pressed.length; at++) pressed[at] = letters.charCodeAt(at);
   const stream = new Blob([pressed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
-  const found: Record<string, ArrayLike<number>> = {};
+  const arrays: Record<string, ArrayLike<number>> = {};
   let at = 0;
   for (const [
     name,
@@ -39,7 +39,7 @@ export async function unpacked({ tables, bytes: text }: Packed): Promise<Record<
         for (let row = 0; row < rows; row++) target[(row * width + column) * size + byte] = bytes[at++]!;
       }
     }
-    found[name] = kind === "f2" ? halves(new Uint16Array(target.buffer)) : new KINDS[kind](target.buffer);
+    arrays[name] = kind === "f2" ? halves(new Uint16Array(target.buffer)) : new KINDS[kind](target.buffer);
   }
-  return found;
+  return arrays;
 }

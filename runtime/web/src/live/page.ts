@@ -77,7 +77,7 @@ export class Page {
       const [x, z, facing] = figures[0]?.root ?? [0, 0, 0];
       const [behind, left] = n ? placeBehind(n) : [0, 0];
       const [sin, cos] = [Math.sin(facing), Math.cos(facing)];
-      const phase = n ? n % net.model.steerer.matcher.how.search_every : undefined;
+      const phase = n ? n % net.model.steerer.matcher.settings.search_every : undefined;
       figures.push(
         new Figure(net.model, [x - behind * sin + left * cos, z - behind * cos - left * sin, facing], phase),
       );
@@ -90,7 +90,7 @@ export class Page {
   }
 
   /** Do what a sentence says; what is to be answered. */
-  told(text: string): string {
+  obey(text: string): string {
     const order = orderOf(text, this.net, this.figures[0]!);
     if (order) {
       this.pilot = order;
@@ -101,19 +101,19 @@ export class Page {
       this.once(once, saysAll(text));
       return once;
     }
-    const found = this.repertoire.find(text);
-    if (!found) return `? It knows ${KNOWN}: type ${this.repertoire.names[0]}, or choose from the list.`;
-    this.act(found.act, found.arms, saysAll(text));
-    const without = found.lacking.map((word) => `'${word}'`).join(", ");
-    return found.act.name + (without && `, without ${without} (confidence ${found.confidence.toFixed(2)})`);
+    const match = this.repertoire.find(text);
+    if (!match) return `? It knows ${KNOWN}: type ${this.repertoire.names[0]}, or choose from the list.`;
+    this.act(match.act, match.arms, saysAll(text));
+    const without = match.lacking.map((word) => `'${word}'`).join(", ");
+    return match.act.name + (without && `, without ${without} (confidence ${match.confidence.toFixed(2)})`);
   }
 
   /** Take what was dropped; what is to be said of it. */
-  show({ told, avatar, motion }: Dropped): string {
+  show({ text, avatar, motion }: Dropped): string {
     this.view.dirty = true;
     if (avatar) this.scene.become(avatar);
-    if (motion) this.act(actOf(this.net.model, told, numbersOf(this.net.model, motion)), false, false);
-    return told;
+    if (motion) this.act(actOf(this.net.model, text, numbersOf(this.net.model, motion)), false, false);
+    return text;
   }
 
   /** Do once what a gait that goes nowhere shows, of all figures or the first, and go on. */
@@ -132,7 +132,7 @@ export class Page {
   }
 
   /** What the first figure is asked: by hand, or else by its pilot, or else to stand. */
-  asked(): Asked | Going {
+  command(): Asked | Going {
     const [x, y] = this.hands.pushed;
     const pushed = x !== 0 || y !== 0;
     this.held &&= pushed;
@@ -142,8 +142,8 @@ export class Page {
     }
     if (pushed) this.pilot = null;
     else if (this.pilot) {
-      const found = this.pilot.ask(this.net, this.figures[0]!);
-      if (found) return found;
+      const command = this.pilot.ask(this.net, this.figures[0]!);
+      if (command) return command;
       this.pilot = null;
     }
     return this.byHand(x, y);
@@ -155,8 +155,8 @@ export class Page {
     const away = this.view.yaw * RADIANS + Math.PI;
     const { gait, pace } = this.paced(strength);
     const way = away - Math.atan2(x, y);
-    const { acting, asked, root } = this.figures[0]!;
-    const kept = acting ? root[2] : asked.facing; // while the whole body acts, its facing is the act's
+    const { acting, wanted, root } = this.figures[0]!;
+    const kept = acting ? root[2] : wanted.facing; // while the whole body acts, its facing is the act's
     const facing = state.strafe ? away : strength ? way : kept;
     const speed = strength ? inRange(net.model, gait, pace, way - facing) : 0;
     return { gait, x: speed * Math.sin(way), z: speed * Math.cos(way), facing };
@@ -168,7 +168,7 @@ export class Page {
     const fast = fastest(net);
     if (state.gait === 0 && hands.byStick && !state.hurry && !hands.hurries) {
       const paces = { least: net.speeds[net.gaits[0]!]![0]!, walk: usual(net, 0), run: usual(net, fast) };
-      const { speed, runs } = stick(strength, this.figures[0]!.asked.gait === fast, paces);
+      const { speed, runs } = stick(strength, this.figures[0]!.wanted.gait === fast, paces);
       return { gait: runs ? fast : 0, pace: speed };
     }
     const gait = (state.hurry || hands.hurries) && state.gait === 0 ? fast : state.gait;
@@ -193,24 +193,24 @@ export class Page {
     this.view.dirty = false;
     if (this.awake < 0) return;
     if (!this.state.pause) this.ahead += passed * this.net.fps * this.state.pace;
-    for (; this.ahead >= 1; this.ahead--) this.tick(this.asked());
+    for (; this.ahead >= 1; this.ahead--) this.tick(this.command());
     const poses = this.figures.map((figure) => figure.shown(this.ahead));
     this.scene.draw(poses, passed, this.figures, this.pilot?.goal, this.state);
     this.tell();
   }
 
   private tell(): void {
-    const { velocity, asked } = this.figures[0]!;
-    this.say(`${this.net.gaits[asked.gait]} · ${Math.hypot(...velocity).toFixed(1)} m/s`);
+    const { velocity, wanted } = this.figures[0]!;
+    this.say(`${this.net.gaits[wanted.gait]} · ${Math.hypot(...velocity).toFixed(1)} m/s`);
   }
 }
 
 /** Open the page of what motet/live/page.py has written. */
-export async function open(given: Given, stage: Stage): Promise<Page> {
+export async function open(embedded: Given, stage: Stage): Promise<Page> {
   const element = (id: string) => document.getElementById(id)!;
   const canvas = element("canvas") as HTMLCanvasElement;
-  const scene = new Scene(stage, canvas, given.body, given.body.height); // its programs are compiled while tables are unpacked
-  const model = await modelOf(given.net);
+  const scene = new Scene(stage, canvas, embedded.body, embedded.body.height); // its programs are compiled while tables are unpacked
+  const model = await modelOf(embedded.net);
   const speeds = Object.fromEntries(model.gaits.map((gait, n) => [gait, model.abilities.speeds[n]!]));
   const net: Net = { model, gaits: model.gaits, fps: model.fps, speeds, rows: model.steerer.matcher.rows };
   const page = new Page(
@@ -219,14 +219,14 @@ export async function open(given: Given, stage: Stage): Promise<Page> {
     scene,
     new Hands(stage, element("stick")),
     new Recorder(net.fps, scene, canvas),
-    said(element("speed")),
+    announcer(element("speed")),
   );
-  page.setFigures(given.characters);
+  page.setFigures(embedded.characters);
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) page.startByItself();
   for (const done of DONE) addEventListener(done, () => (stage.view.dirty = true));
   await drawn(page);
-  page.repertoire = await Repertoire.of(given.acts, model);
-  addControls(page, given.most);
+  page.repertoire = await Repertoire.of(embedded.acts, model);
+  addControls(page, embedded.most);
   return page;
 }
 
@@ -243,7 +243,7 @@ function drawn(page: Page): Promise<void> {
 }
 
 /** Writes what changes into an element. */
-function said(element: HTMLElement): (text: string) => void {
+function announcer(element: HTMLElement): (text: string) => void {
   let last = "";
   return (text) => {
     if (text !== last) element.textContent = last = text;

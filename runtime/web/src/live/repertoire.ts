@@ -31,15 +31,15 @@ export class Repertoire {
     this.phrases = new Phrases(entries);
   }
 
-  static async of(given: GivenActs, model: ControlModel): Promise<Repertoire> {
-    const { frames } = await unpacked(given);
-    const [, width] = given.tables.frames!.shape;
+  static async of(embedded: GivenActs, model: ControlModel): Promise<Repertoire> {
+    const { frames } = await unpacked(embedded);
+    const [, width] = embedded.tables.frames!.shape;
     const numbers = Float64Array.from(frames!);
     for (let at = width; at < numbers.length; at++) numbers[at]! += numbers[at - width]!;
     return new Repertoire(
       model,
-      given.acts,
-      numbers.map((value) => value / given.steps),
+      embedded.acts,
+      numbers.map((value) => value / embedded.steps),
     );
   }
 

@@ -42,8 +42,8 @@ export class Scene {
     const painter = stage.openStage(canvas);
     if (!painter) throw new Error("it has no WebGL2");
     this.painter = painter;
-    const own = (this.body = painter.body(body));
-    this.looks = ({ turned, places }, n) => ({ body: own, turned, places, unit: 1 / height, shirt: n });
+    const first = (this.body = painter.body(body));
+    this.looks = ({ turned, places }, n) => ({ body: first, turned, places, unit: 1 / height, shirt: n });
   }
 
   /** From now on the first figure is an avatar. */
@@ -80,7 +80,7 @@ export class Scene {
     const ways = shows.trails
       ? [
           ...figures.slice(0, TRACED).map((figure, n) => this.gone(figure, n)),
-          ...(figures[0] ? [this.asked(figures[0])] : []),
+          ...(figures[0] ? [this.planned(figures[0])] : []),
         ]
       : [];
     const spots = [
@@ -101,8 +101,8 @@ export class Scene {
 
   /** x and z in metres where a pixel of the canvas shows the ground. */
   groundAt(x: number, y: number): [x: number, z: number] | null {
-    const found = this.camera && this.stage.onGround(this.camera, x, y);
-    return found ? [found[0] * this.height, found[1] * this.height] : null;
+    const point = this.camera && this.stage.onGround(this.camera, x, y);
+    return point ? [point[0] * this.height, point[1] * this.height] : null;
   }
 
   /** The camera comes after the first figure without its sway, further away where there are many. */
@@ -129,7 +129,7 @@ export class Scene {
     return [x / this.height, z / this.height];
   }
 
-  private asked(figure: Figure): Strip {
+  private planned(figure: Figure): Strip {
     const points = Array.from({ length: SOON / APART + 1 }, (_, at): [number, number] => {
       const [x, z] = figure.later(at * APART);
       return [x / this.height, z / this.height];

@@ -78,7 +78,7 @@ export interface Mesh {
 
 /** Draws on one canvas. */
 export interface Painter {
-  body(given: unknown): Body;
+  body(body: unknown): Body;
   avatar(mesh: Mesh): unknown;
   drop(body: unknown): void;
   begin(still: boolean): { width: number; height: number };

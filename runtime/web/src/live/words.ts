@@ -31,22 +31,22 @@ export function saysAll(text: string): boolean {
 }
 
 /** The order that a sentence is: a gait, a way, a pace or to stop, from what a figure does now; null for any other sentence. */
-export function orderOf(text: string, net: Net, { asked, root }: Figure): Order | null {
+export function orderOf(text: string, net: Net, { wanted, root }: Figure): Order | null {
   const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word));
-  const found = new Order(asked.gait, Math.hypot(asked.x, asked.z), root[2]);
+  const order = new Order(wanted.gait, Math.hypot(wanted.x, wanted.z), root[2]);
   const gaits = net.gaits.map((name) => (net.speeds[name]![1]! > 0 ? stem(name) : "")); // a jump on the spot is an act
   const side = words.find((word) => word in TURNS);
   for (const word of words) {
     const gait = gaits.indexOf(stem(word));
-    if (gait >= 0) Object.assign(found, { gait, speed: usual(net, gait) });
-    else if (STOPS.has(stem(word))) Object.assign(found, { gait: 0, speed: 0 });
-    else if (word in PACES) found.speed *= PACES[word]!;
+    if (gait >= 0) Object.assign(order, { gait, speed: usual(net, gait) });
+    else if (STOPS.has(stem(word))) Object.assign(order, { gait: 0, speed: 0 });
+    else if (word in PACES) order.speed *= PACES[word]!;
     else if (!(word in TURNS || stem(word) === "turn" || (side && /^\d+$/.test(word)))) return null;
   }
   if (!words.length || (!side && words.every((word) => stem(word) === "turn"))) return null;
   const degrees = Number(words.find((word) => /^\d+$/.test(word)) ?? 0);
-  if (side) found.way += RADIANS * (degrees ? Math.sign(TURNS[side]!) * degrees : TURNS[side]!);
-  return found;
+  if (side) order.way += RADIANS * (degrees ? Math.sign(TURNS[side]!) * degrees : TURNS[side]!);
+  return order;
 }
 
 /** The gait that goes nowhere whose name is all that a sentence says: it is done once. */
@@ -75,39 +75,41 @@ export class Phrases {
   /** The number of the phrase, -1 if none has enough of what is said; the words that it leaves out; how much it has, by their weight. */
   find(text: string): { at: number; lacking: string[]; confidence: number } {
     const words = wordsOf(text).filter((word) => !IDLE.has(word) && !ALL.has(word));
-    const asked = words.map((word) => this.read(word));
-    const all = asked.reduce((sum, word) => sum + this.weight(word), 0);
-    const scores = this.stems.map((own, at) => {
-      const shared = asked.reduce((sum, word) => sum + (own.has(word) ? this.weight(word) : 0), 0);
-      return { at, share: all ? shared / all : 0, ...this.own(at, asked) };
+    const wanted = words.map((word) => this.read(word));
+    const all = wanted.reduce((sum, word) => sum + this.weight(word), 0);
+    const scores = this.stems.map((stems, at) => {
+      const shared = wanted.reduce((sum, word) => sum + (stems.has(word) ? this.weight(word) : 0), 0);
+      return { at, share: all ? shared / all : 0, ...this.overlap(at, wanted) };
     });
     const [best] = scores.sort(
-      (a, b) => b.share - a.share || b.said - a.said || a.rest - b.rest || a.at - b.at,
+      (a, b) => b.share - a.share || b.shared - a.shared || a.rest - b.rest || a.at - b.at,
     );
     if (!best || best.share < ENOUGH) return { at: -1, lacking: words, confidence: best?.share ?? 0 };
     return {
       at: best.at,
-      lacking: words.filter((_, i) => !this.stems[best.at]!.has(asked[i]!)),
+      lacking: words.filter((_, i) => !this.stems[best.at]!.has(wanted[i]!)),
       confidence: best.share,
     };
   }
 
   /** The stem of a word, or of the known one that it is a misspelling of. */
   private read(word: string): string {
-    const own = stem(word);
-    if (this.stems.some((stems) => stems.has(own))) return own;
+    const stemmed = stem(word);
+    if (this.stems.some((stems) => stems.has(stemmed))) return stemmed;
     return stem(corrected(word, this.known) || word);
   }
 
   /** How rare a stem is: greatest where no phrase has it. */
   private weight(word: string): number {
-    return Math.log((this.stems.length + 1) / (this.stems.filter((own) => own.has(word)).length + 1)) + 0.1;
+    return (
+      Math.log((this.stems.length + 1) / (this.stems.filter((stems) => stems.has(word)).length + 1)) + 0.1
+    );
   }
 
   /** How many words of its own sentence are asked for, and how many are not. */
-  private own(at: number, asked: string[]): { said: number; rest: number } {
+  private overlap(at: number, wanted: string[]): { shared: number; rest: number } {
     const words = wordsOf(this.phrases[at]!.sentence).filter((word) => !IDLE.has(word));
-    const said = words.filter((word) => asked.includes(stem(word))).length;
-    return { said, rest: words.length - said };
+    const shared = words.filter((word) => wanted.includes(stem(word))).length;
+    return { shared, rest: words.length - shared };
   }
 }
