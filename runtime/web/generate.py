@@ -6,14 +6,12 @@ A module becomes an object with those of its constants that src uses, such as ME
 an object with the default of each field, and its range where it has one.
 """
 
-import ast
 import inspect
 import json
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import MISSING, asdict, fields, is_dataclass
 from importlib import import_module
-from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -83,7 +81,7 @@ def typescript() -> str:
     """The text of src/generated.ts: of each module what the other files of src name."""
     sources = [path.read_text("utf-8") for path in sorted(TARGET.parent.rglob("*.ts")) if path != TARGET]
     used = {name for source in sources for name in re.findall(r"\b[A-Z_]+\.[A-Z_]+\b|\b[a-z]\w+Settings\b", source)}
-    parts = ["/* Written by runtime/web/generate.py from the modules of the Python runtime: do not edit. */\n"]
+    parts = ["/* Written by runtime/web/generate.py: do not edit. Units stand in the modules of Python. */\n"]
     for name, path in MODULES.items():
         module = import_module(path)
         constants = list(constants_of(module, {use[1] for use in map(parted, used) if use[0] == name}))
@@ -107,22 +105,13 @@ def parted(name: str) -> tuple[str, str]:
 
 
 def constants_of(module: ModuleType, used: Iterable[str]) -> Iterator[str]:
-    """A line for each constant of a module, or of its classes, that is used, and its docstring above it."""
-    left = set(used)
-    body = ast.parse(inspect.getsource(module)).body
-    classes = [(getattr(module, node.name), node.body) for node in body if isinstance(node, ast.ClassDef)]
-    for owner, statements in ((module, body), *classes):
-        for statement, following in pairwise([*statements, ast.Pass()]):
-            targets = ast.walk(statement.targets[0]) if isinstance(statement, ast.Assign) else ()
-            names = [target.id for target in targets if isinstance(target, ast.Name) and target.id in left]
-            match following:
-                case ast.Expr(ast.Constant(str(doc))) if names:
-                    yield f"  // {' '.join(doc.split())}\n"
-            for name in names:
-                yield f"  {name}: {literal(getattr(owner, name))},\n"
-            left -= set(names)
-    if left:
-        raise AttributeError(f"{module.__name__} has no {', '.join(sorted(left))}, which src uses")
+    """A line for each constant of a module, or of its classes, that is used."""
+    kinds = [kind for _, kind in inspect.getmembers(module, inspect.isclass) if kind.__module__ == module.__name__]
+    for name in sorted(used):
+        owners = [owner for owner in (module, *kinds) if hasattr(owner, name)]
+        if not owners:
+            raise AttributeError(f"{module.__name__} has no {name}, which src uses")
+        yield f"  {name}: {literal(getattr(owners[0], name))},\n"
 
 
 def fields_of(kind: type[Any]) -> Iterator[str]:
