@@ -93,7 +93,7 @@ CEILINGS = {
     "motet.draw": 12_000,
     "motet.figures": 30_400,
     "motet.formats": 36_200,
-    "motet.generate": 24_800,
+    "motet.generate": 25_400,
     "motet.live": 5_700,
     "motet.models": 8_900,
     "motet.motion": 15_700,
@@ -111,7 +111,7 @@ CEILINGS = {
     "motet_train.evaluate": 44_900,
     "motet_train.models": 20_400,
     "motet_train.papers": 39_800,
-    "motet_train.recipes": 14_500,
+    "motet_train.recipes": 14_800,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

@@ -12,12 +12,13 @@ from fake_codes import ACTIONS, END, KNOWN, NULL_ACTION, PARTS, memory_tables, n
 from numpy.typing import NDArray
 
 from motet.generate.codes import CodesSettings, Source, Writer, draw_codes, drawn_actions, drawn_steps, nucleus
-from motet.generate.memory import LEAP, PAST, Memory
+from motet.generate.memory import Memory, MemorySettings
 
 pytestmark = pytest.mark.numeric
 
 Array = NDArray[Any]
 PLAIN = CodesSettings()
+SETTINGS = MemorySettings()
 DRAWINGS = [
     PLAIN,
     CodesSettings(temperature=0.8, first_temperature=0.3, top_p=0.7, guidance=2.5),
@@ -95,7 +96,7 @@ def memory() -> Memory:
 
 def recent_of(codes: Array, at: int) -> list[Array]:
     """Numbers of the steps before one, the latest first, as many as are looked at."""
-    return list(numbers_of(codes[max(0, at - len(PAST)) : at])[::-1])
+    return list(numbers_of(codes[max(0, at - SETTINGS.past_steps) : at])[::-1])
 
 
 def test_a_memory_starts_where_motions_of_the_action_start() -> None:
@@ -142,10 +143,10 @@ def naive_shares(action: int, recent: list[Array], age: int, ends: bool, done: f
     for start, (of, codes) in zip(STARTS.tolist(), MOTIONS, strict=False):
         for at in range(len(codes)) if of == action else ():
             over = naive_parts(codes)[at]
-            if not (at > 0 if age else over < 0.3) or over > done + LEAP:
+            if not (at > 0 if age else over < 0.3) or over > done + SETTINGS.skip:
                 continue
             off = (at - age) ** 2 / 64 if ends else min((at - age) ** 2 / 64, 2.0)
-            for back, weight in enumerate(PAST, start=1):
+            for back, weight in enumerate((1.0, 0.5, 0.25), start=1):
                 known = CLOSE * numbers_of(codes[[max(at - back, 0)]])[0]
                 off += weight * float(((known - recent[min(back, len(recent)) - 1]) ** 2).sum())
             found[start + at] = float(np.exp(-2 * off))
@@ -162,7 +163,8 @@ def test_a_memory_goes_on_where_the_past_resembles_the_present(age: int, ends: b
     known, rng = memory(), np.random.default_rng(age)
     known = replace(known, keys={action: np.float32(CLOSE) * keys for action, keys in known.keys.items()})
     middle = CLOSE * np.mean([numbers_of(codes[:-1]).mean(axis=0) for _, codes in MOTIONS], axis=0)
-    recent = [(middle + 0.1 * rng.normal(size=middle.shape)).astype(np.float32) for _ in PAST[: age or 3]]
+    count = min(age or 3, SETTINGS.past_steps)
+    recent = [(middle + 0.1 * rng.normal(size=middle.shape)).astype(np.float32) for _ in range(count)]
     found = [known.next(1, recent, age, ends, (one + 0.5) / 2000, done) for one in range(2000)]
     shares = naive_shares(1, recent, age, ends, done)
     assert sum(share > 0.02 for share in shares.values()) > 1

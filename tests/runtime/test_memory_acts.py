@@ -8,7 +8,7 @@ from fake_codes import END, PARTS, memory_tables, source
 from numpy.typing import NDArray
 
 from motet.generate.codes import CodesSettings, Writer, draw_codes
-from motet.generate.memory import WHOLE, Memory
+from motet.generate.memory import Memory, MemorySettings
 
 Array = NDArray[Any]
 REMEMBERED = CodesSettings(memory=1.0)
@@ -28,7 +28,7 @@ def drawn_from(motions: list[tuple[int, Array]], exactly: int = 0, seeds: int = 
 
 def test_of_a_recording_that_shows_the_same_again_and_again_one_act_is_shown() -> None:
     for codes in drawn_from([(1, SITS)]):
-        assert WHOLE - len(IDLE) <= len(codes) < 60  # who stands may do so for less long
+        assert MemorySettings.act_steps - len(IDLE) <= len(codes) < 60  # who stands may do so for less long
         assert codes[-1] == STEPS[0].tolist()
         assert str(ROUND.tolist())[1:-1] in str(codes)
     for codes in drawn_from([(1, SITS)], exactly=100):
@@ -38,7 +38,7 @@ def test_of_a_recording_that_shows_the_same_again_and_again_one_act_is_shown() -
 
 def test_what_shows_much_is_shown_and_what_is_short_is_shown_whole() -> None:
     once = np.concatenate([np.random.default_rng(3).permutation(STEPS)[:60], END_STEP])
-    assert all(len(codes) > WHOLE for codes in drawn_from([(1, once)]))
+    assert all(len(codes) > MemorySettings.act_steps for codes in drawn_from([(1, once)]))
     short = np.concatenate([once[:44], END_STEP])
     assert drawn_from([(1, short)]) == [once[:44].tolist()] * 6
 

@@ -1,7 +1,7 @@
 """The model that writes codes: its steps and its loss, the windows that it learns from, and its training."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,9 @@ from click.testing import CliRunner
 from codes_data import CODEC, CODES, TEXT, small_store, trained
 from torch import Tensor, nn
 
+import motet
 from motet.cli import main
+from motet.generate.memory import MemorySettings
 from motet_train.data.sentences import actions_of
 from motet_train.data.sixd_windows import CodedMotion, CodeWindows, memory_of
 from motet_train.data.store import Store
@@ -19,7 +21,7 @@ from motet_train.models.action_net import ActionsConfig
 from motet_train.models.codec import CodecConfig, MotionCodec
 from motet_train.models.kinematics import Tree
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
-from motet_train.recipes.codes import coded, codes_of
+from motet_train.recipes.codes import alike_distance, coded, codes_of
 from motet_train.runs import MODELS, Run
 
 TREE = Tree((-1, 0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), (0, 1))
@@ -138,6 +140,16 @@ def test_tables_hold_the_memory_and_the_numbers_of_its_codes() -> None:
     torch.testing.assert_close(torch.from_numpy(tables["moves"][move]), model.codec.book[move] / model.codec.book_scale)
     body = torch.from_numpy(tables["body"][codes].ravel())
     torch.testing.assert_close(body, model.codec.from_codes(torch.tensor([codes]))[0])
+
+
+def test_the_distance_of_alike_steps_is_that_of_the_codec() -> None:
+    """The default is the distance that the shipped codec has; one with numbers half as far apart has a quarter."""
+    memory = motet.load("generate").source.memory
+    assert alike_distance(memory) == MemorySettings().alike_distance
+    halves = {action: keys / np.float32(2) for action, keys in memory.keys.items()}
+    assert alike_distance(replace(memory, keys=halves)) == pytest.approx(MemorySettings().alike_distance / 4, abs=0.01)
+    short = {action: rows[:40] for action, rows in memory.rows.items()}
+    assert alike_distance(replace(memory, rows=short)) == memory.settings.alike_distance  # nothing to measure
 
 
 def test_a_model_comes_back_from_its_configuration() -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats, Graph
 from motet.decode.loop import Ids, Loop, Noise, Scores, advance, zero_state
-from motet.generate.memory import LEAP, PAST, Memory
+from motet.generate.memory import Memory
 from motet.settings import Range, Settings
 
 WINDOW = 64
@@ -96,8 +96,9 @@ class Writer:
     def draw(self, actions: Ids, ends: bool = True, steps: int = 0, whole: bool = True) -> Ids:
         """The next step (B, P) of rows with the given actions (B,).
 
-        ends: whether a motion may end, but no more than LEAP sooner than any remembered one; else an action that would
-        end begins again. steps: of this and those to come, where they are to show the most of an action that begins.
+        ends: whether a motion may end, but no more than the memory's ``skip`` sooner than any remembered one; else an
+        action that would end begins again. steps: of this and those to come, where they are to show the most of an
+        action that begins.
         whole: whether all of an action is shown; else, of long recordings, an act (:meth:`Memory.next`). Each row takes
         one block of uniform numbers (P + 2,) from its noise.
         """
@@ -117,7 +118,8 @@ class Writer:
                 over, self.done[row] = memory.over(action, place, whole)
                 codes[row] = memory.codes[place]
                 codes[row, 0] = self.source.end if over and ends else codes[row, 0]
-        begun = self.age < (1 - LEAP) * np.array([memory.shortest.get(int(action), 0) for action in actions])
+        shortest = np.array([memory.shortest.get(int(action), 0) for action in actions])
+        begun = self.age < (1 - memory.settings.skip) * shortest
         again = self._parts(known, uniform[:, 2:], codes, ends, begun)
         self.last = np.tile(codes, (2, 1))
         self.age, self.done = np.where(again, 0, self.age + 1), np.where(again, 0.0, self.done)
@@ -137,7 +139,7 @@ class Writer:
             if 0 in sizes and array.shape[axis := 1 + sizes.index(0)] > WINDOW:
                 self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
         if self.last[0, 0] != self.source.end + 1:
-            self.recent = [outputs["numbers"][: len(actions)], *self.recent][: len(PAST)]
+            self.recent = [outputs["numbers"][: len(actions)], *self.recent][: self.source.memory.settings.past_steps]
         known: Floats = outputs["known"]
         return known
 

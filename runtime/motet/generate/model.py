@@ -31,7 +31,7 @@ from motet.generate.base import Generated, GenerateModel, LoopSettings
 from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.continue_codes import ContinuationSettings
-from motet.generate.memory import Memory
+from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
 from motet.generate.story_decoder import Part, Piece, Teller, pace_of
 from motet.models.language import texts_of
@@ -109,7 +109,7 @@ class CodesModel(GenerateModel):
     """A model that generates motion codes; docs/reference/bundle.md has its graphs and tables. A context is the
     log-probabilities of actions."""
 
-    SETTINGS = (FamiliaritySettings, ContinuationSettings)
+    SETTINGS = (FamiliaritySettings, ContinuationSettings, MemorySettings)
     LOOPS = LOOPS
     ROLES = ("encoder", "part", "decoder", "tokens", "step")
 
@@ -143,7 +143,7 @@ class CodesModel(GenerateModel):
         body = self.table("body", "Q N", "float32")
         if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
             raise BundleError("manifest, tables.body: does not fit the graph step")
-        return Memory.of(steps, moves, body, self.sizes["A"])
+        return Memory.of(steps, moves, body, self.sizes["A"], self.settings(MemorySettings))
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """See :meth:`motet.models.language.LanguageModel.contexts`; one by one: padding changes how sums round."""

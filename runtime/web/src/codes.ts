@@ -1,5 +1,5 @@
 /* Motions drawn code by code: docs/reference/bundle.md, the loop `codes`. */
-import { CODES, MEMORY } from "./generated.js";
+import { CODES } from "./generated.js";
 import { integers, type NumberArray } from "./arrays.js";
 import { type Graph, taken } from "./graph.js";
 import { type Memory } from "./memory.js";
@@ -92,7 +92,7 @@ export class Writer {
 
   /**
    * The next step (B, P) of rows with the given actions. ends: whether a motion may end, but no more than
-   * LEAP sooner than any remembered one; else an action that would end begins again.
+   * `skip` sooner than any remembered one; else an action that would end begins again.
    * steps: of this and those to come, where they are to show the most of an action that begins; else 0. whole: as for
    * the memory's `next`.
    */
@@ -114,7 +114,7 @@ export class Writer {
       place === undefined ? undefined : this.step(place, ends && after[row]!.end),
     );
     const begun = actions.map(
-      (action, row) => from[row]! < (1 - MEMORY.LEAP) * (memory.shortest.get(action) ?? 0),
+      (action, row) => from[row]! < (1 - memory.settings.skip) * (memory.shortest.get(action) ?? 0),
     );
     const { codes, again } = await this.drawn(
       known,
@@ -167,7 +167,7 @@ export class Writer {
     const row = (at: number) => data.slice(at * shape[1]!, (at + 1) * shape[1]!);
     const started = last[0]![0] !== this.source.end + 1;
     const latest = started
-      ? recent.map((before, at) => [row(at), ...before].slice(0, MEMORY.PAST.length))
+      ? recent.map((before, at) => [row(at), ...before].slice(0, this.source.memory.settings.past_steps))
       : recent;
     this.now = { age, done, last, states: lately(next), recent: latest };
     return outputs.known!;

@@ -1,4 +1,4 @@
-import { GENERATE_CODES, continuationSettings, familiaritySettings } from "./generated.js";
+import { GENERATE_CODES, continuationSettings, familiaritySettings, memorySettings } from "./generated.js";
 import type { Bundle, Manifest } from "./bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
 import { FUNCTION_WORDS, partsOf, sentencesOf, stem, verbsOf } from "./composition.js";
@@ -403,13 +403,14 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
     throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
   const [actions, end] = [manifest.actions?.length ?? 0, moves.shape[0]!];
   const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
+  const remembers = settingsOf("memory", memorySettings, manifest.settings.memory);
   const source: Source = {
     step: step!,
     part: part!,
     end,
     nullAction: actions,
     parts,
-    memory: new Memory(memory, moves, body, actions),
+    memory: new Memory(memory, moves, body, actions, remembers),
   };
   const codec: Codec = {
     decoder: decoder!,

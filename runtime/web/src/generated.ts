@@ -160,20 +160,27 @@ export const continuationSettings = {
 
 // motet.generate.memory
 export const MEMORY = {
-  ALIKE: 8.03,
-  ALL: 0.95,
-  EARLY: 0.3,
   FAR: 1048576,
-  GOOD: 0.95,
-  LATER: 0.015625,
-  LATEST: 2,
-  LEAP: 0.3,
-  NEAR: 0.5,
-  PAST: [1, 0.5, 0.25],
-  POSE: 1,
-  REST: 0.125,
-  UNLIKE: 30,
-  WHOLE: 45,
+} as const;
+
+// motet.generate.memory.MemorySettings
+export const memorySettings = {
+  past_steps: { default: 3, low: 1, high: 16, whole: true },
+  past_fading: { default: 0.5, low: 0, high: 1, whole: false },
+  distance_scale: { default: 0.5, low: 1e-06, high: 1000000, whole: false },
+  age_cost: { default: 0.015625, low: 0, high: 1000000, whole: false },
+  age_cost_limit: { default: 2, low: 0, high: 1000000, whole: false },
+  entry: { default: 0.3, low: 0, high: 1, whole: false },
+  skip: { default: 0.3, low: 0, high: 1, whole: false },
+  rest_weight: { default: 0.125, low: 1e-06, high: 1000000, whole: false },
+  pose_weight: { default: 1, low: 1e-06, high: 1000000, whole: false },
+  good_start: { default: 0.95, low: 0, high: 1, whole: false },
+  quick_share: { default: 0.8, low: 0, high: 1, whole: false },
+  act_share: { default: 0.95, low: 0, high: 1, whole: false },
+  tempo: { default: 1.2, low: 1, high: 10, whole: false },
+  act_steps: { default: 45, low: 1, high: 10000, whole: true },
+  alike_distance: { default: 8.03, low: 1e-06, high: 1000000, whole: false },
+  edge_cost: { default: 30, low: 0, high: 10000, whole: false },
 } as const;
 
 // motet.generate.model

@@ -1,6 +1,7 @@
-import { MEMORY } from "./generated.js";
+import { MEMORY, type memorySettings } from "./generated.js";
 import type { NumberArray } from "./arrays.js";
 import { BundleError } from "./errors.js";
+import { type Settings } from "./settings.js";
 
 /** Of each row of an action its age, and the share of the action that is over before it. */
 interface Course {
@@ -31,6 +32,7 @@ export class Memory {
     moves: NumberArray,
     body: NumberArray,
     actions: number,
+    readonly settings: Settings<typeof memorySettings>,
   ) {
     const [steps, columns] = [table.shape[0]!, table.shape[1]!];
     this.steps = steps;
@@ -47,9 +49,11 @@ export class Memory {
       );
     }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
-    this.parts = this.over(changes.map((change) => MEMORY.REST + change));
+    this.parts = this.over(changes.map((change) => this.settings.rest_weight + change));
     const rare = this.rarity(body.shape[0]!, moves.shape[0]!);
-    this.particular = changes.map((change, row) => (MEMORY.POSE + change) * Math.exp(rare[row]!));
+    this.particular = changes.map(
+      (change, row) => (this.settings.pose_weight + change) * Math.exp(rare[row]!),
+    );
     this.acts = this.over(this.particular);
   }
 
@@ -163,7 +167,8 @@ export class Memory {
     }
     const places = [...all.keys()];
     const fitting = places.filter(
-      (at) => (age ? ages[at]! > 0 : over[at]! < MEMORY.EARLY) && over[at]! <= done + MEMORY.LEAP,
+      (at) =>
+        (age ? ages[at]! > 0 : over[at]! < this.settings.entry) && over[at]! <= done + this.settings.skip,
     );
     const used = fitting.length ? fitting : places;
     return this.near(
@@ -207,10 +212,10 @@ export class Memory {
     for (const piece of motions.sort((a, b) => this.ages[a[0]!]! - this.ages[b[0]!]!)) {
       const codes = (some: number[]) => some.map((row) => this.codes(row)).join();
       const place = (take: number[]) => this.ages[piece[0]!]! - this.ages[take[0]!]!;
-      const begin = codes(piece.slice(0, MEMORY.PAST.length));
+      const begin = codes(piece.slice(0, this.settings.past_steps));
       const before = takes.find(
         ({ take }) =>
-          place(take) > 0 && codes(take.slice(place(take), place(take) + MEMORY.PAST.length)) === begin,
+          place(take) > 0 && codes(take.slice(place(take), place(take) + this.settings.past_steps)) === begin,
       );
       const last = this.lasts[piece[0]!]!;
       if (!before) takes.push({ take: piece, pieces: new Set([last]) });
@@ -226,22 +231,28 @@ export class Memory {
   private act(take: number[]): [number, number] {
     const end = take.length - 1;
     let best: [number, number] = [0, end];
-    if (end <= MEMORY.WHOLE) return best;
-    const past = take.map((row) => MEMORY.PAST.map((_, back) => this.past(row, back)));
+    if (end <= this.settings.act_steps) return best;
+    const past = take.map((row) =>
+      Array.from({ length: this.settings.past_steps }, (_, back) => this.past(row, back)),
+    );
     const apart = take.map((row) => Float64Array.from(past, (seen) => this.distance(row, seen)));
-    const enough = MEMORY.ALL * take.reduce((sum, row) => sum + this.particular[row]!, 0);
-    const edge = (to: number, at: number) => Math.min(apart[to]![at]! / MEMORY.ALIKE, 1);
+    const enough = this.settings.act_share * take.reduce((sum, row) => sum + this.particular[row]!, 0);
+    const edge = (to: number, at: number) => Math.min(apart[to]![at]! / this.settings.alike_distance, 1);
     const shown = take.map(() => end + 1); // where each step is first shown, from a place on
     let least = Infinity;
     const spans: [number, number, number][] = [];
     for (let first = end; first >= 0; first--) {
-      take.forEach((_, at) => (shown[at] = apart[first]![at]! <= MEMORY.ALIKE ? first : shown[at]!));
+      take.forEach(
+        (_, at) => (shown[at] = apart[first]![at]! <= this.settings.alike_distance ? first : shown[at]!),
+      );
       const order = [...take.keys()].sort((a, b) => shown[a]! - shown[b]! || a - b);
       let [sum, k] = [0, 0];
       while (k < end && (sum += this.particular[take[order[k]!]!]!) < enough) k++;
-      for (let last = Math.max(shown[order[k]!]! + 1, first + MEMORY.WHOLE); last <= end; last++) {
+      for (let last = Math.max(shown[order[k]!]! + 1, first + this.settings.act_steps); last <= end; last++) {
         spans.push([
-          last - first + MEMORY.UNLIKE * (edge(0, first) + Math.min(edge(0, last), edge(end, last))),
+          last -
+            first +
+            this.settings.edge_cost * (edge(0, first) + Math.min(edge(0, last), edge(end, last))),
           first,
           last,
         ]);
@@ -262,7 +273,7 @@ export class Memory {
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
       const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
       const most = shown.reduce((a, b) => Math.max(a, b));
-      const good = starts.filter((_, at) => shown[at]! >= MEMORY.GOOD * most);
+      const good = starts.filter((_, at) => shown[at]! >= this.settings.good_start * most);
       entries.push(good[Math.floor(good.length / 2)]!);
       while (at < all.length && all[at]! <= last) at++;
     }
@@ -288,12 +299,13 @@ export class Memory {
   ): number {
     const off = new Float64Array(rows.length);
     for (let at = 0; at < rows.length; at++) {
-      const later = MEMORY.LATER * (ages[at]! - age) ** 2;
-      off[at] = this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, MEMORY.LATEST));
+      const later = this.settings.age_cost * (ages[at]! - age) ** 2;
+      off[at] =
+        this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, this.settings.age_cost_limit));
     }
     const least = off.reduce((a, b) => Math.min(a, b));
     let sum = 0;
-    const shares = off.map((value) => (sum += Math.exp((least - value) / MEMORY.NEAR)));
+    const shares = off.map((value) => (sum += Math.exp((least - value) / this.settings.distance_scale)));
     return rows[shares.findIndex((share) => share > uniform * sum)] ?? rows.at(-1)!;
   }
 
@@ -305,7 +317,7 @@ export class Memory {
 
   private distance(row: number, recent: Float32Array[]): number {
     let sum = 0;
-    for (let back = 0; back < MEMORY.PAST.length; back++) {
+    for (let back = 0; back < this.settings.past_steps; back++) {
       const seen = recent[Math.min(back, recent.length - 1)]!;
       const remembered = this.past(row, back);
       let apart = 0;
@@ -313,7 +325,7 @@ export class Memory {
         const off = remembered[at]! - seen[at]!;
         apart += off * off;
       }
-      sum += MEMORY.PAST[back]! * apart;
+      sum += this.settings.past_fading ** back * apart;
     }
     return sum;
   }

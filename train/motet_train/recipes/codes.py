@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from motet.generate.memory import Memory, MemorySettings, squared_distances
 from motet.representation.base import FrameMirror
 from motet_train.data.acts import acts
 from motet_train.data.batches import frame_mirror
@@ -34,6 +35,12 @@ DRAWING: dict[str, Any] = {
     "first_temperature": 0.7,
     "max_seconds": 30.0,
 }
+
+ALIKE_PAIRS = 0.2018
+"""Share of the pairs of steps within long recordings that count as alike."""
+
+MEASURED_RECORDINGS = 1000
+"""Long recordings in which the distances of steps are measured, at most."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,34 @@ def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions:
     about = manifest(job, found, asdict(net.config), data, by)
     about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
     about["training"] |= {"codec": _made(codec.manifest["training"]), "actions": _made(actions.manifest["training"])}
-    return job.run(net, learner, about)
+    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(shown)),))
+
+
+def memory_settings(tables: Mapping[str, NDArray[Any]], actions: int) -> MemorySettings:
+    """The settings of a memory, from the tables of a bundle and the number of actions.
+
+    Only ``alike_distance`` depends on the codec: it is found by :func:`alike_distance`. Shares of movement do not, and
+    the other distances are left as they are, since every codec keeps its numbers between -1 and 1 and spread.
+    """
+    memory = Memory.of(tables["memory"], tables["moves"], tables["body"], actions)
+    return replace(memory.settings, alike_distance=alike_distance(memory))
+
+
+def alike_distance(memory: Memory) -> float:
+    """The squared distance, to three digits, within which the share :data:`ALIKE_PAIRS` of the pairs of steps is that
+    long recordings have; the memory's own setting where it has no recording longer than an act."""
+    lengthy = []
+    for action in memory.rows:
+        for recording in memory.recordings(action):
+            if len(recording.places) - 1 > memory.settings.act_steps:
+                lengthy.append(memory.keys[action][recording.places])
+    if not lengthy:
+        return memory.settings.alike_distance
+    distances = []
+    for keys in lengthy[:: -(-len(lengthy) // MEASURED_RECORDINGS)]:
+        distances.append(squared_distances(keys)[np.triu_indices(len(keys), 1)])
+    alike = float(np.quantile(np.concatenate(distances), ALIKE_PAIRS))
+    return max(float(f"{alike:.3g}"), MemorySettings.RANGES["alike_distance"][1].low)
 
 
 def _made(training: Mapping[str, Any]) -> dict[str, Any]:
