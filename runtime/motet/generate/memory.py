@@ -75,8 +75,8 @@ class MemorySettings(Settings):
     """Fewest steps from the first to the last of an act, 6 s with the shipped codec: shorter recordings are one act."""
 
     alike_distance: SquaredDistance = 8.03
-    """Places that are no farther apart show the same. It depends on the codec: the recipe measures it (docs/reference/bundle.md)
-    and the default is that of the shipped one."""
+    """Places that are no farther apart show the same. It depends on the codec: training measures it for a codec
+    (docs/reference/bundle.md), and the default is that of the shipped one."""
 
     edge_cost: Annotated[float, Range(0, 10_000, "steps")] = 30
     """Steps by which an act may be longer in order to begin, or end, as its recording does."""
