@@ -32,8 +32,7 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     asf: the skeleton; if not given, the file of the same stem, else of the same subject (``39.asf`` for
         ``39_14.amc``), else the only ASF file, looked for beside the motion and then in ``../asf``.
     fps: AMC does not state it. Default: the file's comment ``# fps 60`` (motet writes one) or its line
-        ``:SAMPLES-PER-SECOND 60``, else 120, the rate of
-        nearly all of CMU. A comment that contradicts it is an error.
+        ``:SAMPLES-PER-SECOND 60``, else 120, the rate of nearly all of CMU. A comment that contradicts it is an error.
     partial: read the complete frames of a file whose last frame is truncated instead of refusing it.
     Channels come in the file's order of bones, units "length" for translations, "deg" or "rad" as in the file.
     FormatError names the file, and the line where it is cut or wrong.
@@ -43,8 +42,8 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     if asf is None and not isinstance(file, str | Path):
         raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
-    header, unit, said = _header(path, lines, skeleton)
-    text.check_rate(path, said, fps)
+    header, unit, stated_fps = _header(path, lines, skeleton)
+    text.check_rate(path, stated_fps, fps)
     layout = _layout(path, words_of(lines, header), skeleton.dofs)
     try:
         values = _values(path, lines, header, layout)
@@ -54,10 +53,14 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
             raise
         values = _values(path, lines[:last], header, layout)
         log.info("%s: the last frame is truncated and was left out", path)
-    channels = [(bone, dof) for bone, _ in layout for dof in skeleton.dofs[bone]]
-    units = tuple("length" if dof[0] == "t" else unit for _, dof in channels)
-    fps = text.frame_rate(next((rate for rate in (said, fps) if rate is not None), 120.0), path)
-    return Motion(values, tuple(map(".".join, channels)), units, fps, skeleton.skeleton)
+    channels = []
+    units = []
+    for bone, _ in layout:
+        for dof in skeleton.dofs[bone]:
+            channels.append(f"{bone}.{dof}")
+            units.append("length" if dof[0] == "t" else unit)
+    rates = [rate for rate in (stated_fps, fps, 120.0) if rate is not None]
+    return Motion(values, tuple(channels), tuple(units), text.frame_rate(rates[0], path), skeleton.skeleton)
 
 
 def skeleton_for(stem: str, skeletons: Mapping[str, T]) -> T | None:
@@ -74,10 +77,10 @@ def _find_asf(path: Path) -> Path:
     stems = dict.fromkeys([path.stem, path.stem.split("_")[0]])
     for folder in (path.parent, path.parent.parent / "asf"):
         try:
-            found = sorted(f for f in folder.iterdir() if f.suffix.lower() == ".asf") if folder.is_dir() else []
+            files = sorted(folder.iterdir()) if folder.is_dir() else []
         except OSError as error:
             raise FormatError(path, f"cannot look for a skeleton in {folder}: {error.strerror}") from error
-        if skeleton := skeleton_for(path.stem, {file.stem: file for file in found}):
+        if skeleton := skeleton_for(path.stem, {file.stem: file for file in files if file.suffix.lower() == ".asf"}):
             return skeleton
     names = " or ".join(f"{stem}.asf" for stem in stems)
     raise FormatError(path, f"no skeleton found: expected {names}, or a single .asf, beside it or in ../asf")
@@ -126,28 +129,37 @@ def _values(path: Path, lines: list[str], header: int, layout: Layout) -> Array:
     plain = _plain_values(lines[header:], layout)
     if plain is not None:
         return plain
-    frame = [("", 0), *layout]
-    found: list[str] = []
+    frame = [("", 0), *layout]  # the lines of a frame: its number, and a line for each bone
+    words_of_values: list[str] = []
     at = line = frames = 0
     for line, words in words_of(lines, header):
-        (bone, count), is_number = frame[at], _is_frame_number(words)
+        bone, count = frame[at]
+        is_number = _is_frame_number(words)
         if at and is_number:
             break
-        if (words[0] != bone) if at else not is_number:
+        is_expected = words[0] == bone if at else is_number
+        if not is_expected:
             wanted = f"bone {bone!r}" if at else "a frame number"
             raise FormatError(path, f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
         if len(words) - 1 != count:
             raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
-        found += words[1:]
-        at, frames = (at + 1) % len(frame), frames + (at == 0)
+        words_of_values += words[1:]
+        frames += at == 0
+        at = (at + 1) % len(frame)
     if at:
         raise FormatError(path, f"truncated frame: bone {frame[at][0]!r} is missing", line)
-    values = text.finite(found)
-    if values is None:  # the line at fault is found
-        values = np.array(
-            [value for line, words in words_of(lines, header) for value in text.numbers(words[1:], path, line)]
-        )
+    values = text.finite(words_of_values)
+    if values is None:
+        values = np.array(_checked_numbers(path, lines, header))
     return values.reshape(frames, sum(count for _, count in layout))
+
+
+def _checked_numbers(path: Path, lines: list[str], header: int) -> list[float]:
+    """All values, line by line; FormatError names the line at fault."""
+    values: list[float] = []
+    for line, words in words_of(lines, header):
+        values += text.numbers(words[1:], path, line)
+    return values
 
 
 def _plain_values(lines: list[str], layout: Layout) -> Array | None:

@@ -38,32 +38,46 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
     path = place_of(file)
     lines = text.read_text(file).split("\n")
     figures, motion_line = _hierarchy(path, lines)
-    names = _figure_names(figures)
-    chosen = text.chosen(path, names, figure, "figure")
+    number = text.chosen(path, _figure_names(figures), figure, "figure")
     start, declared, fps = _motion_header(path, lines, motion_line)
     widths = [sum(len(node.channels) for node in nodes) for nodes in figures]
     width = sum(widths)
     # without channels nothing else confirms the number
     if not width and declared > 10**7:
         raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
-    if partial:  # leave out an incomplete last frame
-        last = max((n for n in range(start, len(lines)) if lines[n].strip()), default=start)
-        if last < len(lines) and len(lines[last].split()) != width:
-            lines = lines[:last]
+    if partial:
+        lines = _complete_lines(lines, start, width)
     values = _values(path, lines, start, width) if width else np.zeros((declared, 0))
-    if len(values) < declared and not partial:
-        reason = f"the file declares {declared} frames but holds {len(values)}: correct the line 'Frames:'"
-        raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", start)
-    if len(values) < declared:
-        log.info("%s: read %d of the declared %d frames", path, len(values), declared)
-    elif len(values) > declared:
-        log.warning("%s: it declares %d frames but holds %d: read them all", path, declared, len(values))
-    nodes = figures[chosen]
-    first_column = sum(widths[:chosen])
-    values = values[:, first_column : first_column + widths[chosen]]
-    channels = [f"{node.name}.{kind}" for node in nodes for kind in node.channels]
+    _check_count(path, len(values), declared, partial, start)
+    # the columns of this figure among those of all
+    first_column = sum(widths[:number])
+    values = values[:, first_column : first_column + widths[number]]
+    nodes = figures[number]
+    channels = []
+    for node in nodes:
+        channels += [f"{node.name}.{kind}" for kind in node.channels]
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
     return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
+
+
+def _complete_lines(lines: list[str], start: int, width: int) -> list[str]:
+    """The lines without a last frame that has not all of its values."""
+    last = len(lines) - 1
+    while last > start and not lines[last].strip():
+        last -= 1
+    is_cut = len(lines) > last and len(lines[last].split()) != width
+    return lines[:last] if is_cut else lines
+
+
+def _check_count(path: Path, held: int, declared: int, partial: bool, line: int) -> None:
+    """FormatError where fewer frames are held than declared, unless ``partial``; other differences are logged."""
+    if held < declared and not partial:
+        reason = f"the file declares {declared} frames but holds {held}: correct the line 'Frames:'"
+        raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", line)
+    if held < declared:
+        log.info("%s: read %d of the declared %d frames", path, held, declared)
+    elif held > declared:
+        log.warning("%s: it declares %d frames but holds %d: read them all", path, declared, held)
 
 
 def contents(file: File) -> text.Contents:
@@ -94,47 +108,79 @@ def _joint(path: Path, node: _Node) -> Joint:
 
 def _hierarchy(path: Path, lines: list[str]) -> tuple[list[list[_Node]], int]:
     """The joints of each ROOT, and the number of the line MOTION after them."""
-    figures: list[list[_Node]] = []
-    nodes: list[_Node] = []
-    open_nodes: list[int] = []
-    names = text.Names()
-    declared = False  # a joint has been named and its brace must follow
-    pieces = ((line, piece.strip()) for line, content in enumerate(lines, 1) for piece in re.split("([{}])", content))
-    for line, statement in ((line, piece) for line, piece in pieces if piece):
+    hierarchy = _Hierarchy(path)
+    for line, content in enumerate(lines, 1):
+        for piece in re.split("([{}])", content):
+            if not (statement := piece.strip()):
+                continue
+            if hierarchy.is_complete() and statement.lower().split()[0] == "motion":
+                return hierarchy.figures, line
+            hierarchy.take(statement, line)
+    raise FormatError(path, "not a BVH file, or truncated: the line MOTION is missing")
+
+
+class _Hierarchy:
+    """The joints of the statements that were taken, one after the other.
+
+    figures: the joints of each ROOT. open_nodes: of the last one, those whose brace is open. is_declared: whether a
+    joint has been named and its brace must follow.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.figures: list[list[_Node]] = []
+        self.open_nodes: list[int] = []
+        self.is_declared = False
+        self.names = text.Names()
+
+    def is_complete(self) -> bool:
+        """Whether the line MOTION may follow."""
+        return bool(self.figures) and not self.open_nodes and not self.is_declared
+
+    def take(self, statement: str, line: int) -> None:
+        """Take a statement or brace; FormatError if it does not belong here."""
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
         match keyword.lower():
             case "root" | "joint" | "end" as kind:
-                if declared or bool(open_nodes) == (kind == "root"):
-                    reason = f"{quoted(statement)} does not belong here: expected trees of joints"
-                    raise FormatError(path, reason, line)
-                if kind == "root":
-                    nodes = []
-                    figures.append(nodes)
-                    names = text.Names()
-                parent = open_nodes[-1] if open_nodes else -1
-                wanted = nodes[parent].name + END_SUFFIX if kind == "end" else rest.strip() or "joint"
-                nodes.append(_Node(names.unique(wanted), parent, line))
-            case "{" if declared:
-                open_nodes.append(len(nodes) - 1)
-            case "}" if open_nodes and not declared:
-                open_nodes.pop()
-            case "offset" if open_nodes and not declared:
-                nodes[open_nodes[-1]].offset = text.triple(rest.split(), path, line)
-            case "channels" if open_nodes and not declared:
-                nodes[open_nodes[-1]].channels = _channels(path, rest.split(), line)
-            case "motion" if nodes and not open_nodes and not declared:
-                return figures, line
-            case "hierarchy" if not nodes:
+                self._add(kind, rest.strip(), statement, line)
+                return
+            case "{" if self.is_declared:
+                self.open_nodes.append(len(self.figures[-1]) - 1)
+            case "}" if self.open_nodes and not self.is_declared:
+                self.open_nodes.pop()
+            case "offset" if self.open_nodes and not self.is_declared:
+                self._open_node().offset = text.triple(rest.split(), self.path, line)
+            case "channels" if self.open_nodes and not self.is_declared:
+                self._open_node().channels = _channels(self.path, rest.split(), line)
+            case "hierarchy" if not self.figures:
                 pass
             case _:
-                raise FormatError(path, f"{quoted(statement)} does not belong here", line)
-        declared = keyword.lower() in ("root", "joint", "end")
-    raise FormatError(path, "not a BVH file, or truncated: the line MOTION is missing")
+                raise FormatError(self.path, f"{quoted(statement)} does not belong here", line)
+        self.is_declared = False
+
+    def _open_node(self) -> _Node:
+        return self.figures[-1][self.open_nodes[-1]]
+
+    def _add(self, kind: str, name: str, statement: str, line: int) -> None:
+        """Add a joint, or the end of one."""
+        if self.is_declared or bool(self.open_nodes) == (kind == "root"):
+            reason = f"{quoted(statement)} does not belong here: expected trees of joints"
+            raise FormatError(self.path, reason, line)
+        if kind == "root":
+            self.figures.append([])
+            self.names = text.Names()
+        parent = self.open_nodes[-1] if self.open_nodes else -1
+        if kind == "end":
+            name = self._open_node().name + END_SUFFIX
+        self.figures[-1].append(_Node(self.names.unique(name or "joint"), parent, line))
+        self.is_declared = True
 
 
 def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
     kinds = (("position", "t"), ("rotation", "r"))
-    known = {f"{axis}{kind}": f"{letter}{axis}" for kind, letter in kinds for axis in "xyz"}
+    known: dict[str, str] = {}
+    for kind, letter in kinds:
+        known |= {f"{axis}{kind}": f"{letter}{axis}" for axis in "xyz"}
     if unknown := [word for word in words[1:] if word.lower() not in known]:
         reason = f"channel {quoted(unknown[0])}: expected one of Xposition ... Zposition, Xrotation ... Zrotation"
         raise FormatError(path, reason, line)
@@ -150,11 +196,11 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
     frames = None
     fps = None
     for line, content in enumerate(lines[motion_line:], start=motion_line + 1):
-        found = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", content, re.IGNORECASE)
-        if found and found[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", found[2]):
-            frames = int(found[2])
-        elif found and found[1].lower() != "frames":
-            fps = _fps(path, found[2], line)
+        entry = re.fullmatch(r"\s*(frames|frame\s+time)\s*:\s*(\S+)\s*", content, re.IGNORECASE)
+        if entry and entry[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", entry[2]):
+            frames = int(entry[2])
+        elif entry and entry[1].lower() != "frames":
+            fps = _fps(path, entry[2], line)
         elif content.strip():
             reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(content.strip())}"
             raise FormatError(path, reason, line)
@@ -204,21 +250,23 @@ def write(file: File, motion: Motion) -> None:
     lines, joints = _tree(motion, translated)
     translations = local_translations(motion)
     angles = _zyx_degrees(motion)
-    blocks = [block[:, i] for i in joints for block in ((translations, angles) if i in translated else (angles,))]
+    blocks = []
+    for i in joints:
+        blocks += [translations[:, i], angles[:, i]] if i in translated else [angles[:, i]]
     rows = np.concatenate(blocks, axis=1)
     if not np.isfinite(rows).all():
         raise MotionError("values of this motion are too large to convert")
-    lines = ["HIERARCHY", *lines, "MOTION", f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
-    write_whole(file, "\n".join([*lines, *(" ".join(map(repr, row)) for row in rows.tolist()), ""]))
+    head = ["HIERARCHY", *lines, "MOTION", f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
+    frames = [" ".join(map(repr, row)) for row in rows.tolist()]
+    write_whole(file, "\n".join([*head, *frames, ""]))
 
 
 def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
     """The lines of the hierarchy, and the joints written as ROOT or JOINT in their order; others are End Sites."""
     skeleton = skeleton_of(motion)
-    moved = {channel.rpartition(".")[0] for channel in motion.channels}
     lines: list[str] = []
     joints: list[int] = []
-    waiting: list[tuple[int | None, int]] = [(0, 0)]
+    waiting: list[tuple[int | None, int]] = [(0, 0)]  # joints, or None for a closing brace, and their depth
     while waiting:
         i, depth = waiting.pop()
         indent = "\t" * min(depth, 40)  # so that a long chain of joints does not make a huge file
@@ -226,21 +274,36 @@ def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
             lines.append(indent + "}")
             continue
         joints.append(i)
-        children = [skeleton.joints[child] for child in skeleton.children[i]]
-        lone = [c.name for c in children if c.name.endswith(END_SUFFIX) and c.name not in moved]
-        is_last = not children or (len(children) == len(lone) == 1 and not skeleton.children[skeleton.children[i][0]])
-        offset = skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
-        kinds = "6 Xposition Yposition Zposition" if i in translated else "3"
-        kind = "JOINT" if i else "ROOT"
-        channels = f"\tCHANNELS {kinds} Zrotation Yrotation Xrotation"
-        start = (f"{kind} {skeleton.joints[i].name}", "{", f"\tOFFSET {text.spaced(offset)}", channels)
-        lines += [indent + line for line in start]
-        if is_last:
-            tip = children[0].offset if children else (0.0, 0.0, 0.0)
-            lines += [f"{indent}\t{line}" for line in ("End Site", "{", f"\tOFFSET {text.spaced(tip)}", "}")]
+        is_last = _is_last(motion, i)
+        lines += [indent + line for line in _joint_lines(skeleton, i, i in translated, is_last)]
         waiting.append((None, depth))
-        waiting += [(child, depth + 1) for child in reversed(skeleton.children[i]) if not is_last]
+        if not is_last:
+            waiting += [(child, depth + 1) for child in reversed(skeleton.children[i])]
     return lines, joints
+
+
+def _is_last(motion: Motion, i: int) -> bool:
+    """Whether a joint has an End Site instead of joints below it."""
+    skeleton = skeleton_of(motion)
+    children = skeleton.children[i]
+    if len(children) != 1:
+        return not children
+    child = skeleton.joints[children[0]]
+    is_moved = any(channel.rpartition(".")[0] == child.name for channel in motion.channels)
+    return child.name.endswith(END_SUFFIX) and not is_moved and not skeleton.children[children[0]]
+
+
+def _joint_lines(skeleton: Skeleton, i: int, is_translated: bool, is_last: bool) -> list[str]:
+    """The lines of a joint, without its closing brace."""
+    offset = skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
+    positions = "6 Xposition Yposition Zposition" if is_translated else "3"
+    lines = [f"{'JOINT' if i else 'ROOT'} {skeleton.joints[i].name}", "{", f"\tOFFSET {text.spaced(offset)}"]
+    lines.append(f"\tCHANNELS {positions} Zrotation Yrotation Xrotation")
+    if is_last:
+        children = skeleton.children[i]
+        tip = skeleton.joints[children[0]].offset if children else (0.0, 0.0, 0.0)
+        lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {text.spaced(tip)}", "\t}"]
+    return lines
 
 
 def _zyx_degrees(motion: Motion) -> Array:

@@ -17,6 +17,7 @@ from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
 from motet.formats.text import frame_rate, number, numbers, read_text
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 
 COMMENT = "# motet motion, fps "
 
@@ -33,9 +34,9 @@ def read(file: File) -> Motion:
         for row in reader:
             if not row or row[0].startswith("#"):
                 comment = ",".join(row)
-                line = reader.line_num
                 if comment.startswith(COMMENT):
-                    fps = frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
+                    rate = number(comment.removeprefix(COMMENT), path, reader.line_num)
+                    fps = frame_rate(rate, path, reader.line_num)
             elif not header:
                 header = row
                 channels = _channels(path, header)
@@ -48,24 +49,30 @@ def read(file: File) -> Motion:
     if not header:
         raise _no_header(path)
     table = np.array(values).reshape(-1, len(header))
-    if fps is None:
-        steps = np.diff(table[:, 0])
-        if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
-            raise FormatError(path, f"times are not evenly spaced: add a comment line '{COMMENT}30'")
-        fps = frame_rate(float(1 / steps.mean()), path)
-    return Motion(table[:, 1:], tuple(match[1] for match in channels), tuple(match[2] for match in channels), fps)
+    fps = _rate_of_times(path, table[:, 0]) if fps is None else fps
+    names = tuple(channel[1] for channel in channels)
+    units = tuple(channel[2] for channel in channels)
+    return Motion(table[:, 1:], names, units, fps)
+
+
+def _rate_of_times(path: Path, times: Array) -> float:
+    """The frame rate of times (T,) in seconds; FormatError where they are not evenly spaced."""
+    steps = np.diff(times)
+    if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
+        raise FormatError(path, f"times are not evenly spaced: add a comment line '{COMMENT}30'")
+    return frame_rate(float(1 / steps.mean()), path)
 
 
 def _channels(path: Path, header: Sequence[str]) -> list[re.Match[str]]:
     """The channels of a header, each with its unit; FormatError for another header."""
-    found = [match for title in header[1:] if (match := re.fullmatch(r"(.+) \[(.+)\]", title))]
+    channels = [channel for title in header[1:] if (channel := re.fullmatch(r"(.+) \[(.+)\]", title))]
     if header[0] == "Format Version":
         raise FormatError(path, "this is a table of Motive, which has no skeleton: export BVH or FBX there")
     if len(header) == 1 and ";" in header[0]:
         raise FormatError(path, "its columns are separated by semicolons: expected commas, and decimals with a point")
-    if header[0] != "time" or len(found) < len(header) - 1:
+    if header[0] != "time" or len(channels) < len(header) - 1:
         raise _no_header(path)
-    return found
+    return channels
 
 
 def _no_header(path: Path) -> FormatError:
