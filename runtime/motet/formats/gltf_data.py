@@ -130,17 +130,24 @@ class Gltf:
         nodes: the nodes to fill, including all their ancestors; all by default. Others are not filled.
         """
         tracks = tracks or {}
-        count = len(next(iter(tracks.values()), [0]))
+        frames = len(next(iter(tracks.values()), [0]))
+        linear = frames_last((frames, len(self.parents), 3, 3))
+        turns = frames_last((frames, len(self.parents), 3, 3))
+        places = frames_last((frames, len(self.parents), 3))
         wanted = self.order if nodes is None else set(nodes)
-        linear, turns = (frames_last((count, len(self.parents), 3, 3)) for _ in range(2))
-        places = frames_last((count, len(self.parents), 3))
-        for node in (node for node in self.order if node in wanted):
-            move, quat, scale = (tracks.get((node, name), rest) for name, rest in self.local(node).items())
+        for node in self.order:
+            if node not in wanted:
+                continue
+            # the node in its parent
+            properties = {name: tracks.get((node, name), rest) for name, rest in self.local(node).items()}
+            quat = properties["rotation"]
             turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
-            linear[:, node] = turn * scale[..., None, :]
+            linear[:, node] = turn * properties["scale"][..., None, :]
             turns[:, node] = turn
-            places[:, node] = move
-            if (parent := self.parents[node]) >= 0:
+            places[:, node] = properties["translation"]
+            # and in the world, where its parent, which comes before it, already is
+            parent = self.parents[node]
+            if parent >= 0:
                 places[:, node] = places[:, parent] + rotated(linear[:, parent], places[:, node])
                 linear[:, node] = product(linear[:, parent], linear[:, node])
                 turns[:, node] = product(turns[:, parent], turns[:, node])
@@ -239,10 +246,10 @@ class Gltf:
             raise FormatError(self.path, reason)
         decode = import_module("meshopt").decode_gltf_buffer
         try:
-            found: bytes = decode(content, count, stride, packed["mode"], packed.get("filter")).tobytes()
+            unpacked: bytes = decode(content, count, stride, packed["mode"], packed.get("filter")).tobytes()
         except (ValueError, TypeError) as error:
             raise FormatError(self.path, f"a packed part is broken: {str(error)[:200]}") from error
-        return found
+        return unpacked
 
 
 def parse(file: File) -> Gltf:
@@ -259,27 +266,32 @@ def parse(file: File) -> Gltf:
         raise FormatError(path, f"glTF version {str(version)[:20]}: expected 2.0")
     if len(document.get("nodes", [])) > MAX_NODES:
         raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
+    beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
+    return Gltf(path, document, _buffers(path, document, binary, beside), beside)
+
+
+def _buffers(path: Path, document: Mapping[str, Any], binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
+    """The contents of all buffers; FormatError for sizes out of range."""
     buffers = document.get("buffers", [])
     sizes = [buffer["byteLength"] for buffer in buffers]
     if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
         raise FormatError(path, f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
-    beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
-    return Gltf(path, document, tuple(_buffer(path, buffer, binary, beside) for buffer in buffers), beside)
+    return tuple(_buffer(path, buffer, binary, beside) for buffer in buffers)
 
 
 def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
     """The JSON text and the binary part of a GLB file."""
-    found: dict[bytes, bytes] = {}
+    chunks: dict[bytes, bytes] = {}
     place = 12
     while place + 8 <= len(content):
         length, kind = struct.unpack_from("<I4s", content, place)
         if place + 8 + length > len(content):
             raise FormatError(path, "truncated GLB file: it ends within a chunk")
-        found.setdefault(kind, content[place + 8 : place + 8 + length])
+        chunks.setdefault(kind, content[place + 8 : place + 8 + length])
         place += 8 + length
-    if b"JSON" not in found:
+    if b"JSON" not in chunks:
         raise FormatError(path, "truncated GLB file: it has no JSON chunk")
-    return found[b"JSON"], found.get(b"BIN\0", b"")
+    return chunks[b"JSON"], chunks.get(b"BIN\0", b"")
 
 
 def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path | None) -> bytes:

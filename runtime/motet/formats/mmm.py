@@ -16,6 +16,7 @@ from motet.errors import FormatError
 from motet.files import File, place_of
 from motet.formats.text import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 
 MAX_DEPTH = 64
 MAX_ELEMENTS = 10**5
@@ -51,18 +52,24 @@ def read(file: File) -> Motion:
     if not joints or not count:
         raise FormatError(path, "not an MMM motion: expected a Motion with JointOrder and MotionFrames")
     rows = np.array(flat).reshape(count, -1)
-    # the file's angles are roll, pitch and yaw, R = Rz Ry Rx
-    (x, y, z), (roll, pitch, yaw) = rows[:, 1:4].T * 0.001, rows[:, 4:7].T
+    # the file is in millimetres, z up, and its angles are roll, pitch and yaw, R = Rz Ry Rx
+    x, y, z = rows[:, 1:4].T * 0.001
+    roll, pitch, yaw = rows[:, 4:7].T
     values = np.column_stack([-x, z, y, -roll, yaw, pitch, rows[:, 7:]])
     names = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz", *joints)
-    steps = np.diff(rows[:, 0])
+    units = ("m",) * 3 + ("rad",) * (3 + len(joints))
+    return Motion(values, names, units, _rate_of_times(path, rows[:, 0]))
+
+
+def _rate_of_times(path: Path, times: Array) -> float:
+    """The frame rate of times (T,) in seconds; FormatError where they are not evenly spaced."""
+    steps = np.diff(times)
     if not len(steps):
         raise FormatError(path, "cannot tell the frame rate from a single frame")
     uneven = np.flatnonzero(np.abs(steps - steps.mean()) > 0.5 * abs(steps.mean()))
     if steps.mean() <= 0 or len(uneven):
         raise FormatError(path, f"frame {uneven[0] + 1 if len(uneven) else 1}: the time steps are uneven")
-    fps = frame_rate(round(float(1 / steps.mean()), 3), path)
-    return Motion(values, names, ("m",) * 3 + ("rad",) * (3 + len(joints)), fps)
+    return frame_rate(round(float(1 / steps.mean()), 3), path)
 
 
 def motion_name(file: File) -> str:
@@ -135,13 +142,13 @@ class _Opened:
 
 def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> list[float]:
     """Time step, root position and rotation, and the joints' angles of one frame."""
-    found: list[float] = []
+    values: list[float] = []
     for tag, count in {"Timestep": 1, "RootPosition": 3, "RootRotation": 3, "JointPosition": joints}.items():
         words = (element.findtext(tag) or "").split()
         if len(words) != count:
             raise FormatError(path, f"frame {number}: {tag} needs {count} values, not {len(words)}")
         try:
-            found += numbers(words, path, None)
+            values += numbers(words, path, None)
         except FormatError as error:
             raise FormatError(path, f"frame {number}: {tag}: {error.reason}") from error
-    return found
+    return values

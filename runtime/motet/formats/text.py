@@ -194,18 +194,11 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
     translation of one of its joints.
     """
     skeleton = skeleton_of(motion)
-    allowed = {f"r{axis}": (*TURN,) for axis in AXES} | {f"t{axis}": ("length", "m") for axis in AXES}
-    parts = [(name, *name.rpartition(".")[::2]) for name in motion.channels]
-    bad = [
-        f"{name} [{unit}]"
-        for (name, joint, kind), unit in zip(parts, motion.units, strict=True)
-        if joint not in skeleton.places or unit not in allowed.get(kind, ())
-    ]
-    if bad:
-        raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(bad)}")
-    translations = local_translations(motion)
-    moved = {joint for _, joint, kind in parts if kind[0] == "t"}
+    _check_channels(path, motion)
     joints = list(skeleton.joints)
+    translations = local_translations(motion)
+    moved = {channel.rpartition(".")[0] for channel in motion.channels if channel[-2] == "t"}
+    # a translation that stays is an offset
     moving = []
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         if joint.name in moved and len(motion):
@@ -215,16 +208,34 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
                 x, y, z = translations[0, i].tolist()
                 joints[i] = replace(joint, offset=(x, y, z))
     translated = (skeleton.names[0], *moving)
-    still = motion.select(tuple(name for name, joint, kind in parts if kind[0] == "r" or joint in translated))
+    kept = []
+    for channel in motion.channels:
+        joint_name, _, kind = channel.rpartition(".")
+        if kind[0] == "r" or joint_name in translated:
+            kept.append(channel)
+    still = motion.select(tuple(kept))
     units = tuple("length" if unit == "m" else unit for unit in still.units)
     still = still.select(still.channels, units)
     return replace(still, skeleton=Skeleton(tuple(joints), skeleton.metres_per_unit)), tuple(moving)
 
 
-def part_names(given: Iterable[str], kind: str = "clip") -> tuple[str, ...]:
+def _check_channels(path: str | Path, motion: Motion) -> None:
+    """FormatError for channels that are neither an Euler angle nor a translation of a joint."""
+    skeleton = skeleton_of(motion)
+    units_of = {f"r{axis}": (*TURN,) for axis in AXES} | {f"t{axis}": ("length", "m") for axis in AXES}
+    wrong = []
+    for channel, unit in zip(motion.channels, motion.units, strict=True):
+        joint, _, kind = channel.rpartition(".")
+        if joint not in skeleton.places or unit not in units_of.get(kind, ()):
+            wrong.append(f"{channel} [{unit}]")
+    if wrong:
+        raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(wrong)}")
+
+
+def part_names(names_in_file: Iterable[str], kind: str = "clip") -> tuple[str, ...]:
     """Unique names for a file's clips or figures, in order: printable and on one line, "clip3" for an empty third."""
     names = Names()
-    return tuple(names.unique(_tidy(name) or f"{kind}{i}") for i, name in enumerate(given, start=1))
+    return tuple(names.unique(_tidy(name) or f"{kind}{i}") for i, name in enumerate(names_in_file, start=1))
 
 
 def _tidy(name: str) -> str:
