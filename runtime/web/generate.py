@@ -22,59 +22,58 @@ from motet.settings import Settings
 
 TARGET = Path(__file__).parent / "src/generated.ts"
 
-MODULES = {
-    "BUNDLE": "motet.bundle.bundle",
-    "FIELDS": "motet.bundle.fields",
-    "GRAPH_SAFETY": "motet.bundle.graph_safety",
-    "MANIFEST": "motet.bundle.manifest",
-    "MEMBERS": "motet.bundle.members",
-    "WORDS": "motet.decode.beam",
-    "CONTACTS": "motet.figures.feet.contacts",
-    "HOLD": "motet.figures.feet.hold",
-    "TREADMILL": "motet.figures.feet.treadmill",
-    "ALIGNMENT": "motet.figures.humanoid.alignment",
-    "MEASURE": "motet.figures.humanoid.measure",
-    "RETARGET": "motet.figures.humanoid.retarget",
-    "TWO_BONES": "motet.figures.two_bones",
-    "GLTF": "motet.formats.gltf",
-    "GLTF_DATA": "motet.formats.gltf_data",
-    "TEXT": "motet.formats.text",
-    "CODEC": "motet.generate.codec",
-    "CODES": "motet.generate.codes",
-    "CONTINUE_CODES": "motet.generate.continue_codes",
-    "MEMORY": "motet.generate.memory",
-    "GENERATE_CODES": "motet.generate.model",
-    "BASE": "motet.models.control",
-    "DESCRIBE": "motet.models.describe",
-    "LANGUAGE": "motet.models.language",
-    "KNOWN": "motet.models.nearest_neighbour",
-    "ROTATIONS": "motet.motion.rotations",
-    "SKELETON": "motet.motion.skeleton",
-    "BETWEEN": "motet.predict.between",
-    "FREE_RUN": "motet.predict.free_run",
-    "PREDICT": "motet.predict.model",
-    "PLACED": "motet.representation.placed",
-    "SEARCH": "motet.search.model",
-    "NEAREST": "motet.search.nearest",
-    "ACTING": "motet.steering.action_layer",
-    "ACTS": "motet.steering.acts",
-    "ARRIVING": "motet.steering.arrival",
-    "APART": "motet.steering.avoidance",
-    "EVENTS": "motet.steering.events",
-    "LOCK": "motet.steering.foot_lock",
-    "STANDING": "motet.steering.idle",
-    "LOOKING": "motet.steering.look_layer",
-    "MATCHING": "motet.steering.matching",
-    "STEER": "motet.steering.model",
-    "LEADING": "motet.steering.path_following",
-    "REACHING": "motet.steering.reach_layer",
-    "STEERING_SETTINGS": "motet.steering.settings",
-    "GUIDED": "motet.steering.targets",
-    "WARPING": "motet.steering.warping",
-    "COMPOSITION": "motet.text.clauses",
-    "VOCABULARY": "motet.text.vocabulary",
-}
-"""Name of an object in TypeScript -> the module that has its constants."""
+MODULES = (
+    "motet.bundle.bundle",
+    "motet.bundle.fields",
+    "motet.bundle.graph_safety",
+    "motet.bundle.manifest",
+    "motet.bundle.members",
+    "motet.decode.beam",
+    "motet.figures.feet.contacts",
+    "motet.figures.feet.hold",
+    "motet.figures.feet.treadmill",
+    "motet.figures.humanoid.alignment",
+    "motet.figures.humanoid.measure",
+    "motet.figures.humanoid.retarget",
+    "motet.figures.two_bones",
+    "motet.formats.gltf",
+    "motet.formats.gltf_data",
+    "motet.formats.text",
+    "motet.generate.codec",
+    "motet.generate.codes",
+    "motet.generate.continue_codes",
+    "motet.generate.memory",
+    "motet.generate.model",
+    "motet.models.control",
+    "motet.models.describe",
+    "motet.models.language",
+    "motet.models.nearest_neighbour",
+    "motet.motion.rotations",
+    "motet.motion.skeleton",
+    "motet.predict.between",
+    "motet.predict.free_run",
+    "motet.predict.model",
+    "motet.representation.placed",
+    "motet.search.model",
+    "motet.search.nearest",
+    "motet.steering.action_layer",
+    "motet.steering.acts",
+    "motet.steering.arrival",
+    "motet.steering.avoidance",
+    "motet.steering.events",
+    "motet.steering.foot_lock",
+    "motet.steering.idle",
+    "motet.steering.look_layer",
+    "motet.steering.matching",
+    "motet.steering.model",
+    "motet.steering.path_following",
+    "motet.steering.reach_layer",
+    "motet.steering.settings",
+    "motet.steering.targets",
+    "motet.steering.warping",
+    "motet.text.clauses",
+    "motet.text.vocabulary",
+)
 
 
 def typescript() -> str:
@@ -82,20 +81,26 @@ def typescript() -> str:
     sources = [path.read_text("utf-8") for path in sorted(TARGET.parent.rglob("*.ts")) if path != TARGET]
     used = {name for source in sources for name in re.findall(r"\b[A-Z_]+\.[A-Z_]+\b|\b[a-z]\w+Settings\b", source)}
     parts = ["/* Written by runtime/web/generate.py: do not edit. Units stand in the modules of Python. */\n"]
-    for name, path in MODULES.items():
-        module = import_module(path)
+    for module in map(import_module, MODULES):
+        name = named(module)
         constants = list(constants_of(module, {use[1] for use in map(parted, used) if use[0] == name}))
         if constants:
-            parts += [f"\n// {path}\nexport const {name} = {{\n", *constants, "} as const;\n"]
+            parts += [f"\n// {module.__name__}\nexport const {name} = {{\n", *constants, "} as const;\n"]
         for title, kind in inspect.getmembers(module, inspect.isclass):
             label = title[0].lower() + title[1:]
             if label in used and kind.__module__ == module.__name__:
                 parts += [
-                    f"\n// {path}.{title}\nexport const {label} = {{\n",
+                    f"\n// {module.__name__}.{title}\nexport const {label} = {{\n",
                     *fields_of(kind),
                     "} as const;\n",
                 ]
     return "".join(parts)
+
+
+def named(module: ModuleType) -> str:
+    """The object of a module: MEMORY of motet.generate.memory, GENERATE of motet.generate.model."""
+    *_, room, name = module.__name__.split(".")
+    return (room if name == "model" else name).upper()
 
 
 def parted(name: str) -> tuple[str, str]:

@@ -184,7 +184,7 @@ export const memorySettings = {
 } as const;
 
 // motet.generate.model
-export const GENERATE_CODES = {
+export const GENERATE = {
   NEVER: -1000000000,
   STANDING: "a person stands still",
   STANDING_SECONDS: 0.8,
@@ -197,7 +197,7 @@ export const familiaritySettings = {
 } as const;
 
 // motet.models.control
-export const BASE = {
+export const CONTROL = {
   LARGEST_CROWD: 100000,
 } as const;
 
@@ -217,7 +217,7 @@ export const LANGUAGE = {
 } as const;
 
 // motet.models.nearest_neighbour
-export const KNOWN = {
+export const NEAREST_NEIGHBOUR = {
   LEFT: 1,
   NOTHING: "no human motion that it knows",
   RIGHT: -1,
@@ -286,7 +286,7 @@ export const nearestSettings = {
 } as const;
 
 // motet.steering.action_layer
-export const ACTING = {
+export const ACTION_LAYER = {
   FADED: 0.0001,
   LONGER: 1.75,
   METRE: 10,
@@ -313,7 +313,7 @@ export const actSettings = {
 } as const;
 
 // motet.steering.arrival
-export const ARRIVING = {
+export const ARRIVAL = {
   AHEAD: 0.3,
   BRAKES: 1.5,
   FACES: 0.13962634015954636,
@@ -327,7 +327,7 @@ export const ARRIVING = {
 } as const;
 
 // motet.steering.avoidance
-export const APART = {
+export const AVOIDANCE = {
   SIGHT: 5,
   SOON: 2,
   STRENGTH: 6,
@@ -341,7 +341,7 @@ export const EVENTS = {
 } as const;
 
 // motet.steering.foot_lock
-export const LOCK = {
+export const FOOT_LOCK = {
   LIFTS: 0.035,
 } as const;
 
@@ -356,7 +356,7 @@ export const footLockSettings = {
 } as const;
 
 // motet.steering.idle
-export const STANDING = {
+export const IDLE = {
   DEPTH: 0.021,
   LEAST: 0.001,
   PERIOD: 4,
@@ -369,7 +369,7 @@ export const STANDING = {
 } as const;
 
 // motet.steering.look_layer
-export const LOOKING = {
+export const LOOK_LAYER = {
   BEHIND: 2.6179938779914944,
   EYES: [0, 0.07, 0.08],
   HALF_LIFE: 0.18,
@@ -391,19 +391,19 @@ export const MATCHING = {
 } as const;
 
 // motet.steering.model
-export const STEER = {
+export const STEERING = {
   FEATURE_STEPS: 16,
   SPREAD_FROM: 32,
 } as const;
 
 // motet.steering.path_following
-export const LEADING = {
+export const PATH_FOLLOWING = {
   SUDDEN: 0.2,
   WAITS: 0.2,
 } as const;
 
 // motet.steering.reach_layer
-export const REACHING = {
+export const REACH_LAYER = {
   HALF_LIFE: 0.12,
   LEAP: 0.1,
   LEAST: 0.001,
@@ -452,7 +452,7 @@ export const steeringSettings = {
 } as const;
 
 // motet.steering.targets
-export const GUIDED = {
+export const TARGETS = {
   LARGEST_COMMAND: 1000000,
   LONGEST_PATH: 10000,
 } as const;
@@ -463,7 +463,7 @@ export const WARPING = {
 } as const;
 
 // motet.text.clauses
-export const COMPOSITION = {
+export const CLAUSES = {
   FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first", "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on", "or", "person", "she", "somebody", "someone", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your"],
 } as const;
 

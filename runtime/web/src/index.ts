@@ -1,18 +1,18 @@
-export { Bundle, type Manifest } from "./bundle.js";
+export { Bundle, type Manifest } from "./bundle/bundle.js";
 export { BundleError, ControlError, DecodingError, TextError } from "./errors.js";
-export type { Doing } from "./acting.js";
-export { type Act, actOf } from "./acts.js";
-export { ControlModel, type StartSettings } from "./control.js";
+export type { Doing } from "./steering/actionLayer.js";
+export { type Act, actOf } from "./steering/acts.js";
+export { ControlModel, type StartSettings } from "./steering/model.js";
 export {
   ControlSession,
   type ControlSnapshot,
   type SteeredPose,
   type Told,
   type Way,
-} from "./controlSession.js";
-export { DescribeModel, type Description, type DescribeSettings } from "./describe.js";
-export type { FigureEvent } from "./events.js";
-export { FillModel } from "./fill.js";
+} from "./steering/session.js";
+export { DescribeModel, type Description, type DescribeSettings } from "./models/describe.js";
+export type { FigureEvent } from "./steering/events.js";
+export { FillModel } from "./predict/fill.js";
 export {
   type Generated,
   GenerateModel,
@@ -22,19 +22,19 @@ export {
   type Story,
   type StorySettings,
   type Understood,
-} from "./generate.js";
-export type { Frames } from "./model.js";
-export { type AnyModel, load, release } from "./models.js";
-export { PredictModel } from "./predict.js";
-export { type Hit, SearchModel } from "./search.js";
-export { framesOf, type Pose, poser, posesOf } from "./poses.js";
-export { readBVH, toBVH } from "./bvh.js";
+} from "./generate/model.js";
+export type { Frames } from "./models/base.js";
+export { type AnyModel, load, release } from "./models/load.js";
+export { PredictModel } from "./predict/model.js";
+export { type Hit, SearchModel } from "./search/model.js";
+export { framesOf, type Pose, poser, posesOf } from "./representation/poses.js";
+export { readBVH, toBVH } from "./formats/bvh.js";
 export { FormatError, MotionError } from "./errors.js";
-export { framesFor, motionOf, plantFeet } from "./frames.js";
-export { toVRMA } from "./glbWrite.js";
-export { holdFeet } from "./hold.js";
-export { HUMANOID, isHumanoid } from "./humanoid.js";
-export { atRest, type Motion, resampled, type World, worldOf } from "./motion.js";
+export { framesFor, motionOf, plantFeet } from "./representation/frames.js";
+export { toVRMA } from "./formats/glb.js";
+export { holdFeet } from "./figures/feet/hold.js";
+export { HUMANOID, isHumanoid } from "./figures/humanoid/bones.js";
+export { atRest, type Motion, resampled, type World, worldOf } from "./motion/motion.js";
 export {
   type Figure,
   figureOf,
@@ -43,8 +43,8 @@ export {
   type Like,
   type NamedJoints,
   toHumanoid,
-} from "./retarget.js";
-export { type Joint, Skeleton } from "./skeleton.js";
-export { type Avatar, type Clip, toThree, type Track } from "./three.js";
-export { isInPlace, withTravel } from "./treadmill.js";
-export { clipsOf, readGLB } from "./gltfMotion.js";
+} from "./figures/humanoid/retarget.js";
+export { type Joint, Skeleton } from "./motion/skeleton.js";
+export { type Avatar, type Clip, toThree, type Track } from "./formats/three.js";
+export { isInPlace, withTravel } from "./figures/feet/treadmill.js";
+export { clipsOf, readGLB } from "./formats/gltf.js";

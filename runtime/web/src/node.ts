@@ -1,5 +1,5 @@
 /* What Node imports: the same functions, with ONNX Runtime's build for Node. */
-import { loadFrom } from "./runtime.js";
+import { loadFrom } from "./bundle/runtime.js";
 
 loadFrom(() => import("onnxruntime-web"));
 

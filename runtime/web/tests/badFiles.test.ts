@@ -13,7 +13,7 @@ import {
   Skeleton,
   toHumanoid,
 } from "../src/index.js";
-import { rateOf } from "../src/gltfMotion.js";
+import { rateOf } from "../src/formats/gltf.js";
 
 const mixamo = readFileSync("../../tests/runtime/skeletons/mixamo.bvh", "utf8");
 

@@ -1,6 +1,6 @@
 /* What every runtime has to give, in Node and in a browser: golden vectors, and answers that Python gave (python.json). */
-import { type NumberArray, rows } from "../src/arrays.js";
-import { Bundle, type TextTables } from "../src/bundle.js";
+import { type NumberArray, rows } from "../src/bundle/arrays.js";
+import { Bundle, type TextTables } from "../src/bundle/bundle.js";
 import {
   actOf,
   ControlModel,
@@ -13,9 +13,9 @@ import {
   type Told,
   type Way,
 } from "../src/index.js";
-import { framesOf } from "../src/poses.js";
-import { Recorded } from "../src/random.js";
-import { Vocabulary } from "../src/text.js";
+import { framesOf } from "../src/representation/poses.js";
+import { Recorded } from "../src/decode/random.js";
+import { Vocabulary } from "../src/text/vocabulary.js";
 import python from "./python.json";
 
 /** Reads the zip of a shipped bundle. */

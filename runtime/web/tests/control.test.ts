@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
 import { BundleError, ControlError, ControlModel, load, type Told } from "../src/index.js";
-import { Goals } from "../src/goals.js";
+import { Goals } from "../src/steering/goals.js";
 import { steeringSettings } from "../src/generated.js";
 import { settingsOf } from "../src/settings.js";
 

@@ -19,7 +19,7 @@ import {
   toVRMA,
   worldOf,
 } from "../src/index.js";
-import { TABLES } from "../src/tables.js";
+import { TABLES } from "../src/figures/humanoid/tables.js";
 
 interface Case {
   text?: string;

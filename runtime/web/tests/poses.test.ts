@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
 import { GenerateModel, load, poser, posesOf } from "../src/index.js";
-import { rotationOf, type Vector } from "../src/rotations.js";
+import { rotationOf, type Vector } from "../src/motion/rotations.js";
 
 /** A vector turned by a quaternion. */
 function turned([x, y, z, w]: [number, number, number, number], [a, b, c]: Vector): Vector {

@@ -14,9 +14,9 @@ import {
   type SearchModel,
   TextError,
 } from "../src/index.js";
-import { checkGraph } from "../src/graphSafety.js";
-import { Pcg64 } from "../src/random.js";
-import { openZip } from "../src/zip.js";
+import { checkGraph } from "../src/bundle/graphSafety.js";
+import { Pcg64 } from "../src/decode/random.js";
+import { openZip } from "../src/bundle/members.js";
 
 const bytes = async (name: string) => new Uint8Array(await readFile(`../motet/bundles/${name}.zip`));
 

@@ -14,7 +14,7 @@ import {
   resampled,
   withTravel,
 } from "../src/index.js";
-import { about, type Quaternion, type Vector, X } from "../src/rotations.js";
+import { about, type Quaternion, type Vector, X } from "../src/motion/rotations.js";
 import { close, equal } from "./cases.js";
 import python from "./python.json";
 

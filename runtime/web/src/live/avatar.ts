@@ -1,11 +1,11 @@
 /* Avatars: the mesh of a .vrm or .glb file, and its joints in the poses of the humanoid. */
 import { FormatError, MotionError } from "../errors.js";
-import { Gltf, inlined, type MeshPart, type Placed } from "../gltf.js";
-import { restOf } from "../gltfMotion.js";
-import { LEG_LENGTH } from "../humanoid.js";
-import { worldOf } from "../motion.js";
-import { type Figure as Measured, figureOf, fromHumanoid } from "../retarget.js";
-import { minus, plus, rotated, times, type Vector, X, Y, Z } from "../rotations.js";
+import { Gltf, inlined, type MeshPart, type Placed } from "../formats/gltfData.js";
+import { restOf } from "../formats/gltf.js";
+import { LEG_LENGTH } from "../figures/humanoid/bones.js";
+import { worldOf } from "../motion/motion.js";
+import { type Figure as Measured, figureOf, fromHumanoid } from "../figures/humanoid/retarget.js";
+import { minus, plus, rotated, times, type Vector, X, Y, Z } from "../motion/rotations.js";
 import { motionOf, type Shown } from "./figure.js";
 import type { Mesh, Primitive } from "./stage.js";
 

@@ -1,7 +1,7 @@
 /* Figures that go by themselves: they follow the first one, wander about, or go to a point. Metres, seconds, radians. */
 import { type Asked, type Figure, inRange } from "./figure.js";
-import { aside, keptApart } from "../apart.js";
-import type { ControlModel } from "../control.js";
+import { aside, keptApart } from "../steering/avoidance.js";
+import type { ControlModel } from "../steering/model.js";
 
 /** What figures keep between them, how far they go from the first one, and the room of one in the rows behind it. */
 const [ROOM, FAR, ROW, COLUMN] = [0.8, 9, 1, 0.9];

@@ -1,12 +1,12 @@
 /* Files that are dropped on the page: a motion that the figure does, or an avatar that it becomes. */
-import { readBVH } from "../bvh.js";
+import { readBVH } from "../formats/bvh.js";
 import { FormatError, MotionError } from "../errors.js";
-import { Gltf } from "../gltf.js";
-import { clipsOf, readGLB } from "../gltfMotion.js";
-import { isHumanoid } from "../humanoid.js";
-import { type Motion, resampled } from "../motion.js";
-import { toHumanoid } from "../retarget.js";
-import { wrapped } from "../springs.js";
+import { Gltf } from "../formats/gltfData.js";
+import { clipsOf, readGLB } from "../formats/gltf.js";
+import { isHumanoid } from "../figures/humanoid/bones.js";
+import { type Motion, resampled } from "../motion/motion.js";
+import { toHumanoid } from "../figures/humanoid/retarget.js";
+import { wrapped } from "../motion/springs.js";
 import { Avatar } from "./avatar.js";
 
 const LARGEST = 200e6;

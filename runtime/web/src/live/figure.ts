@@ -1,19 +1,19 @@
 /* The model of a live page, and its figures. */
-import { doing, type Doing } from "../acting.js";
-import { type Act, motionOf } from "../acts.js";
-import type { Going } from "../arriving.js";
-import { ControlModel } from "../control.js";
-import type { Manifest } from "../bundle.js";
-import { HUMANOID, SIDES } from "../humanoid.js";
-import { lead } from "../leading.js";
-import type { Tables } from "../matching.js";
-import { worldOf } from "../motion.js";
-import type { Pose as Ground } from "../planar.js";
-import type { Quaternion, Vector } from "../rotations.js";
-import { damped, dampedPath, dampingOf, wrapped } from "../springs.js";
+import { doing, type Doing } from "../steering/actionLayer.js";
+import { type Act, motionOf } from "../steering/acts.js";
+import type { Going } from "../steering/arrival.js";
+import { ControlModel } from "../steering/model.js";
+import type { Manifest } from "../bundle/bundle.js";
+import { HUMANOID, SIDES } from "../figures/humanoid/bones.js";
+import { lead } from "../steering/pathFollowing.js";
+import type { Tables } from "../steering/matching.js";
+import { worldOf } from "../motion/motion.js";
+import type { Pose as Ground } from "../motion/planar.js";
+import type { Quaternion, Vector } from "../motion/rotations.js";
+import { damped, dampedPath, dampingOf, wrapped } from "../motion/springs.js";
 import { type Packed, unpacked } from "./packing.js";
-import { standing, type Steered, tell, tick } from "../steered.js";
-import { between, type Played } from "../steering.js";
+import { standing, type Steered, tell, tick } from "../steering/steered.js";
+import { between, type Played } from "../steering/step.js";
 
 export { motionOf };
 

@@ -1,5 +1,5 @@
 /* Arrays of a page: gzipped, column by column, of each column first all first bytes; as motet/live/packing.py packs them. */
-import { halves } from "../arrays.js";
+import { halves } from "../bundle/arrays.js";
 
 const KINDS = {
   f4: Float32Array,

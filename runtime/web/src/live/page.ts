@@ -10,8 +10,8 @@ import { type GivenActs, Repertoire } from "./repertoire.js";
 import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
 import { stick } from "./stick.js";
-import { type Act, actOf, numbersOf } from "../acts.js";
-import type { Going } from "../arriving.js";
+import { type Act, actOf, numbersOf } from "../steering/acts.js";
+import type { Going } from "../steering/arrival.js";
 import { onceOf, orderOf, saysAll } from "./words.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */

@@ -1,6 +1,6 @@
 /* The last seconds of the steered figure as a file. */
-import { type Surface, toGLB, toVRMA } from "../glbWrite.js";
-import type { Played } from "../steering.js";
+import { type Surface, toGLB, toVRMA } from "../formats/glb.js";
+import type { Played } from "../steering/step.js";
 import { motionOf, shownOf } from "./figure.js";
 import { toGIF } from "./gif.js";
 import type { Scene } from "./scene.js";

@@ -1,6 +1,6 @@
 /* The acts that a page knows: motet/live/repertoire.py. */
-import { type Act, actOf } from "../acts.js";
-import type { ControlModel } from "../control.js";
+import { type Act, actOf } from "../steering/acts.js";
+import type { ControlModel } from "../steering/model.js";
 import { type Packed, unpacked } from "./packing.js";
 import { Phrases, wordsOf } from "./words.js";
 

@@ -1,6 +1,6 @@
 /* What is seen: figures as they are between two ticks, the ways they have gone and are asked to go, feet that stand. */
-import { SIDES } from "../humanoid.js";
-import type { Vector } from "../rotations.js";
+import { SIDES } from "../figures/humanoid/bones.js";
+import type { Vector } from "../motion/rotations.js";
 import { FEET, type Figure, type Shown } from "./figure.js";
 import type { Avatar } from "./avatar.js";
 import type { Body, Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";

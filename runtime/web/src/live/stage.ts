@@ -1,5 +1,5 @@
 /* What a page is given by the script that all pages share, motet/draw/stage.js: the view and what draws. */
-import type { Quaternion, Vector } from "../rotations.js";
+import type { Quaternion, Vector } from "../motion/rotations.js";
 
 /** Angles in degrees. dirty: something has changed that is to be drawn. */
 export interface View {

@@ -1,6 +1,6 @@
 /* What a typed sentence asks for: an order such as "run" or "turn left", or one of the acts that a page knows. */
-import { FUNCTION_WORDS, stem } from "../composition.js";
-import { corrected } from "../spelling.js";
+import { FUNCTION_WORDS, stem } from "../text/clauses.js";
+import { corrected } from "../text/spelling.js";
 import { type Net, usual } from "./crowd.js";
 import type { Figure } from "./figure.js";
 import { Order } from "./pilots.js";

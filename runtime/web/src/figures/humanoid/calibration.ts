@@ -1,0 +1,195 @@
+/* A of joints from frames, where the rest pose is no body's: docs/reference/retargeting.md, "Rest poses that do not stand". */
+import { ALIGNMENT } from "../../generated.js";
+import { frame, knownAxes, meanDirection, nearAxes } from "./alignment.js";
+import type { Body } from "./body.js";
+import { ARM, directionOf, LEG, SIDES } from "./bones.js";
+import type { World } from "../../motion/motion.js";
+import {
+  cross,
+  inverse,
+  minus,
+  normalised,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  STILL,
+  swing,
+  times,
+  unit,
+  type Vector,
+  X,
+  Y,
+  Z,
+} from "../../motion/rotations.js";
+
+/** A of all joints that are bones; alongAxes: whether joints have axes along bones and hinges. */
+export function calibrated(body: Body, world: World, alongAxes: boolean): Quaternion[] {
+  const calibration = new Calibration(body, world, alongAxes);
+  calibration.trunk();
+  SIDES.forEach((side, at) => {
+    calibration.leg(LEG.map((part) => side + part));
+    calibration.arm(
+      ARM.map((part) => side + part),
+      at ? -1 : 1,
+    );
+  });
+  return calibration.aligned;
+}
+
+class Calibration {
+  readonly aligned: Quaternion[];
+
+  constructor(
+    private readonly body: Body,
+    private readonly world: World,
+    private readonly alongAxes: boolean,
+  ) {
+    this.aligned = body.skeleton.joints.map(() => STILL);
+  }
+
+  private turnsOf(joint: number): Quaternion[] {
+    return this.world.turns.map((turned) => turned[joint]!);
+  }
+
+  /** Rotations of the humanoid's bone for a joint whose A is found. */
+  private turned(joint: number): Quaternion[] {
+    return this.turnsOf(joint).map((turn) => product(turn, this.aligned[joint]!));
+  }
+
+  private directions(bone: string): Vector[] {
+    return this.world.places.map((pose) => this.body.direction(pose, bone));
+  }
+
+  /** A from estimates of the bone's rotation: what the convention says, or near axes, or the mean. */
+  private settle(joint: number, turns: Quaternion[]): void {
+    const known = this.body.map.axes[joint];
+    const mean = known
+      ? STILL
+      : meanTurn(this.turnsOf(joint).map((turn, at) => product(inverse(turn), turns[at]!)));
+    this.aligned[joint] = known ? knownAxes(known) : this.alongAxes ? nearAxes(mean, 30) : mean;
+  }
+
+  /** The same for a bone of a limb, which then also points where it really does. */
+  private settleLimb(bone: string, along: Vector[], turns: Quaternion[]): void {
+    const joint = this.body.map.joints[bone]!;
+    this.settle(joint, turns);
+    const local = meanDirection(this.turnsOf(joint), along);
+    // feet count that lie along an axis of their joint
+    if (/(Foot|Toes)$/.test(bone) && !(Math.max(...local.map(Math.abs)) > 0.995)) return;
+    const start = rotated(this.aligned[joint]!, directionOf(bone));
+    this.aligned[joint] = product(swing(start, local), this.aligned[joint]!);
+  }
+
+  /** Hips and back: up towards the arms; the joint that carries the arms and those above: up towards the head. */
+  trunk(): void {
+    const {
+      body,
+      world: { places },
+    } = this;
+    const { joints, spine, neck } = body.map;
+    const above = joints.head === undefined ? neck : [...neck, joints.head];
+    const back = [joints.hips!, ...spine, ...above];
+    const chest = spine.length;
+    back.forEach((joint, i) => {
+      const last = i === back.length - 1;
+      this.settle(
+        joint,
+        places.map((pose) => {
+          const [legs, arms] = [unit(body.toLeft(pose, "UpperLeg")), unit(body.toLeft(pose, "UpperArm"))];
+          const left = i < chest ? plus(times(legs, 1 - i / chest), times(arms, i / chest)) : arms;
+          const start = last
+            ? pose[back[Math.max(i - 1, chest - 1)]!]!
+            : i
+              ? pose[joint]!
+              : body.middle(pose, "UpperLeg");
+          const end = last ? pose[joint]! : i < chest ? body.middle(pose, "UpperArm") : pose[back.at(-1)!]!;
+          return frame(left, minus(end, start));
+        }),
+      );
+    });
+  }
+
+  /** Knees are hinges that bend backwards; feet and toes have the hinge's axis. */
+  leg(bones: string[]): void {
+    const { joints } = this.body.map;
+    const [thigh, shin] = [this.directions(bones[0]!), this.directions(bones[1]!)];
+    const hips = this.turned(joints.hips!);
+    const hinge = thigh.map((along, at) =>
+      plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), ALIGNMENT.HINGE)),
+    );
+    this.settleLimb(
+      bones[0]!,
+      thigh,
+      hinge.map((axis, at) => frame(axis, times(thigh[at]!, -1))),
+    );
+    this.settleLimb(
+      bones[1]!,
+      shin,
+      hinge.map((axis, at) => frame(axis, times(shin[at]!, -1))),
+    );
+    const shins = this.turned(joints[bones[1]!]!);
+    for (const bone of bones.slice(2).filter((name) => joints[name] !== undefined)) {
+      if (!this.body.aimed(bone)) {
+        this.settle(joints[bone]!, shins);
+        continue;
+      }
+      const along = this.directions(bone);
+      const slope = inverse(swing(Z, directionOf(bone)));
+      this.settleLimb(
+        bone,
+        along,
+        along.map((direction, at) => {
+          const left = rotated(shins[at]!, X);
+          return product(frame(left, cross(direction, left)), slope);
+        }),
+      );
+    }
+  }
+
+  /** Elbows are hinges that bend forwards with the arms out to the sides; hands are in line with the forearms. */
+  arm([shoulder, upperArm, lowerArm, hand]: string[], sign: number): void {
+    const { body } = this;
+    const { joints, spine } = body.map;
+    const chest = this.turned(spine.at(-1)!);
+    if (joints[shoulder!] !== undefined) this.settle(joints[shoulder!]!, chest);
+    const upper = this.directions(upperArm!);
+    const lower = body.aimed(lowerArm!) ? this.directions(lowerArm!) : upper;
+    const up = upper.map((along, at) => {
+      const plain = product(swing(rotated(chest[at]!, directionOf(upperArm!)), along), chest[at]!);
+      return plus(times(cross(along, lower[at]!), -sign), times(rotated(plain, Y), ALIGNMENT.HINGE));
+    });
+    const level = (along: Vector[], ups: Vector[]) =>
+      along.map((axis, at) => frame(times(axis, sign), ups[at]!, false));
+    this.settleLimb(upperArm!, upper, level(upper, up));
+    this.settleLimb(lowerArm!, lower, level(lower, up));
+    if (joints[hand!] === undefined) return;
+    const forearm = this.turned(joints[lowerArm!]!);
+    if (!body.aimed(hand!)) return this.settle(joints[hand!]!, forearm);
+    const along = this.directions(hand!);
+    this.settleLimb(
+      hand!,
+      along,
+      level(
+        along,
+        forearm.map((turn) => rotated(turn, Y)),
+      ),
+    );
+  }
+}
+
+/** The rotation nearest to all: the eigenvector of the sum of q q^T of the largest eigenvalue, found by squaring it. */
+function meanTurn(turns: Quaternion[]): Quaternion {
+  let matrix = [0, 1, 2, 3].map((i) =>
+    [0, 1, 2, 3].map((j) => turns.reduce((sum, turn) => sum + turn[i]! * turn[j]!, 0)),
+  );
+  for (let round = 0; round < 40; round++) {
+    const largest = Math.max(...matrix.flat().map(Math.abs));
+    const scaled = matrix.map((row) => row.map((value) => value / largest));
+    matrix = scaled.map((row) =>
+      scaled.map((_, j) => row.reduce((sum, value, k) => sum + value * scaled[k]![j]!, 0)),
+    );
+  }
+  const widest = matrix.reduce((best, row) => (Math.hypot(...row) > Math.hypot(...best) ? row : best));
+  return normalised(widest as Quaternion);
+}

@@ -1,0 +1,424 @@
+import { GENERATE, continuationSettings, familiaritySettings, memorySettings } from "../generated.js";
+import type { Bundle, Manifest } from "../bundle/bundle.js";
+import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
+import { FUNCTION_WORDS, partsOf, sentencesOf, stem, verbsOf } from "../text/clauses.js";
+import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
+import { BundleError, DecodingError, TextError } from "../errors.js";
+import type { Graph } from "../bundle/graph.js";
+import { Memory } from "./memory.js";
+import { type Frames, LanguageModel } from "../models/base.js";
+import { type Noise, Pcg64, stateOf } from "../decode/random.js";
+import { settingsOf } from "../settings.js";
+
+/** How motions are drawn: by default as the bundle says. */
+export interface GenerateSettings extends Partial<Drawing> {
+  /** Of the random numbers, 0 by default: a seed gives the motion that it gives in Python. */
+  seed?: number;
+  /** How many motions, 1 by default. */
+  hypotheses?: number;
+  /** The exact length; by default a motion ends by itself. */
+  seconds?: number;
+  /** The most seconds of a motion that ends by itself. */
+  max_seconds?: number;
+  /** Take a text that asks for several things in a row as one; else it is a story of its parts. */
+  whole?: boolean;
+  /** Refuse a text that is outside the training data, or of which a word is unknown or left out. */
+  strict?: boolean;
+}
+
+/** How a story is drawn: by default as the bundle says. */
+export interface StorySettings extends Partial<Drawing> {
+  seed?: number;
+  /** Of each sentence, or one value for all; null for a sentence that ends by itself, as all do by default. */
+  seconds?: number | (number | null)[];
+  max_seconds?: number;
+  /** Take a text that asks for several things in a row as one; else its parts are passages, each of the same length. */
+  whole?: boolean;
+  /** Refuse texts like `GenerateSettings.strict`. */
+  strict?: boolean;
+  /** Where the figure is to stand briefly. */
+  stand?: "start" | "end" | "both";
+  /** The frames (T, D) that the story continues, such as those of an earlier one. */
+  after?: Frames;
+}
+
+/** What a text is shown as. */
+export interface Shown {
+  /** A sentence of the known action that is shown; "" where there are several. */
+  action: string;
+  /** Known words of the text that no sentence of that action has; the console is warned of them. */
+  lacking: string[];
+  /** From 0 to 1, how well the model knows the text: see `understood`; of several sentences the one that it knows least. */
+  confidence: number;
+}
+
+/** A motion that was drawn: frames (T, D) of `root_sixd`, those that Python draws with the same seed, before feet are held. */
+export interface Generated extends Shown {
+  frames: Float32Array[];
+}
+
+/** A motion of several sentences. */
+export interface Story extends Generated {
+  passages: Passage[];
+}
+
+/** A sentence of a story, shown from `start` to `stop` in seconds. */
+export interface Passage extends Shown {
+  text: string;
+  start: number;
+  stop: number;
+}
+
+/** How well a sentence is known, from 0 to 1, whether that is enough, and sentences of the likeliest actions. */
+export interface Understood {
+  confidence: number;
+  confident: boolean;
+  nearest: string[];
+}
+
+/** Sentences of a story, for each its seconds (0 where it ends by itself), whether they are whole, how it is drawn. */
+interface Script {
+  whole: boolean;
+  strict: boolean;
+  texts: string[];
+  seconds: number[];
+  longest: number;
+  drawing: Drawing;
+  noise: Noise;
+}
+
+/** Frames of a story that become final, with which sentence, and so many steps of it. */
+interface Piece {
+  sentence: number;
+  /** Of the first piece of a sentence. */
+  shown?: Shown;
+  frames: Float32Array[];
+  steps: number;
+}
+
+/** What is said of a sentence whose action lacks words of it. */
+function leftOut(sentence: string, { action, lacking }: Shown): string {
+  return `'${sentence}' is read as '${action}', which leaves out ${lacking.map((word) => `'${word}'`).join(", ")}`;
+}
+
+/** Motions for a sentence, drawn as codes. */
+export class GenerateModel extends LanguageModel {
+  private readonly familiarity = settingsOf(
+    "familiarity",
+    familiaritySettings,
+    this.manifest.settings.familiarity,
+  );
+  private readonly continuation = settingsOf(
+    "continuation",
+    continuationSettings,
+    this.manifest.settings.continuation,
+  );
+  private readonly verbs: ReturnType<typeof verbsOf>;
+
+  constructor(
+    manifest: Manifest,
+    private readonly encoder: Graph,
+    private readonly source: Source,
+    private readonly codec: Codec,
+  ) {
+    super(manifest);
+    this.verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
+  }
+
+  /** Motions for a text; of one that asks for several things in a row each is a `Story`. */
+  async generate(text: string, settings: GenerateSettings = {}): Promise<(Generated | Story)[]> {
+    const seed = this.setting("seed", settings.seed ?? 0);
+    const count = this.setting("hypotheses", settings.hypotheses ?? 1);
+    if (!settings.whole && (await this.parts(text)).length > 1) {
+      const motions: Story[] = [];
+      for (const value of [seed, ...stateOf(seed, count - 1)])
+        motions.push(await this.story(text, { ...settings, seed: value }));
+      return motions;
+    }
+    const noise = Array.from({ length: count }, (_, at) => (at ? new Pcg64(seed, at - 1) : new Pcg64(seed)));
+    return this.drawn(text, noise, settings);
+  }
+
+  /** What a text asks for one after another: docs/reference/bundle.md, "Several things in one text". */
+  async parts(text: string): Promise<string[]> {
+    this.words(text);
+    const lacking: string[] = [];
+    for (const sentence of sentencesOf(text)) {
+      const parts = partsOf(sentence, this.verbs);
+      lacking.push(...(parts.length > 1 && (await this.lacks(sentence)) ? parts : [sentence]));
+    }
+    return lacking.length > 1 ? lacking : [text];
+  }
+
+  /** Whether the likeliest action lacks something of a sentence. */
+  private async lacks(sentence: string): Promise<boolean> {
+    const context = await this.context(sentence);
+    return this.lacking(sentence, context.indexOf(Math.max(...context))).length > 0;
+  }
+
+  /** The known words of a sentence, but for function words, of which no sentence of an action has any form. */
+  private lacking(sentence: string, action: number): string[] {
+    const have = new Set(this.manifest.actions![action]!.words.map(stem));
+    const words = new Set(this.vocabulary.split(sentence).map((word) => this.vocabulary.meant(word)));
+    const lacks = (word: string) =>
+      word &&
+      !FUNCTION_WORDS.has(word) &&
+      ![word, this.vocabulary.near(word)].some((form) => have.has(stem(form)));
+    return [...words].filter(lacks).sort();
+  }
+
+  /** What a sentence is taken for. */
+  private shown(sentence: string, action: number, context: Float32Array): Shown {
+    const shown = this.shownAs(sentence, action, context);
+    if (shown.lacking.length) console.warn(leftOut(sentence, shown));
+    return shown;
+  }
+
+  private shownAs(sentence: string, action: number, context: Float32Array): Shown {
+    const taken = this.manifest.actions![action]!.sentence;
+    return {
+      action: taken,
+      lacking: this.lacking(sentence, action),
+      confidence: this.known(sentence, context).confidence,
+    };
+  }
+
+  /** The context of a sentence; strict: without the actions that leave out a word. TextError for what is refused then. */
+  private async contextOf(sentence: string, strict = false): Promise<Float32Array> {
+    const context = await this.context(sentence);
+    if (!strict) return context;
+    const { unknown } = this.vocabulary.encode(sentence);
+    if (unknown.length)
+      throw new TextError(`the model does not know ${unknown.join(", ")} (in '${sentence}')`);
+    const { confidence, confident, nearest } = this.known(sentence, context);
+    const near = nearest.map((example) => `'${example}'`).join(", ");
+    if (!confident)
+      throw new TextError(
+        `'${sentence}' is outside the training data (confidence ${confidence.toFixed(2)}); nearest: ${near}`,
+      );
+    const shown = this.shownAs(sentence, context.indexOf(Math.max(...context)), context);
+    if (shown.lacking.length) throw new TextError(leftOut(sentence, shown));
+    return context.map((value, action) => (this.lacking(sentence, action).length ? GENERATE.NEVER : value));
+  }
+
+  /** The same by noise that is given for each motion. */
+  async drawn(text: string, noise: Noise[], settings: GenerateSettings): Promise<Generated[]> {
+    const drawing = this.drawing(settings);
+    const seconds = settings.seconds === undefined ? 0 : this.setting("seconds", settings.seconds);
+    const longest = Math.max(1, this.steps(seconds || this.setting("max_seconds", settings.max_seconds)));
+    const context = await this.contextOf(text, settings.strict);
+    const actions = noise.map((source) => drawnAction(this.source, context, source, drawing.certainty));
+    const codes = await drawCodes(new Writer(this.source, noise, drawing), actions, longest, seconds > 0);
+    const shown = new Map([...new Set(actions)].map((action) => [action, this.shown(text, action, context)]));
+    const motions: Generated[] = [];
+    for (const [at, motion] of codes.entries()) {
+      const frames = await new StreamingDecoder(this.codec).push(motion, true);
+      const last = seconds ? Math.max(1, Math.round(seconds * this.fps)) : frames.length;
+      motions.push({ frames: frames.slice(0, last), ...shown.get(actions[at]!)! });
+    }
+    return motions;
+  }
+
+  /** One motion for several sentences, each from where the last one ends, and when each is shown. */
+  async story(sentences: string | string[], settings: StorySettings = {}): Promise<Story> {
+    const script = await this.parted(this.scriptOf(sentences, settings));
+    const steps = script.texts.map(() => 0);
+    const shown: Shown[] = [];
+    const frames: Float32Array[] = [];
+    for await (const piece of this.pieces(script, settings.after)) {
+      frames.push(...piece.frames);
+      if (piece.shown) shown.push(piece.shown);
+      steps[piece.sentence]! += piece.steps;
+    }
+    let [start, over] = [0, 0];
+    const passages = script.texts.map((text, at): Passage => {
+      over += steps[at]! * this.codec.hop;
+      const passage = { text, start, stop: Math.min(over, frames.length) / this.fps, ...shown[at]! };
+      start = passage.stop;
+      return passage;
+    });
+    const action = passages.length > 1 ? "" : passages[0]!.action;
+    const confidence = Math.min(...passages.map((passage) => passage.confidence));
+    return { frames, action, lacking: passages.flatMap((passage) => passage.lacking), confidence, passages };
+  }
+
+  /** The frames of `story` in pieces, as they are drawn; what cannot be told is refused before the first one. */
+  stream(sentences: string | string[], settings: StorySettings = {}): AsyncGenerator<Float32Array[], void> {
+    const script = this.scriptOf(sentences, settings);
+    const pieces = async () => this.pieces(await this.parted(script), settings.after);
+    return (async function* () {
+      for await (const { frames } of await pieces()) if (frames.length) yield frames;
+    })();
+  }
+
+  /** How well a sentence is known, and the nearest known sentences: docs/reference/bundle.md, the loop `codes`. */
+  async understood(text: string): Promise<Understood> {
+    return this.known(text, await this.context(text));
+  }
+
+  private known(text: string, context: Float32Array): Understood {
+    const actions = this.manifest.actions!;
+    const counts = new Map<string, number>();
+    for (const { words } of actions)
+      for (const word of new Set(words)) counts.set(word, (counts.get(word) ?? 0) + 1);
+    const rare = (word: string) => Math.log((1 + actions.length) / counts.get(word)!);
+    const unheard = Math.log(1 + actions.length);
+    const textWords = [...new Set(this.vocabulary.split(text))];
+    const heard = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : 0), 0);
+    const all = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : unheard), 0);
+    const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
+    const { confident, doubt } = this.familiarity;
+    const confidence = (heard / (all || 1)) * Math.exp(context[order[0]!]!) ** doubt;
+    const nearest = [...new Set(order.map((action) => actions[action]!.sentence))].slice(0, 3);
+    return { confidence, confident: confidence >= confident, nearest };
+  }
+
+  private async context(text: string): Promise<Float32Array> {
+    return (await this.encoder.run(this.words(text))).context!.data;
+  }
+
+  private drawing(settings: Partial<Drawing>): Drawing {
+    return {
+      temperature: this.setting("temperature", settings.temperature),
+      first_temperature: this.setting("first_temperature", settings.first_temperature),
+      top_p: this.setting("top_p", settings.top_p),
+      guidance: this.setting("guidance", settings.guidance),
+      memory: this.setting("memory", settings.memory),
+      certainty: this.setting("certainty", settings.certainty),
+    };
+  }
+
+  /** How many steps cover a time. */
+  private steps(seconds: number): number {
+    return Math.ceil((seconds * this.fps) / this.codec.hop - 1e-9);
+  }
+
+  private scriptOf(sentences: string | string[], settings: StorySettings): Script {
+    const texts = typeof sentences === "string" ? [sentences] : [...sentences];
+    const each = Array.isArray(settings.seconds)
+      ? settings.seconds
+      : texts.map(() => (settings.seconds as number | undefined) ?? null);
+    if (!texts.length) throw new TextError("a story needs a sentence");
+    if (each.length !== texts.length)
+      throw new DecodingError(`${texts.length} sentences have ${each.length} lengths`);
+    if (![undefined, "start", "end", "both"].includes(settings.stand))
+      throw new DecodingError(`stand is start, end or both, not ${settings.stand}`);
+    const seconds = each.map((length) => (length === null ? 0 : this.setting("seconds", length)));
+    for (const end of ["start", "end"] as const) {
+      if (settings.stand !== end && settings.stand !== "both") continue;
+      texts[end === "start" ? "unshift" : "push"](GENERATE.STANDING);
+      seconds[end === "start" ? "unshift" : "push"](GENERATE.STANDING_SECONDS);
+    }
+    texts.forEach((text) => this.words(text));
+    const longest = this.steps(this.setting("max_seconds", settings.max_seconds));
+    return {
+      texts,
+      seconds,
+      whole: settings.whole ?? false,
+      strict: settings.strict ?? false,
+      longest,
+      drawing: this.drawing(settings),
+      noise: new Pcg64(this.setting("seed", settings.seed ?? 0)),
+    };
+  }
+
+  /** The story with the parts of its sentences as passages. */
+  private async parted(script: Script): Promise<Script> {
+    const parts = script.whole
+      ? script.texts.map((text) => [text])
+      : await Promise.all(script.texts.map((text) => this.parts(text)));
+    const texts = parts.flat();
+    if (script.strict) for (const text of texts) await this.contextOf(text, true); // refused before anything is drawn
+    return {
+      ...script,
+      texts,
+      seconds: parts.flatMap((part, at) => part.map(() => script.seconds[at]! / part.length)),
+    };
+  }
+
+  /** What each sentence is shown as, then for each step of codes the frames that become final with it; at last the remaining frames. */
+  private async *pieces(
+    { texts, strict, seconds, longest, drawing, noise }: Script,
+    after?: Frames,
+  ): AsyncGenerator<Piece, void> {
+    const writer = new Writer(this.source, [noise], drawing);
+    const before = after && (await this.continued(after));
+    if (before) await writer.see(before.codes);
+    const decoder = new StreamingDecoder(this.codec, before);
+    let [done, shown, end, limit] = [0, 0, 0, Infinity];
+    for (const [sentence, text] of texts.entries()) {
+      const context = await this.contextOf(text, strict);
+      const action = drawnAction(this.source, context, noise, drawing.certainty);
+      yield { sentence, shown: this.shown(text, action, context), frames: [], steps: 0 };
+      const length = seconds[sentence]!;
+      end += length;
+      limit = length ? Math.max(1, Math.round(end * this.fps)) : Infinity;
+      for await (const { codes } of drawnSteps(
+        writer,
+        [action],
+        length ? this.steps(end) - done : longest,
+        length > 0,
+      )) {
+        done++;
+        const frames = (await decoder.push(codes)).slice(0, limit - shown);
+        shown += frames.length;
+        yield { sentence, frames, steps: 1 };
+      }
+      if (!length) end = (done * this.codec.hop) / this.fps;
+    }
+    yield {
+      sentence: texts.length - 1,
+      frames: (await decoder.push([], true)).slice(0, limit - shown),
+      steps: 0,
+    };
+  }
+
+  /** The last seconds, whole steps of codes, of a motion. */
+  private async continued(after: Frames): Promise<Context> {
+    const { hop } = this.codec;
+    const frames = this.checked(after, this.manifest.motion.channels.length, 2 * hop).slice(
+      -this.steps(this.continuation.context) * hop,
+    );
+    const whole = frames.slice(frames.length % hop);
+    return { frames: whole, codes: await codesOf(this.codec, whole) };
+  }
+}
+
+/** What a bundle of the loop `codes` makes. */
+export async function generateModel(bundle: Bundle, graphs: Record<string, Graph>): Promise<GenerateModel> {
+  const { manifest } = bundle;
+  const [memory, moves, body] = await Promise.all([
+    bundle.table("memory"),
+    bundle.table("moves"),
+    bundle.table("body"),
+  ]);
+  const { step, part, encoder, decoder, tokens } = graphs as Record<string, Graph>;
+  const { ahead, hop } = (manifest.config.codec ?? {}) as { ahead: number[]; hop: number };
+  const shape = decoder!.spec.outputs.find((output) => output.name === "frames")!.shape;
+  const looks =
+    Array.isArray(ahead) && ahead.length <= 8 && ahead.every((steps) => [0, 1, 2].includes(steps));
+  if (!looks || hop !== shape[2])
+    throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
+  const [actions, end] = [manifest.actions?.length ?? 0, moves.shape[0]!];
+  const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
+  const remembers = settingsOf("memory", memorySettings, manifest.settings.memory);
+  const source: Source = {
+    step: step!,
+    part: part!,
+    end,
+    nullAction: actions,
+    parts,
+    memory: new Memory(memory, moves, body, actions, remembers),
+  };
+  const codec: Codec = {
+    decoder: decoder!,
+    tokens: tokens!,
+    moves: end,
+    back: ahead.reduce((sum, steps) => sum + 2 - steps, 0) + Math.ceil(4 / hop),
+    ahead: ahead.reduce((sum, steps) => sum + steps, 0),
+    hop,
+    fps: manifest.motion.fps,
+    halfLife: settingsOf("continuation", continuationSettings, manifest.settings.continuation).half_life,
+  };
+  return new GenerateModel(manifest, encoder!, source, codec);
+}

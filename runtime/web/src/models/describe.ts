@@ -1,0 +1,132 @@
+import { DESCRIBE, confidenceSettings } from "../generated.js";
+import type { NumberArray } from "../bundle/arrays.js";
+import { beamSearch, type Hypothesis, type Limits, scoreWords } from "../decode/beam.js";
+import type { Manifest } from "../bundle/bundle.js";
+import { consensus } from "../decode/consensus.js";
+import { DecodingError } from "../errors.js";
+import type { Graph } from "../bundle/graph.js";
+import { type Known, pathOf } from "./nearestNeighbour.js";
+import { type Frames, LanguageModel } from "./base.js";
+import { type Noise, Pcg64 } from "../decode/random.js";
+import { settingsOf } from "../settings.js";
+import { Vocabulary } from "../text/vocabulary.js";
+
+/** How descriptions are found: by default as the bundle says. */
+export interface DescribeSettings {
+  /** "known": sentences about known motions that are near, by default where the bundle has any and no draws are asked for. */
+  decoding?: "known" | "beam" | "consensus";
+  /** Sentences that are kept, and given. */
+  beams?: number;
+  /** Sentences that are drawn: the best agrees most with all of them, and need not be the most probable. */
+  draws?: number;
+  /** Of the draws, 0 by default. */
+  seed?: number;
+  /** Of the draws. */
+  temperature?: number;
+  maxWords?: number;
+}
+
+/**
+ * A sentence and the logarithm of its probability: that it is right, where known motions answer, or else that it is said
+ * in these words. score: by which it is ranked. confident: whether it is as probable as right ones are.
+ */
+export interface Description {
+  text: string;
+  logProbability: number;
+  score: number;
+  confident: boolean;
+}
+
+/** Sentences for a motion. */
+export class DescribeModel extends LanguageModel {
+  private readonly confidence = settingsOf(
+    "confidence",
+    confidenceSettings,
+    this.manifest.settings.confidence,
+  );
+
+  constructor(
+    manifest: Manifest,
+    private readonly graphs: Record<string, Graph>,
+    private readonly known?: Known,
+  ) {
+    super(manifest);
+  }
+
+  /** Sentences that describe frames (T, D), best first. */
+  async describe(frames: Frames, settings: DescribeSettings = {}): Promise<Description[]> {
+    const decoding = settings.decoding ?? (this.known && settings.draws === undefined ? "known" : undefined);
+    if (decoding === "known") return this.answers(frames, settings);
+    const hypotheses = await this.hypotheses(frames, settings);
+    return hypotheses.map(({ ids, logProbability, score }) => {
+      return {
+        text: this.vocabulary.decode(ids),
+        logProbability,
+        score,
+        confident: logProbability >= this.confidence.log_probability,
+      };
+    });
+  }
+
+  /** What known motions answer. */
+  private async answers(frames: Frames, settings: DescribeSettings): Promise<Description[]> {
+    if (!this.known) throw new DecodingError("no motion is known: choose beam or consensus");
+    if (settings.draws !== undefined)
+      throw new DecodingError("known motions answer without draws: leave them out, or choose consensus");
+    const beams = this.setting("beams", settings.beams);
+    const { vector } = await this.graphs.space!.run(this.motion(frames));
+    const { known, manifest } = this;
+    const answers = known.answers(
+      vector!.data as Float32Array,
+      frames.length / this.fps,
+      pathOf(frames, manifest.motion),
+      beams,
+    );
+    return answers.map(({ text, probability }) => {
+      const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST));
+      return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
+    });
+  }
+
+  /** Sentences that are written, as ids of words; noise: what draws are made by, instead of a seed. */
+  async hypotheses(frames: Frames, settings: DescribeSettings = {}, noise?: Noise): Promise<Hypothesis[]> {
+    const limits = this.limits(settings.maxWords);
+    const beams = this.setting("beams", settings.beams);
+    const drawing = settings.decoding
+      ? settings.decoding === "consensus"
+      : this.manifest.loop === "consensus";
+    const draws = settings.draws ?? (drawing ? this.setting("draws") : undefined);
+    if (draws === undefined) return beamSearch(this.graphs.step!, await this.context(frames), limits, beams);
+    const source = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
+    const temperature = this.setting("temperature", settings.temperature);
+    const context = await this.context(frames);
+    const beginnings = await consensus(
+      this.graphs.step!,
+      context,
+      limits,
+      this.setting("draws", draws),
+      temperature,
+      source,
+    );
+    return beginnings.slice(0, beams);
+  }
+
+  /** The log-probability of a sentence given frames (T, D). */
+  async score(frames: Frames, text: string): Promise<number> {
+    const { ids } = this.vocabulary.encode(text);
+    return scoreWords(this.graphs.step!, await this.context(frames), this.limits(), ids);
+  }
+
+  private async context(frames: Frames): Promise<NumberArray<Float32Array>> {
+    return (await this.graphs.encoder!.run(this.motion(frames))).context!;
+  }
+
+  private limits(maxWords?: number): Limits {
+    return {
+      start: Vocabulary.SOS,
+      end: Vocabulary.EOS,
+      banned: Vocabulary.BANNED,
+      longest: this.setting("max_words", maxWords),
+    };
+  }
+}

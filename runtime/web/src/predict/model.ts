@@ -1,0 +1,44 @@
+import { stacked } from "../bundle/arrays.js";
+import type { Manifest } from "../bundle/bundle.js";
+import { DecodingError } from "../errors.js";
+import { freeRun } from "./freeRun.js";
+import type { Graph } from "../bundle/graph.js";
+import { type Frames, Model } from "../models/base.js";
+
+/** The frames that follow a motion. */
+export class PredictModel extends Model {
+  constructor(
+    manifest: Manifest,
+    private readonly graphs: Record<string, Graph>,
+  ) {
+    super(manifest);
+  }
+
+  /** The next frames after the last ones of (T, D); by default one horizon. */
+  async predict(frames: Frames, count = this.setting("horizon")): Promise<Float32Array[]> {
+    const seed = this.seed(frames);
+    return freeRun(
+      this.graphs.encoder!,
+      this.graphs.step!,
+      seed,
+      this.setting("frames", count),
+      this.setting("horizon"),
+    );
+  }
+
+  /** For each frame of a horizon how far its joints are expected to be off, on average, in centimetres. */
+  async expectedErrors(frames: Frames): Promise<Float32Array> {
+    const { encoder, error } = this.graphs;
+    if (!error) throw new DecodingError(`the bundle ${this.manifest.name} does not estimate its errors`);
+    const seed = this.seed(frames);
+    const known = { frames: stacked(seed, 1, seed.length, seed[0]!.length) };
+    const metres = (await error.run({ ...known, ...(await encoder!.run(known)) })).error!.data;
+    return metres.map((metre) => 100 * metre);
+  }
+
+  /** The last frames, as many as the encoder takes. */
+  private seed(frames: Frames): Frames {
+    const { shape } = this.graphs.encoder!.spec.inputs[0]!;
+    return this.checked(frames, Number(shape[2]), Number(shape[1])).slice(-Number(shape[1]));
+  }
+}

@@ -1,0 +1,101 @@
+/* Figures that go along paths and arrive at their ends, as motet/steering/arrival.py says. Metres, seconds, radians; x and z. */
+import { ARRIVAL } from "../generated.js";
+import type { Playback } from "./matching.js";
+import { clamp, dampingOf, wrapped } from "../motion/springs.js";
+
+export type Point = readonly [x: number, z: number];
+
+/** A figure on its path. */
+export interface Going {
+  points: Point[];
+  /** Metres to each point. */
+  along: number[];
+  gone: number;
+  speed: number;
+  gait: number;
+  /** At the end; null for any. */
+  facing: number | null;
+  /** Whether it is told to stand, and whether it stands at the end. */
+  stops: boolean;
+  arrived: boolean;
+}
+
+/** On a path of two points or more. */
+export function sent(points: Point[], order: Pick<Going, "gait" | "speed" | "facing">): Going {
+  const along = [0];
+  for (let at = 1; at < points.length; at++)
+    along.push(along[at - 1]! + distance(points[at - 1]!, points[at]!));
+  return { points, along, gone: 0, stops: false, arrived: false, ...order };
+}
+
+/** A tick later: the velocity at which the figure is to go, [0, 0] for standing. */
+export function onward(going: Going, playback: Playback, halfLife: number): [x: number, z: number] {
+  const { points, along } = going;
+  const [root, velocity] = [at2(playback.root), at2(playback.spring)];
+  const here = at(going, going.gone);
+  const way = unit(minus(at(going, going.gone + 0.05), here));
+  const gone = going.gone + clamp(dot(minus(root, here), way), 0, 0.5);
+  const [pace, whole] = [Math.hypot(...velocity), along.at(-1)!];
+  const ahead = gone + ARRIVAL.AHEAD + ARRIVAL.SOONER * pace;
+  const off = minus(points.at(-1)!, root);
+  const [last, far] = [ahead >= whole, Math.hypot(...off)];
+  const left = last ? far : Math.max(whole - gone, far);
+  const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < ARRIVAL.NEAR);
+  const stands = pace < ARRIVAL.STANDS;
+  going.stops = (going.stops && !(stands && far > ARRIVAL.GLIDES_FROM)) || arrives;
+  const turned = going.facing === null || Math.abs(wrapped(playback.root[2] - going.facing)) < ARRIVAL.FACES;
+  going.arrived = going.stops && (going.arrived || (stands && far < ARRIVAL.NEAR && turned));
+  const speed = going.stops ? 0 : Math.min(going.speed, Math.sqrt(2 * ARRIVAL.BRAKES * left));
+  going.gone = Math.min(gone, whole);
+  const [x, z] = unit(minus(at(going, ahead), root));
+  return [x * speed, z * speed];
+}
+
+/** Where a figure faces that goes at a velocity: where it goes; near the end as it does, and at the end as it is to. */
+export function faces({ points, facing }: Going, { root, spring }: Playback, [x, z]: Point): number {
+  if (distance(points.at(-1)!, at2(root)) >= ARRIVAL.SIDESTEP) return Math.atan2(x, z);
+  return facing ?? spring[2];
+}
+
+/** Move a figure that comes to rest to where it is to stand. */
+export function settle(
+  { points, stops }: Going,
+  playback: Playback,
+  halfLife: number,
+  seconds: number,
+): void {
+  const [x, z, facing] = playback.root;
+  const off = minus(minus(points.at(-1)!, [x, z]), rolling(playback, halfLife));
+  const far = Math.hypot(...off);
+  if (!stops || far >= ARRIVAL.GLIDES_FROM) return;
+  const most =
+    (ARRIVAL.GLIDES[0] + ARRIVAL.GLIDES[1] * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
+  const share = Math.min(seconds / ARRIVAL.SETTLES, most / Math.max(far, 1e-9));
+  playback.root = [x + off[0] * share, z + off[1] * share, facing];
+}
+
+/** The point of a path that is so many metres from its beginning. */
+function at({ points, along }: Going, gone: number): Point {
+  const beyond = along.findIndex((metres) => metres > gone);
+  const after = clamp(beyond < 0 ? along.length : beyond, 1, along.length - 1);
+  const [start, stop] = [along[after - 1]!, along[after]!];
+  const part = clamp((gone - start) / Math.max(stop - start, 1e-9), 0, 1);
+  const [from, to] = [points[after - 1]!, points[after]!];
+  return [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])];
+}
+
+/** How far a figure still goes that is told to stand: the integral of the spring. */
+function rolling({ spring, springRate }: Playback, halfLife: number): Point {
+  const damping = dampingOf(halfLife);
+  return [0, 1].map((i) => (2 * spring[i]! + springRate[i]! / damping) / damping) as unknown as Point;
+}
+
+const at2 = ([x, z]: readonly number[]): Point => [x!, z!];
+const minus = (a: Point, b: Point): Point => [a[0] - b[0], a[1] - b[1]];
+const dot = (a: Point, b: Point): number => a[0] * b[0] + a[1] * b[1];
+const distance = (a: Point, b: Point): number => Math.hypot(a[0] - b[0], a[1] - b[1]);
+
+function unit([x, z]: Point): Point {
+  const length = Math.max(Math.hypot(x, z), 1e-9);
+  return [x / length, z / length];
+}

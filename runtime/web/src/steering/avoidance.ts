@@ -1,0 +1,45 @@
+/* Figures that keep apart: each turns aside from those that it would come too near to, as motet/steering/avoidance.py says. */
+import { AVOIDANCE, PATH_FOLLOWING } from "../generated.js";
+import type { Pose as Ground } from "../motion/planar.js";
+
+/** Where a figure is, and its velocity in m/s; x and z first. */
+export interface Walker {
+  root: Ground;
+  velocity: readonly number[];
+}
+
+/** The change of a figure's velocity, x and z in m/s, by which it keeps `room` metres from others. */
+export function keptApart(figure: Walker, others: readonly Walker[], room: number): [x: number, z: number] {
+  let [changeX, changeZ] = [0, 0];
+  for (const other of others) {
+    const [x, z] = [figure.root[0] - other.root[0], figure.root[1] - other.root[1]];
+    if (other === figure || Math.abs(x) >= AVOIDANCE.SIGHT || Math.abs(z) >= AVOIDANCE.SIGHT) continue;
+    const [u, v] = [figure.velocity[0]! - other.velocity[0]!, figure.velocity[1]! - other.velocity[1]!];
+    const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), AVOIDANCE.SOON);
+    const [nearX, nearZ] = [x + soon * u, z + soon * v];
+    if (nearX * nearX + nearZ * nearZ >= room * room) continue;
+    const by =
+      AVOIDANCE.STRENGTH *
+      Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) *
+      (1 - soon / AVOIDANCE.SOON);
+    // head on there is no way away from the other: to the right of the way there
+    const [rightX, rightZ] = unit(z, -x);
+    const [awayX, awayZ] = unit(nearX + 0.1 * room * rightX, nearZ + 0.1 * room * rightZ);
+    changeX += awayX * by;
+    changeZ += awayZ * by;
+  }
+  return [changeX, changeZ];
+}
+
+/** A velocity that goes around others, no faster than before; none where it would be too slow. */
+export function aside([x, z]: readonly number[], change: readonly number[]): [x: number, z: number] {
+  const [u, v] = [x! + change[0]!, z! + change[1]!];
+  const speed = Math.hypot(u, v);
+  const share = speed > PATH_FOLLOWING.WAITS ? Math.min(1, Math.hypot(x!, z!) / speed) : 0;
+  return [u * share, v * share];
+}
+
+function unit(x: number, z: number): [number, number] {
+  const length = Math.max(Math.hypot(x, z), 1e-6);
+  return [x / length, z / length];
+}

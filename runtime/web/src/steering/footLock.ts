@@ -1,0 +1,90 @@
+/* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
+import { FOOT_LOCK, footLockSettings } from "../generated.js";
+import { LEG, SOLES } from "../figures/humanoid/bones.js";
+import { legOf, reach } from "../figures/legs.js";
+import { about, minus, plus, product, rotated, type Vector, Y } from "../motion/rotations.js";
+import { damped, dampingOf } from "../motion/springs.js";
+import type { Settings } from "../settings.js";
+import type { Played } from "./step.js";
+
+/** Points of a sole, heel, ball and tip, and which joint of a leg carries each. */
+const POINTS = LEG.flatMap((part, joint) =>
+  (SOLES[part] ?? []).map((point): [number, Vector] => [joint, point]),
+);
+const BALL = 1;
+
+/** Of one foot: by how much it is moved along x and z and how high it steps, how fast these change, and where the points of its
+ *  sole were. */
+interface Foot {
+  shift: [number, number];
+  drift: [number, number];
+  height: [off: number, rate: number];
+  soles: Vector[] | null;
+}
+
+/** The lock of one figure: a foot each, left and right. */
+export type Lock = [Foot, Foot];
+
+export function newLock(): Lock {
+  const foot = (): Foot => ({ shift: [0, 0], drift: [0, 0], height: [0, 0], soles: null });
+  return [foot(), foot()];
+}
+
+/** The next pose, a tick later, with standing feet held in place and above the ground. */
+export function held(
+  lock: Lock,
+  pose: Played,
+  settings: Settings<typeof footLockSettings>,
+  dt: number,
+): Played {
+  const [x, z, facing] = pose.ground;
+  const hips = product(about(Y, facing), pose.rotations[0]!);
+  const rotations = [...pose.rotations];
+  lock.forEach((foot, side) => {
+    const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
+    const soles = POINTS.map(([joint, point]) =>
+      plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)),
+    );
+    const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
+    const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
+    const contact = pose.contacts[side]!;
+    const moved = shift(
+      foot,
+      minus(soles[bears]!, (foot.soles ?? soles)[bears]!),
+      contact > settings.stands,
+      settings,
+      dt,
+    );
+    foot.soles = soles;
+    const steps = contact * settings.steps * Math.min(1, moved / (settings.swings * dt));
+    const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(FOOT_LOCK.LIFTS), dt);
+    foot.height = [steps + off, rise];
+    const lift = Math.max(0, steps + off - soles[lowest]![1]);
+    if (foot.shift[0] || foot.shift[1] || lift)
+      reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
+  });
+  return { ...pose, rotations };
+}
+
+/** Move a foot whose point that bears it was moved since the last tick; how far that is then shown to move. */
+function shift(
+  foot: Foot,
+  [x, , z]: Vector,
+  contact: boolean,
+  settings: Settings<typeof footLockSettings>,
+  dt: number,
+): number {
+  const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
+  if (contact && Math.hypot(x, z) < settings.swings * dt && Math.hypot(...stay) < settings.farthest) {
+    [foot.shift, foot.drift] = [stay, [0, 0]];
+    return 0;
+  }
+  const damping = dampingOf(settings.fade);
+  const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
+  const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
+  [foot.shift, foot.drift] = [
+    [offX, offZ],
+    [rateX, rateZ],
+  ];
+  return Math.hypot(offX - stay[0], offZ - stay[1]);
+}

@@ -1,0 +1,64 @@
+/* Figures that stand keep their place, and breathe: docs/reference/bundle.md, "Standing". */
+import { IDLE } from "../generated.js";
+import type { Playback, Target } from "./matching.js";
+import type { Pose as Ground } from "../motion/planar.js";
+import { about, inverse, product, type Quaternion, rotated, STILL, X } from "../motion/rotations.js";
+import { damped, dampingOf } from "../motion/springs.js";
+import type { Played } from "./step.js";
+
+/** The bones that a breath turns about the x axis of the hips, and by how many times its depth. */
+const TURNS = Object.entries(IDLE.TURNS).map(([bone, times]) => ({ bone: Number(bone), times }));
+/** Those of the trunk above the hips. */
+const TRUNK: readonly number[] = IDLE.TRUNK;
+
+/** Of one figure. ticks: since it was there. share, rate: how far it has come to rest, from 0 to 1, and how fast that changes. */
+export interface Standing {
+  ticks: number;
+  share: number;
+  rate: number;
+}
+
+/** Of a figure that has not yet stood. */
+export function notYet(): Standing {
+  return { ticks: 0, share: 0, rate: 0 };
+}
+
+/** A tick later; a figure that stands is kept where it was before it. root: before the tick. acts: whether an act leads the whole body. */
+export function kept(
+  standing: Standing,
+  pose: Played,
+  playback: Playback,
+  [x, z]: Ground,
+  target: Target,
+  acts: boolean,
+  dt: number,
+): Played {
+  const slow = Math.hypot(playback.spring[0], playback.spring[1]) < IDLE.SLOW;
+  const stands =
+    !target[0] && !target[1] && !acts && slow && pose.contacts.every((contact) => contact > IDLE.STANDS);
+  const goal = stands ? 1 : 0;
+  const [off, rate] = damped(standing.share - goal, standing.rate, dampingOf(IDLE.SETTLES), dt);
+  Object.assign(standing, { ticks: standing.ticks + 1, share: goal + off, rate });
+  const [toX, toZ, facing] = playback.root;
+  const rests = goal * standing.share;
+  playback.root = [toX - rests * (toX - x), toZ - rests * (toZ - z), facing];
+  return { ...pose, ground: playback.root };
+}
+
+/** A pose with its breath. */
+export function breathed({ ticks, share }: Standing, pose: Played, dt: number): Played {
+  if (share <= IDLE.LEAST) return pose;
+  const [x, z] = pose.ground;
+  const angle =
+    IDLE.DEPTH *
+    share *
+    Math.sin(2 * Math.PI * (((ticks * dt) / IDLE.PERIOD) % 1) + IDLE.WAVE[0] * x + IDLE.WAVE[1] * z);
+  const rotations = [...pose.rotations];
+  let above: Quaternion = STILL;
+  for (const { bone, times } of TURNS) {
+    const local = pose.rotations[bone]!;
+    if (times) rotations[bone] = product(about(rotated(inverse(above), X), times * angle), local);
+    if (TRUNK.includes(bone)) above = product(above, local);
+  }
+  return { ...pose, rotations };
+}

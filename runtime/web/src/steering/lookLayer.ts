@@ -1,0 +1,121 @@
+/* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/steering/look_layer.py says. */
+import { LOOK_LAYER } from "../generated.js";
+import { type Follower, followed, followerAt, shownBy } from "./follower.js";
+import { BONES, HUMANOID } from "../figures/humanoid/bones.js";
+import {
+  about,
+  inverse,
+  minus,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  size,
+  STILL,
+  type Vector,
+  Y,
+  Z,
+} from "../motion/rotations.js";
+import { clamp } from "../motion/springs.js";
+import type { Played } from "./step.js";
+
+/** Bones that turn, and the share of the turn that each and those below it make together. */
+const SHARES = Object.entries(LOOK_LAYER.SHARES).map(([name, share]): [bone: number, share: number] => [
+  BONES.indexOf(name),
+  share,
+]);
+const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
+const SPINE = BONES.indexOf("spine");
+
+/** What a figure looks at, and the angles by which its head is turned to the left and up, more than is played. */
+export interface Look {
+  point: Vector | null;
+  turn: Follower;
+}
+
+/** Of a figure that looks at nothing. */
+export function ahead(): Look {
+  return { point: null, turn: followerAt([0, 0]) };
+}
+
+/** A pose with the head turned, a tick after the last; the look goes on. */
+export function looked(look: Look, pose: Played, seconds: number): Played {
+  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST)) return pose;
+  const seen = bonesOf(pose);
+  const now = angles(rotated(seen.at(-1)!, Z));
+  look.turn = followed(
+    look.turn,
+    wanted(look, pose, seen, now),
+    LOOK_LAYER.LEAP,
+    LOOK_LAYER.HALF_LIFE,
+    seconds,
+  );
+  const rotations = [...pose.rotations];
+  let above: Quaternion = STILL;
+  turned(seen, now[0], shownBy(look.turn)).forEach((bone, i) => {
+    rotations[SHARES[i]![0]] = product(inverse(above), bone);
+    above = bone;
+  });
+  return { ...pose, rotations };
+}
+
+/** The turn that is wanted, to the left and up, of bones in the frame of the lower spine, the last of which looks at angles. */
+function wanted(
+  { point, turn }: Look,
+  pose: Played,
+  seen: Quaternion[],
+  now: [left: number, up: number],
+): number[] {
+  if (!point) return [0, 0];
+  const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
+  if (!(size(aim) > LOOK_LAYER.NEAR)) return [0, 0];
+  const [toSide, up] = angles(aim);
+  let left = toSide;
+  if (Math.abs(left) > LOOK_LAYER.BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
+  left *= Math.min(Math.hypot(aim[0], aim[2]) / LOOK_LAYER.UNDER, 1);
+  return [
+    clamp(left, -LOOK_LAYER.MOST[0], LOOK_LAYER.MOST[0]) - now[0],
+    clamp(up, -LOOK_LAYER.MOST[1], LOOK_LAYER.MOST[1]) - now[1],
+  ];
+}
+
+/** Rotations of the bones that turn in the frame of the lower spine. */
+function bonesOf({ rotations }: Played): Quaternion[] {
+  let above: Quaternion = STILL;
+  return SHARES.map(([bone]) => (above = product(above, rotations[bone]!)));
+}
+
+/** A point in the frame of the lower spine. */
+function inSpine({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
+  const hips = product(about(Y, facing), rotations[0]!);
+  const place = plus([x, height, z], rotated(hips, OFFSETS[SPINE]!));
+  return rotated(inverse(product(hips, rotations[SPINE]!)), minus(point, place));
+}
+
+/** Where the eyes are in the frame of the lower spine. */
+function eyes(bones: Quaternion[]): Vector {
+  let [place, above]: [Vector, Quaternion] = [[0, 0, 0], STILL];
+  bones.forEach((bone, i) => {
+    place = plus(place, rotated(above, OFFSETS[SHARES[i]![0]]!));
+    above = bone;
+  });
+  return plus(place, rotated(above, [...LOOK_LAYER.EYES]));
+}
+
+/** Of a direction, to the left and up. */
+function angles([x, y, z]: Vector): [left: number, up: number] {
+  return [Math.atan2(x, z), Math.atan2(y, Math.hypot(x, z))];
+}
+
+/** Bones turned by their shares of angles, from a gaze so far to the left. */
+function turned(bones: Quaternion[], gaze: number, [left, up]: number[]): Quaternion[] {
+  return bones.map((bone, i) => {
+    const share = SHARES[i]![1];
+    const [way, half] = [gaze + share * left!, (share * up!) / 2];
+    const [sine, cosine] = [Math.sin(half), Math.cos(half)];
+    return product(
+      [-Math.cos(way) * sine, 0, Math.sin(way) * sine, cosine],
+      product(about(Y, share * left!), bone),
+    );
+  });
+}

@@ -1,0 +1,107 @@
+/* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
+import type { footLockSettings } from "../generated.js";
+import { type Acting, type ActingModel, begin, laid, noAct } from "./actionLayer.js";
+import type { Going } from "./arrival.js";
+import type { Happenings } from "./events.js";
+import { held, type Lock, newLock } from "./footLock.js";
+import type { Command, Gaits } from "./gaits.js";
+import { ahead, type Look, looked } from "./lookLayer.js";
+import type { Playback, Target } from "./matching.js";
+import type { Pose as Ground } from "../motion/planar.js";
+import { idle, type Reach, reached } from "./reachLayer.js";
+import { breathed, kept, notYet, type Standing } from "./idle.js";
+import type { Settings } from "../settings.js";
+import type { Played, Steerer } from "./step.js";
+
+/** What figures are steered with. */
+export interface SteeringModel extends ActingModel {
+  readonly abilities: Gaits;
+  readonly lock: Settings<typeof footLockSettings>;
+}
+
+export interface Steered {
+  playback: Playback;
+  acting: Acting;
+  lock: Lock;
+  standing: Standing;
+  command: Command;
+  target: Target;
+  /** The path that it is on, if any. */
+  going: Going | null;
+  look: Look;
+  /** Of the left and the right hand. */
+  hands: [Reach, Reach];
+  /** Of its last tick. */
+  happenings: Happenings | null;
+}
+
+/** A figure that stands still at a place; with a phase it searches in its turn alone, first after so many ticks. */
+export function standing(steerer: Steerer, gait: number, place?: Ground, phase?: number): Steered {
+  const facing = place?.[2] ?? 0;
+  const { matcher } = steerer;
+  const playback = matcher.playing(matcher.stillest(gait), place, phase);
+  const command = { gait, speed: 0, direction: 0, facing, facesWay: false };
+  const orders: Pick<Steered, "going" | "look" | "hands"> = {
+    going: null,
+    look: ahead(),
+    hands: [idle(), idle()],
+  };
+  return {
+    playback,
+    acting: noAct(steerer, playback),
+    lock: newLock(),
+    standing: notYet(),
+    command,
+    target: [0, 0, facing],
+    ...orders,
+    happenings: null,
+  };
+}
+
+/** Set where a figure goes from now on, off any path: a command, and the target that its gait makes of it. */
+export function tell(figure: Steered, command: Command, target: Target): void {
+  const changed =
+    target.some((value, i) => Math.abs(value - figure.target[i]!) > 1e-4) ||
+    command.gait !== figure.command.gait;
+  if (changed) hasten(figure.playback);
+  Object.assign(figure, { command, target, going: null });
+}
+
+/** Let a figure that waits for no turn search in the next tick. */
+export function hasten(playback: Playback): void {
+  if (!playback.inTurn) playback.ticksToSearch = 0;
+}
+
+/** The next pose, 1 / fps seconds later. raw: a target in place of the figure's own, gone for as it is. */
+export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
+  const { playback, acting, command } = figure;
+  const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
+  const { steerer, lock: settings, fps } = model;
+  const [{ root }, dt] = [playback, 1 / fps];
+  const changed = begin(model, acting, playback, target, command.gait);
+  const whole = acting.playing?.whole ?? false;
+  const played = steerer.tick(playback, target, command.gait);
+  const stood = holdFeet ? kept(figure.standing, played, playback, root, target, whole, dt) : played;
+  const pose = laid(model, acting, stood, playback, root, changed);
+  if (whole && !command.speed) stand(figure);
+  return guided(
+    figure,
+    holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), settings, dt) : pose,
+    dt,
+  );
+}
+
+/** A pose with head and arms as the figure is told. */
+function guided({ look, hands }: Steered, pose: Played, seconds: number): Played {
+  return hands.reduce(
+    (shown, hand, side) => reached(hand, side, shown, seconds),
+    looked(look, pose, seconds),
+  );
+}
+
+/** Who acts with the whole body and is told to stand goes on standing as it does then. */
+function stand(figure: Steered): void {
+  const facing = figure.playback.root[2];
+  figure.command = { ...figure.command, direction: facing, facing };
+  figure.target = [0, 0, facing];
+}

@@ -1,0 +1,47 @@
+/* Legs go another way, hips turned with them and the spine back, and with other strides: docs/reference/bundle.md, the loop `matching`. */
+import { WARPING } from "../generated.js";
+import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "../figures/humanoid/bones.js";
+import { legOf, OFFSETS, reach } from "../figures/legs.js";
+import { about, inverse, plus, product, type Quaternion, rotated, Y } from "../motion/rotations.js";
+
+/** Which bones turn back, each by the same share. */
+const BACK = SPINE.map((name) => BONES.indexOf(name));
+
+/** Local rotations with hips and legs turned to the left by an angle; all that the spine carries stays as it is. */
+export function warped(rotations: Quaternion[], angle: number): Quaternion[] {
+  if (Math.abs(angle) <= WARPING.LEAST) return rotations;
+  const turned = [...rotations];
+  let above = rotations[0]!;
+  turned[0] = product(about(Y, angle), above);
+  for (const bone of BACK) {
+    // about the vertical, as the parent has it
+    turned[bone] = product(about(rotated(inverse(above), Y), -angle / BACK.length), rotations[bone]!);
+    above = product(above, rotations[bone]!);
+  }
+  return turned;
+}
+
+/** Of the sole, in the frame of the foot. */
+const BALL = SOLES.Foot!.at(-1)!;
+/** How far in front of the hips the balls of a standing figure's feet are. */
+const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
+
+/**
+ * Local rotations with the balls of the feet led so far that strides are this times as long, in whichever direction they
+ * go: one that changed with the row that is played would make feet leap.
+ */
+export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
+  if (Math.abs(stride - 1) <= WARPING.LEAST) return rotations;
+  const turned = [...rotations];
+  SIDES.forEach((_, side) => {
+    const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);
+    const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
+    const led: [number, number, number] = [
+      (x - OFFSETS[side]![0]![0]) * (stride - 1),
+      0,
+      (z - UNDER) * (stride - 1),
+    ];
+    reach(turned, side, rotations[0]!, leg, led);
+  });
+  return turned;
+}

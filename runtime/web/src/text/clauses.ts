@@ -1,0 +1,64 @@
+/* Sentences that ask for several things in a row, as parts: docs/reference/bundle.md, "Several things in one text". */
+import { CLAUSES } from "../generated.js";
+const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
+const THEN = /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
+const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
+const OPENING = /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the)\s+\w+|\w+ly)(?:\s+(?:is|are))?\s+)+/iu;
+
+/** Words that say little about what is done. */
+export const FUNCTION_WORDS: ReadonlySet<string> = new Set(CLAUSES.FUNCTION_WORDS);
+
+/** What the forms of a lower-case word share: "danc" of dance, dances and dancing. */
+export function stem(word: string): string {
+  if (word.length <= 3) return word;
+  return word
+    .replace(/ies$/u, "y")
+    .replace(/(?:ing|ed|es|s|e)$/u, "")
+    .replace(/y$/u, "i")
+    .replace(/([^aeiou])\1$/u, "$1");
+}
+
+/** The stems of those of some words that have a form in -ing among them. */
+export function verbsOf(words: Iterable<string>): Set<string> {
+  return new Set([...words].filter((word) => word.length > 5 && word.endsWith("ing")).map(stem));
+}
+
+const bare = (text: string) => text.replace(/^[ ,]+|[ ,]+$/gu, "");
+
+/** The sentences of a text, and what it has between semicolons and in lines. */
+export function sentencesOf(text: string): string[] {
+  return text.split(STOPS).map(bare).filter(Boolean);
+}
+
+/** The parts of a sentence, in the order in which they are done. */
+export function partsOf(sentence: string, verbs: Set<string>): string[] {
+  const pieces = sentence
+    .replace(/^first(?:ly)?\b,?\s*/iu, "")
+    .split(THEN)
+    .map(bare)
+    .filter(Boolean);
+  return pieces.flatMap((piece) => beforeVerbs(piece, verbs));
+}
+
+/** A text cut at each comma and "and" that a verb follows, if one came before. */
+function beforeVerbs(text: string, verbs: Set<string>): string[] {
+  const parts: string[] = [];
+  let start = 0;
+  for (const { index, 0: separator } of text.matchAll(ALSO)) {
+    const done =
+      text
+        .slice(start, index)
+        .toLowerCase()
+        .match(/[\p{L}\p{N}_]+/gu) ?? [];
+    const opened = /^[\p{L}\p{N}_]+/u.exec(
+      text
+        .slice(index + separator.length)
+        .replace(OPENING, "")
+        .toLowerCase(),
+    );
+    if (!opened || !verbs.has(stem(opened[0])) || !done.some((word) => verbs.has(stem(word)))) continue;
+    parts.push(text.slice(start, index));
+    start = index + separator.length;
+  }
+  return [...parts, text.slice(start)];
+}
