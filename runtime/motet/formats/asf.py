@@ -58,6 +58,24 @@ def read_skeleton(path: str | Path) -> Asf:
 @lru_cache(maxsize=16)
 def _skeleton(path: Path, text: str) -> Asf:
     """A folder mostly holds motions of a few people: each skeleton is parsed once."""
+    sections = _sections(path, text)
+    units = {words[0].lower(): words[1] for _, words in sections.get("units", []) if len(words) > 1}
+    angle = units.get("angle", "deg").lower()[:3]
+    if angle not in ("deg", "rad"):
+        raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
+    bones = _read_bones(path, sections, 1.0 if angle == "deg" else 180 / np.pi)
+    joints = _joints(bones)
+    if lost := bones.keys() - {joint.name for joint in joints}:
+        raise FormatError(path, f"the hierarchy does not reach bone {quoted(min(lost))}")
+    try:
+        skeleton = Skeleton(tuple(joints), CMU_METRES if units.get("length") == "0.45" else None)
+    except MotionError as error:
+        raise FormatError(path, str(error)) from error
+    return Asf(skeleton, {bone.name: bone.dofs for bone in bones.values() if bone.dofs}, angle)
+
+
+def _sections(path: Path, text: str) -> dict[str, Lines]:
+    """The lines of each section by its keyword; FormatError where a required one is missing."""
     sections: dict[str, Lines] = {"": []}
     section = sections[""]
     for line, words in words_of(text.split("\n")):
@@ -67,11 +85,11 @@ def _skeleton(path: Path, text: str) -> Asf:
             section.append((line, words))
     if "root" not in sections or "hierarchy" not in sections:
         raise FormatError(path, "an ASF file needs the sections :root, :bonedata and :hierarchy")
-    units = {words[0].lower(): words[1] for _, words in sections.get("units", []) if len(words) > 1}
-    angle = units.get("angle", "deg").lower()[:3]
-    if angle not in ("deg", "rad"):
-        raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
-    factor = 1.0 if angle == "deg" else 180 / np.pi
+    return sections
+
+
+def _read_bones(path: Path, sections: Mapping[str, Lines], factor: float) -> dict[str, _Bone]:
+    """All bones with their children, by name. factor: degrees in the file's unit of angles."""
     bones = {"root": _root(path, sections["root"], factor)}
     for begin, block in _blocks(path, sections.get("bonedata", [])):
         bone = _bone(path, begin, block, factor)
@@ -79,14 +97,7 @@ def _skeleton(path: Path, text: str) -> Asf:
             raise FormatError(path, f"bone names must be unique and not empty, not {quoted(bone.name)}", begin)
         bones[bone.name] = bone
     _hang_children(path, sections["hierarchy"], bones)
-    joints = _joints(bones)
-    if lost := bones.keys() - {joint.name for joint in joints}:
-        raise FormatError(path, f"the hierarchy does not reach bone {quoted(min(lost))}")
-    try:
-        skeleton = Skeleton(tuple(joints), CMU_METRES if units.get("length") == "0.45" else None)
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
-    return Asf(skeleton, {bone.name: bone.dofs for bone in bones.values() if bone.dofs}, angle)
+    return bones
 
 
 def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
@@ -111,24 +122,38 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
 
 def _root(path: Path, lines: Lines, factor: float) -> _Bone:
     """The root, with its position in place of its reach."""
-    rest: dict[str, tuple[int, list[str]]] = dict.fromkeys(("position", "orientation"), (0, ["", "0", "0", "0"]))
-    said = rest | {"axis": (0, ["XYZ"]), "order": (0, [])} | {words[0].lower(): (n, words) for n, words in lines}
-    (at, place), (line, angles) = said["position"], said["orientation"]
-    axis = _axis(path, line, [*angles, said["axis"][1][-1]], factor)
-    dofs = _dofs(path, *said["order"], known=("tx", "ty", "tz", "rx", "ry", "rz"))
-    return _Bone("root", triple(place[1:], path, at), axis, dofs)
+    # keyword -> its line and words, with defaults for those that may be absent
+    entries: dict[str, tuple[int, list[str]]] = {
+        "position": (0, ["", "0", "0", "0"]),
+        "orientation": (0, ["", "0", "0", "0"]),
+        "axis": (0, ["XYZ"]),
+        "order": (0, []),
+    }
+    entries |= {words[0].lower(): (line, words) for line, words in lines}
+    line, position = entries["position"]
+    reach = triple(position[1:], path, line)
+    line, angles = entries["orientation"]
+    _, axis_order = entries["axis"]
+    axis = _axis(path, line, [*angles, axis_order[-1]], factor)
+    line, order = entries["order"]
+    dofs = _dofs(path, line, order, known=("tx", "ty", "tz", "rx", "ry", "rz"))
+    return _Bone("root", reach, axis, dofs)
 
 
 def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
-    said = {words[0].lower(): (line, words) for line, words in lines}
-    if missing := [word for word in ("direction", "length", "axis") if word not in said]:
+    entries = {words[0].lower(): (line, words) for line, words in lines}
+    if missing := [word for word in ("direction", "length", "axis") if word not in entries]:
         raise FormatError(path, f"this bone has no {' or '.join(missing)}", begin)
-    (at, direction), (line, words) = said["direction"], said["length"]
-    length = number((*words, "")[1], path, line)
-    reach = [repr(value * length) for value in triple(direction[1:], path, at)]
-    dofs = _dofs(path, *said.get("dof", (0, [])), known=("rx", "ry", "rz"))
-    name = said.get("name", (0, [""]))[1][-1]
-    return _Bone(name, triple(reach, path, begin), _axis(path, *said["axis"], factor), dofs)
+    line, length_words = entries["length"]
+    length = number((*length_words, "")[1], path, line)
+    line, direction = entries["direction"]
+    reach = [repr(value * length) for value in triple(direction[1:], path, line)]
+    line, dof_words = entries.get("dof", (0, []))
+    dofs = _dofs(path, line, dof_words, known=("rx", "ry", "rz"))
+    _, name_words = entries.get("name", (0, [""]))
+    line, axis_words = entries["axis"]
+    axis = _axis(path, line, axis_words, factor)
+    return _Bone(name_words[-1], triple(reach, path, begin), axis, dofs)
 
 
 def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:

@@ -121,10 +121,12 @@ def container(document: Mapping[str, Any], content: bytes) -> bytes:
 
 def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
     """A node for each joint, at rest, in their order."""
-    return [
-        {"name": joint.name, "translation": list(joint.offset), **({"children": list(children)} if children else {})}
-        for joint, children in zip(skeleton.joints, skeleton.children, strict=True)
-    ]
+    nodes: list[dict[str, Any]] = []
+    for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
+        nodes.append({"name": joint.name, "translation": list(joint.offset)})
+        if children:
+            nodes[-1]["children"] = list(children)
+    return nodes
 
 
 def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
@@ -132,8 +134,10 @@ def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
     turns = rotmat_to_quat(local_rotations(motion))
     moves = local_translations(motion)
     for i, joint in enumerate(skeleton.joints):
-        tracks = {"rotation": (turns[:, i], [0, 0, 0, 1]), "translation": (moves[:, i], joint.offset)}
-        yield from ((i, path, track) for path, (track, rest) in tracks.items() if i == 0 or np.any(track != rest))
+        if i == 0 or np.any(turns[:, i] != [0, 0, 0, 1]):
+            yield i, "rotation", turns[:, i]
+        if i == 0 or np.any(moves[:, i] != joint.offset):
+            yield i, "translation", moves[:, i]
 
 
 def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> dict[str, Any]:
@@ -144,15 +148,19 @@ def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
     for node, path, values in tracks:
-        track = values
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
-        if path == "rotation":  # signs that keep each quaternion near its predecessor
-            flips = np.sum(values[1:] * values[:-1], axis=-1, keepdims=True) < 0
-            track = np.concatenate([values[:1], values[1:] * np.cumprod(np.where(flips, -1.0, 1.0), axis=0)])
-        if len(track) not in times:
-            times[len(track)] = buffer.add(np.arange(len(track)) / motion.fps, bounded=True)
-        samplers.append({"input": times[len(track)], "output": buffer.add(track), "interpolation": "LINEAR"})
+        if len(values) not in times:
+            times[len(values)] = buffer.add(np.arange(len(values)) / motion.fps, bounded=True)
+        output = buffer.add(_continuous(values) if path == "rotation" else values)
+        samplers.append({"input": times[len(values)], "output": output, "interpolation": "LINEAR"})
     return {"name": name, "channels": channels, "samplers": samplers}
+
+
+def _continuous(quats: Array) -> Array:
+    """Quaternions (T, 4) with signs that keep each near its predecessor."""
+    is_flipped = np.sum(quats[1:] * quats[:-1], axis=-1, keepdims=True) < 0
+    signs = np.cumprod(np.where(is_flipped, -1.0, 1.0), axis=0)
+    return np.concatenate([quats[:1], quats[1:] * signs])
 
 
 def _rest(skeleton: Skeleton) -> Array:
@@ -169,18 +177,13 @@ def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> dict[str, An
     body = Body(skeleton)
     points = body.points(_rest(skeleton) / body.height)
     prisms = [_prism(bone, points[bone.start], points[bone.end], corners) for bone in body.bones]
-    places, normals = (np.concatenate(arrays) for arrays in zip(*prisms, strict=True))
+    places = np.concatenate([places for places, _ in prisms])
+    normals = np.concatenate([normals for _, normals in prisms])
     joints = np.zeros((len(places), 4))
     joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], corners + 1)
     colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * corners + 2, axis=0)
-    # triangles of a prism, counterclockwise from outside
-    now = np.arange(1, corners + 1)
-    after = np.arange(1, corners + 1) % corners + 1
-    tip = 2 * corners + 1
-    parts = [(0 * now, after, now), (now, after, now + corners), (after, after + corners, now + corners)]
-    parts.append((0 * now + tip, now + corners, after + corners))
-    prism = np.concatenate([np.stack(part, axis=1).reshape(-1) for part in parts])
-    triangles = prism + (2 * corners + 2) * np.arange(len(body.bones))[:, None]
+    first_corners = (2 * corners + 2) * np.arange(len(body.bones))
+    triangles = _prism_triangles(corners) + first_corners[:, None]
     attributes = {
         "POSITION": buffer.add(places * body.height, target=VERTICES, bounded=True),
         "NORMAL": buffer.add(normals, target=VERTICES),
@@ -189,6 +192,23 @@ def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> dict[str, An
         "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(places), 1)), target=VERTICES),
     }
     return {"attributes": attributes, "indices": buffer.add(triangles.reshape(-1), "<u4", INDICES), "material": 0}
+
+
+def _prism_triangles(corners: int) -> NDArray[np.int64]:
+    """The corners of a prism's triangles, counterclockwise from outside, three after three."""
+    near = np.arange(1, corners + 1)  # of the ring at the start
+    near_next = near % corners + 1
+    far = near + corners  # of the ring at the end
+    far_next = near_next + corners
+    first_tip = 0 * near
+    last_tip = first_tip + 2 * corners + 1
+    parts = [
+        (first_tip, near_next, near),
+        (near, near_next, far),
+        (near_next, far_next, far),
+        (last_tip, far, far_next),
+    ]
+    return np.concatenate([np.stack(part, axis=1).reshape(-1) for part in parts])
 
 
 def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, Array]:

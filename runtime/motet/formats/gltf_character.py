@@ -7,7 +7,7 @@ written into the character's file, with mesh and materials, or as a clip without
 
 import base64
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,21 +61,36 @@ class Nodes:
         """
         if motion.skeleton and motion.skeleton.metres_per_unit != 1:
             motion = motion.scaled(1.0)
-        turns = local_rotations(motion)
-        moves = local_translations(motion)
+        rotations = local_rotations(motion)
+        translations = local_translations(motion)
         for i, node in enumerate(self.joints):
-            parent = self.gltf.parents[node]
-            to_parent = self.linear[parent] if parent >= 0 else np.eye(3)
-            origin = self.places[parent] if parent >= 0 else np.zeros(3)
-            left, _, right = np.linalg.svd(to_parent)
-            frame = left @ right
-            turn = self.gltf.local(node)["rotation"]
-            if not i or np.abs(turns[:, i] - np.eye(3)).max() > 1e-6:
-                at_rest = frame @ quat_to_rotmat(turn / np.linalg.norm(turn))
-                yield node, "rotation", rotmat_to_quat(product(product(frame.T, turns[:, i]), at_rest))
-            if not i or np.abs(moves[:, i] - self.skeleton.offsets[i]).max() > 1e-6 * self.skeleton.height:
-                from_parent: Array = moves[:, i] - (origin if not i else 0.0)
-                yield node, "translation", from_parent @ np.linalg.inv(to_parent).T
+            is_root = i == 0
+            offset_changes = np.abs(translations[:, i] - self.skeleton.offsets[i]).max()
+            if is_root or np.abs(rotations[:, i] - np.eye(3)).max() > 1e-6:
+                yield node, "rotation", self._node_rotations(node, rotations[:, i])
+            if is_root or offset_changes > 1e-6 * self.skeleton.height:
+                yield node, "translation", self._node_translations(node, translations[:, i], is_root)
+
+    def _node_rotations(self, node: int, rotations: Array) -> Array:
+        """Quaternions (T, 4) of a node in its parent for rotations (T, 3, 3) of its joint from rest."""
+        parent = self.gltf.parents[node]
+        # the rotation nearest to the parent's linear map
+        left, _, right = np.linalg.svd(self.linear[parent] if parent >= 0 else np.eye(3))
+        frame = left @ right
+        rest = self.gltf.local(node)["rotation"]
+        at_rest = frame @ quat_to_rotmat(rest / np.linalg.norm(rest))
+        return rotmat_to_quat(product(product(frame.T, rotations), at_rest))
+
+    def _node_translations(self, node: int, translations: Array, is_root: bool) -> Array:
+        """Positions (T, 3) of a node in its parent for translations (T, 3) of its joint, the root's in the world."""
+        parent = self.gltf.parents[node]
+        to_parent = np.eye(3)
+        origin = np.zeros(3)
+        if parent >= 0:
+            to_parent = self.linear[parent]
+            origin = self.places[parent]
+        from_parent: Array = translations - (origin if is_root else 0.0)
+        return from_parent @ np.linalg.inv(to_parent).T
 
     def carrier(self, node: int) -> int:
         """The joint that a node is or is attached to, -1 for none."""
@@ -85,10 +100,10 @@ class Nodes:
 
     def turnable(self, node: int) -> dict[str, Any]:
         """A node as animation requires it: with translation, rotation and scale instead of a matrix."""
-        found = self.gltf.objects("nodes")[node]
-        if "matrix" not in found:
-            return found
-        kept = {key: value for key, value in found.items() if key != "matrix"}
+        properties = self.gltf.objects("nodes")[node]
+        if "matrix" not in properties:
+            return properties
+        kept = {key: value for key, value in properties.items() if key != "matrix"}
         return kept | {name: part.tolist() for name, part in self.gltf.local(node).items()}
 
 
@@ -99,7 +114,7 @@ def read_character(file: File) -> Character:
         gltf = parse(file)
         all_moved = set().union(*map(moved, gltf.objects("animations")))
         figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
-        linear, _, places = (found[0] for found in gltf.world())
+        linear, _, places = (part[0] for part in gltf.world())
         joints = list(figure.nodes)
         skeleton = skeleton_at(figure.names, figure.parents, places[joints])
         if not np.abs(np.linalg.det(linear[joints])).min() > 0:
@@ -133,17 +148,18 @@ def _skin(nodes: Nodes) -> dict[int, Array]:
         return {}
     if not parts:
         return {}
-    points, owners = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    points = np.concatenate([points for points, _ in parts])
+    owners = np.concatenate([owners for _, owners in parts])
     # 200 directions, spread evenly by the golden angle; the outermost point in each is kept
     height = 1 - (2 * np.arange(200) + 1) / 200
     angle = np.arange(200) * np.pi * (3 - 5**0.5)
     radius = np.sqrt(1 - height**2)
     directions = np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
-    found = {}
+    hulls = {}
     for joint in np.unique(owners[owners >= 0]).tolist():
-        own = points[owners == joint] - nodes.places[nodes.joints[joint]]
-        found[joint] = own[np.unique(np.argmax(own @ directions.T, axis=0))]
-    return found
+        from_joint = points[owners == joint] - nodes.places[nodes.joints[joint]]
+        hulls[joint] = from_joint[np.unique(np.argmax(from_joint @ directions.T, axis=0))]
+    return hulls
 
 
 def _meshes(nodes: Nodes) -> Iterator[tuple[Array, NDArray[np.intp]]]:
@@ -165,14 +181,14 @@ def _primitives(gltf: Gltf) -> list[tuple[int, dict[str, int], int | None]]:
     primitives: dict[tuple[object, ...], tuple[int, dict[str, int], int | None]] = {}
     visited = 0
     for node in gltf.order:
-        found = gltf.objects("nodes")[node]
-        listed = gltf.objects("meshes")[found["mesh"]]["primitives"] if "mesh" in found else []
+        properties = gltf.objects("nodes")[node]
+        listed = gltf.objects("meshes")[properties["mesh"]]["primitives"] if "mesh" in properties else []
         visited += len(listed)
         if visited > MAX_PRIMITIVES:
             raise FormatError(gltf.path, f"its nodes have more than {MAX_PRIMITIVES} primitives of meshes")
         for primitive in listed:
             attributes = primitive["attributes"]
-            skin = found.get("skin") if "JOINTS_0" in attributes else None
+            skin = properties.get("skin") if "JOINTS_0" in attributes else None
             place = node if skin is None else (skin, attributes["JOINTS_0"], attributes["WEIGHTS_0"])
             primitives[place, attributes["POSITION"]] = (node, attributes, skin)
     accessors = gltf.objects("accessors")
@@ -190,7 +206,8 @@ def _skinned(
     places = nodes.places[skin["joints"]]
     if "inverseBindMatrices" in skin:
         bind = np.swapaxes(nodes.gltf.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4), 1, 2)[: len(linear)]
-        linear, places = linear @ bind[:, :3, :3], rotated(linear, bind[:, :3, 3]) + places
+        places = rotated(linear, bind[:, :3, 3]) + places
+        linear = linear @ bind[:, :3, :3]
     moved = np.zeros(points.shape)
     for joint, weight in zip(joints.T, weights.T, strict=True):
         moved += weight[:, None] * (rotated(linear[joint], points) + places[joint])
@@ -216,13 +233,25 @@ def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
         buffer = Buffer(gltf.document, gltf.buffers[0] if buffers else b"")
         made = [animation(buffer, name, motion, nodes.tracks(motion)) for name, motion in clips.items()]
         kept = [old for old in gltf.objects("animations") if old.get("name") not in clips]
-        targets = {channel["target"]["node"] for each in made for channel in each["channels"]}
-        all_nodes = [nodes.turnable(i) if i in targets else node for i, node in enumerate(gltf.objects("nodes"))]
-        sizes = [{**(buffers[0] if buffers else {}), "byteLength": len(buffer.content)}, *buffers[1:]]
-        document = {**gltf.document, "nodes": all_nodes, "animations": made + kept, **buffer.parts(), "buffers": sizes}
-        document |= {"images": images} if images else {}
+        first = {**(buffers[0] if buffers else {}), "byteLength": len(buffer.content)}
+        document = {**gltf.document, **buffer.parts(), "buffers": [first, *buffers[1:]]}
+        document["nodes"] = _turnable_nodes(nodes, made)
+        document["animations"] = made + kept
+        if images:
+            document["images"] = images
         content = container(document, bytes(buffer.content))
     write_whole(file, content)
+
+
+def _turnable_nodes(nodes: Nodes, animations: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """All nodes of the file, those that animations move as animation requires them."""
+    targets: set[int] = set()
+    for each in animations:
+        targets |= {channel["target"]["node"] for channel in each["channels"]}
+    turnable = []
+    for i, node in enumerate(nodes.gltf.objects("nodes")):
+        turnable.append(nodes.turnable(i) if i in targets else node)
+    return turnable
 
 
 def _embedded_buffers(gltf: Gltf) -> list[dict[str, Any]]:
@@ -272,25 +301,41 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
     if not any(gltf.objects("nodes")[node].get("name") for node in nodes.joints):
         remedy = "which writes the character itself"
         log.warning("%s: its nodes have no names, by which a clip plays: use --onto (onto=), %s", gltf.path, remedy)
+    # the joints and what they hang on, by their new numbers
     kept = list(nodes.joints)
     while gltf.parents[kept[0]] >= 0:
         kept.insert(0, gltf.parents[kept[0]])
-    at = {node: i for i, node in enumerate(kept)}
-    made = animation(buffer, "motion", motion, nodes.tracks(motion))
-    for channel in made["channels"]:
-        channel["target"]["node"] = at[channel["target"]["node"]]
-    bare: list[dict[str, Any]] = []
-    for node in kept:
-        found = nodes.turnable(node)
-        parts: dict[str, Any] = {key: found[key] for key in ("translation", "rotation", "scale") if key in found}
-        children = [at[child] for child in found.get("children", []) if child in at]
-        parts |= {"children": children} if children else {}
-        bare.append({"name": gltf.name(node), **parts})
+    number_of = {node: number for number, node in enumerate(kept)}
+    clip = animation(buffer, "motion", motion, nodes.tracks(motion))
+    for channel in clip["channels"]:
+        channel["target"]["node"] = number_of[channel["target"]["node"]]
     joints = list(nodes.joints)
-    bind = np.zeros((len(joints), 4, 4))
-    bind[:, :3, :3] = nodes.linear[joints]
-    bind[:, :3, 3] = nodes.places[joints]
-    bind[:, 3, 3] = 1
-    skin = {"joints": [at[node] for node in joints]}
-    document = with_body(buffer, motion, nodes.skeleton, bare, made, skin, np.asarray(np.linalg.inv(bind), np.float64))
+    skin = {"joints": [number_of[node] for node in joints]}
+    inverse_bind = _inverse_bind(nodes.linear[joints], nodes.places[joints])
+    bare = _bare_nodes(nodes, number_of)
+    document = with_body(buffer, motion, nodes.skeleton, bare, clip, skin, inverse_bind)
     write_whole(file, container(document, bytes(buffer.content)))
+
+
+def _bare_nodes(nodes: Nodes, number_of: Mapping[int, int]) -> list[dict[str, Any]]:
+    """Nodes without meshes and the like, and with children by their new numbers."""
+    bare = []
+    for node in number_of:
+        properties = nodes.turnable(node)
+        kept: dict[str, Any] = {"name": nodes.gltf.name(node)}
+        for key in ("translation", "rotation", "scale"):
+            if key in properties:
+                kept[key] = properties[key]
+        if children := [number_of[child] for child in properties.get("children", []) if child in number_of]:
+            kept["children"] = children
+        bare.append(kept)
+    return bare
+
+
+def _inverse_bind(linear: Array, places: Array) -> Array:
+    """The inverse bind matrices (J, 4, 4) of joints with linear maps (J, 3, 3) and positions (J, 3) in the world."""
+    bind = np.zeros((len(linear), 4, 4))
+    bind[:, :3, :3] = linear
+    bind[:, :3, 3] = places
+    bind[:, 3, 3] = 1
+    return np.asarray(np.linalg.inv(bind), np.float64)
