@@ -122,7 +122,7 @@ def test_numbers_can_be_words(model: CodesModel) -> None:
 
 
 def test_what_is_not_met_is_told(model: CodesModel) -> None:
-    with pytest.warns(TextWarning, match=r"asks for 150 metres; shown: \d"):
+    with pytest.warns(TextWarning, match=r"requests 150 metres; shown: \d"):
         (made,) = model.generate("a person walks 150 metres", seconds=4)
     assert len(made.frames) == 4 * model.fps
     assert made.measured["metres"] < 20
@@ -234,8 +234,8 @@ def test_a_turn_is_that_of_the_hips_from_first_to_last(sentence: str, model: Cod
 @pytest.mark.parametrize(
     ("sentence", "warned"),
     [
-        ("stands still while running", "at once"),
-        ("walks while sitting", "at once"),
+        ("stands still while running", "only one can be shown"),
+        ("walks while sitting", "only one can be shown"),
         ("cross your fingers", "has no action"),
     ],
 )

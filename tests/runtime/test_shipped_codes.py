@@ -284,7 +284,7 @@ def test_no_motion_ends_as_it_begins(model: CodesModel, memory: float) -> None:
 
 
 def test_the_length_comes_before_other_numbers(model: CodesModel) -> None:
-    with pytest.warns(TextWarning, match="asks for 2 metres; shown: "):
+    with pytest.warns(TextWarning, match="requests 2 metres; shown: "):
         (walk,) = model.generate("walk 2 metres forward", seconds=4)
     (turn,) = model.generate("turn left 90 degrees", seconds=3)
     assert [len(one.frames) for one in (walk, turn)] == [4 * model.fps, 3 * model.fps]

@@ -1,5 +1,4 @@
-"""Generate: motions for a sentence. What all such models share, and those that draw frame by frame from mixtures of
-Gaussians (section 4.3 of Plappert et al. 2017)."""
+"""Generate: motions for a sentence, as far as all models that generate are alike."""
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,8 +21,11 @@ from motet.representation.contract import MotionContract
 from motet.settings import Progress, Seed, seeds_of, silent
 from motet.text.numeric_phrases import Quantities
 
-SETTLED = 0.3  # seconds in which the planting of feet blends in
-PLAYED = 30.0  # frames a second of generated motions by default, whatever the model's own rate
+SETTLED = 0.3
+"""Seconds in which the planting of feet blends in."""
+
+PLAYED = 30.0
+"""Frames per second of generated motions by default, whatever the model's own rate."""
 
 
 class LoopSettings(TypedDict, total=False):
@@ -55,31 +57,40 @@ class _Options(GenerateSettings, total=False):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Generated:
-    """A generated motion, its log-likelihood given the sentence, and the words that were unknown.
-
-    contract: the meaning of the frames. frames: (T, D) as drawn, in its channels.
-    log_likelihood: of the normalised frames as drawn and of their end, like :meth:`GenerateModel.score`;
-        None where the model's loop has no likelihoods.
-    after: the motion that it continues; without one it starts at the origin.
-    action: a sentence of the action that it shows, "" where a model knows none, or several are shown.
-    lacking: known words of its sentence that no sentence of that action has. confidence: from 0 to 1, how well the
-        model knows its sentence (:meth:`motet.generate.model.CodesModel.understood`), or of several the one that
-        it knows least; None where a model cannot say.
-    asked: what its sentence asks for in numbers (:mod:`motet.text.numeric_phrases`): degrees to the left, metres,
-        steps, times, seconds, and a pace beside the usual; empty where several things are shown. measured: how much of
-        each the motion has, as far as it can be said.
-    """
+    """A generated motion, its log-likelihood given the sentence, and the words that were unknown."""
 
     contract: MotionContract
+    """The meaning of the frames."""
+
     frames: Array
+    """(T, D) as drawn, in the contract's channels."""
+
     log_likelihood: float | None
+    """Of the normalised frames as drawn and of their end, like :meth:`GenerateModel.score`; None where the model's loop
+    has no likelihoods."""
+
     unknown: tuple[str, ...] = ()
+    """Words of the sentence that the model does not know."""
+
     after: Motion | None = None
+    """The motion that it continues; without one it starts at the origin."""
+
     action: str = ""
+    """A sentence of the action that it shows; "" where a model knows none, or several are shown."""
+
     lacking: tuple[str, ...] = ()
+    """Known words of its sentence that no sentence of that action has."""
+
     confidence: float | None = None
+    """How well the model knows its sentence (:meth:`motet.generate.model.CodesModel.understood`), 0 to 1; of several
+    sentences the least; None where a model cannot tell."""
+
     asked: Mapping[str, float] = field(default_factory=dict)
+    """The numbers in its sentence (:mod:`motet.text.numeric_phrases`): degrees to the left, metres, steps, times,
+    seconds, and a pace relative to the usual one; empty where several things are shown."""
+
     measured: Mapping[str, float] = field(default_factory=dict)
+    """How much of each the motion has, as far as it can be measured."""
 
     @cached_property
     def features(self) -> Motion:
@@ -150,11 +161,11 @@ class GenerateModel(LanguageModel):
         A mixture model ranks them, the likeliest per frame first. Those of a motion-code model are independent, and the
         first does not depend on their number.
         numbers: show as many degrees, metres, steps, times and seconds as sentences say (:meth:`quantities`), or warn.
-        whole: take a sentence that asks for several things in a row (:meth:`parts`) as one; else each of its motions is
-            a story of its parts, and seconds is what they last together.
+        whole: show a sentence that requests several things in a row (:meth:`parts`) as one; else each of its motions is
+            a story of its parts, and seconds is the length of all of them together.
         seed: sentence i uses seed + i (or seed[i]), and gets the same motions as alone with that seed.
-        strict: refuse a sentence with unknown words, one that is outside the training data, and one of which the action
-            taken lacks a word; else a warning says so. progress: called with the number of sentences done and in all.
+        strict: refuse a sentence with unknown words, one that is outside the training data, and one whose action leaves
+            out a word; else these are warnings. progress: called with the number of sentences done and in all.
         settings: those of the model's loop; None (the default) for the bundle's.
             temperature: of sampling: about the centres of a mixture's components, or of codes. max_seconds: a motion
             that has not ended by then is cut. Mixture models also take candidates: frames drawn by each hypothesis in a
@@ -164,55 +175,62 @@ class GenerateModel(LanguageModel):
         range or unknown to the loop. Unknown words are named by a TextWarning and in the result.
         """
         texts = texts_of(sentences)
-        own = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
-        read, seeds = {**own, "numbers": numbers, "whole": whole}, seeds_of(seed, len(texts), DecodingError)
-        composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole, own)}
+        drawing = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
+        seeds = seeds_of(seed, len(texts), DecodingError)
+        composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole, drawing)}
         single = [i for i in range(len(texts)) if i not in composed]
-        drawn = self._drawn([texts[i] for i in single], [seeds[i] for i in single], strict, own)
-        found: dict[int, list[Generated]] = {}
-        for i in (*single, *sorted(composed)):
-            found[i] = self.composed(texts[i], seeds[i], strict, read) if i in composed else next(drawn)
-            progress(len(found), len(texts))
-        return found[0] if isinstance(sentences, str) else [found[i] for i in range(len(texts))]
+        drawn = self._drawn([texts[i] for i in single], [seeds[i] for i in single], strict, drawing)
+        motions: dict[int, list[Generated]] = {}
+        for i in single:
+            motions[i] = next(drawn)
+            progress(len(motions), len(texts))
+        reading = {**drawing, "numbers": numbers, "whole": whole}
+        for i in sorted(composed):
+            motions[i] = self.composed(texts[i], seeds[i], strict, reading)
+            progress(len(motions), len(texts))
+        return motions[0] if isinstance(sentences, str) else [motions[i] for i in range(len(texts))]
 
     def _composed(self, sentence: str, numbers: bool, whole: bool, settings: Mapping[str, float | None]) -> bool:
-        """Whether a sentence is told as a story: of its parts, or of its numbers, or of the seconds that are given."""
-        return (not whole and len(self.parts(sentence)) > 1) or (numbers and bool(self.quantities(sentence).amounts))
+        """Whether a sentence is shown as a story: for its parts, its numbers, or the seconds of the settings."""
+        if not whole and len(self.parts(sentence)) > 1:
+            return True
+        return numbers and bool(self.quantities(sentence).amounts)
 
     def _drawn(
         self, texts: Sequence[str], seeds: Sequence[int], strict: bool, settings: Mapping[str, float | None]
     ) -> Iterator[list[Generated]]:
         """The motions of each sentence as a whole, drawn in batches."""
-        contexts, noise, chosen = self.asked(texts, len(texts), seeds, strict, settings)
+        contexts, noise, chosen = self.drawing_inputs(texts, len(texts), seeds, strict, settings)
         for start in range(0, len(texts), self.loop.batch):
             batch = slice(start, start + self.loop.batch)
             for text, row in zip(texts[batch], self.decode(contexts[batch], noise[batch], chosen), strict=True):
                 yield self.results(text, row)
 
     def results(self, sentence: str, samples: Sequence[Sample]) -> list[Generated]:
-        """What was drawn for a sentence; a TextWarning where it shows less than was asked."""
+        """The motions drawn for a sentence; a TextWarning where they show less than it says."""
         unknown = tuple(self.unknown(sentence))
-        return [Generated(self.contract, one.frames, one.log_likelihood, unknown) for one in samples]
+        return [Generated(self.contract, sample.frames, sample.log_likelihood, unknown) for sample in samples]
 
     def parts(self, sentence: str) -> list[str]:
-        """What a sentence asks for one after another: itself alone, where the model knows it as one thing."""
+        """The things that a sentence requests one after another; itself, where the model knows it as one thing."""
         return [sentence]
 
     def quantities(self, sentence: str) -> Quantities:
-        """What a sentence asks for in numbers, and what it is taken for without them; nothing where the model's loop
-        cannot follow them."""
+        """The numbers in a sentence, and the text that it is read as without them; none where the model's loop cannot
+        follow them."""
         return Quantities(sentence)
 
     def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:
-        """Motions that show the parts of a sentence, as many as the setting hypotheses says; see :meth:`generate`."""
+        """``settings["hypotheses"]`` motions that show the parts of a sentence; see :meth:`generate`."""
         raise DecodingError(f"models of the loop {self.manifest.loop!r} show one sentence at a time")
 
-    def asked(
+    def drawing_inputs(
         self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
     ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
         """Contexts (N, C) of sentences, noise of ``rows`` rows, and all settings of the loop; see :meth:`generate`."""
-        chosen, contexts = self._settled(settings), self.embed(texts)
-        noise = [np.random.Generator(np.random.PCG64(one)) for one in seeds_of(seed, rows, DecodingError)]
+        chosen = self._settled(settings)
+        contexts = self.embed(texts)
+        noise = [np.random.Generator(np.random.PCG64(row_seed)) for row_seed in seeds_of(seed, rows, DecodingError)]
         for text, context in zip(texts, contexts, strict=True):
             self.note(text, context, strict)
         return contexts, noise, chosen
@@ -229,17 +247,17 @@ class GenerateModel(LanguageModel):
         lacking: and where the action that it is read as leaves out a word (:meth:`check_whole`).
         """
         with collected(TextWarning):
-            for said in [sentence] if whole else self.parts(sentence):
-                part = self.quantities(said).text if numbers else said
-                self.note(part, self.embed(part), strict=True)
+            for part in [sentence] if whole else self.parts(sentence):
+                text = self.quantities(part).text if numbers else part
+                self.note(text, self.embed(text), strict=True)
                 if lacking:
-                    self.check_whole(part)
+                    self.check_whole(text)
 
     def check_whole(self, sentence: str) -> None:
         """TextError where the action that a sentence is read as leaves out a word of it, if the model knows actions."""
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
-        """Warn where the model knows a sentence with this context (C,) only in part, beyond its unknown words.
+        """Warn if the model knows a sentence with this context (C,) only in part, apart from its unknown words.
 
         strict: raise TextError instead.
         """
@@ -252,18 +270,18 @@ class GenerateModel(LanguageModel):
 
     def embed(self, sentences: str | Sequence[str]) -> Floats:
         """The context vector (C,) float32 of a sentence, or vectors (N, C) of several; errors like :meth:`ids`."""
-        found = self.contexts([self.ids(text) for text in texts_of(sentences)])
-        return found[0] if isinstance(sentences, str) else found
+        contexts = self.contexts([self.ids(text) for text in texts_of(sentences)])
+        return contexts[0] if isinstance(sentences, str) else contexts
 
     def score(self, sentence: str, motion: Motion) -> float:
         """Log-likelihood of a motion, and of its end, given a sentence; a TextWarning names the words taken as UNK.
         DecodingError for a model whose loop has no likelihoods."""
         raise DecodingError(f"models of the loop {self.manifest.loop!r} cannot score motions")
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """A sentence ("text" of the settings) and its noise to ids (words,) int64 and the frames of the best motion.
         The noise of each kind is (calls, ...), the frames (T, D) are normalised."""
         ids, _ = self.vocabulary.encode(str(settings["text"]))
-        chosen = self.loop.settled(self.defaults, {k: v for k, v in settings.items() if k != "text"})
-        (row,) = self.decode(self.contexts([ids]), [Recorded(given)], chosen)
+        chosen = self.loop.settled(self.defaults, {name: value for name, value in settings.items() if name != "text"})
+        (row,) = self.decode(self.contexts([ids]), [Recorded(inputs)], chosen)
         return {"ids": ids, "frames": self.contract.normalised(row[0].frames).astype(np.float32)}

@@ -1,8 +1,8 @@
-"""Motions drawn code by code: an action from what a sentence asks for, then steps of codes from what follows.
+"""Motions drawn code by code: an action from the context of a sentence, then one step of codes after the other.
 
-A step of codes is a move of the root and some codes of the body; each is drawn knowing those before it, as words are:
-by temperature, and from the likeliest that make up ``top_p`` together (nucleus sampling: Holtzman et al. 2020). How far
-an action is followed can be raised by classifier-free guidance (Ho and Salimans 2022).
+A step of codes is a move of the root and some codes of the body; each is drawn knowing those before it, like words: by
+temperature, and from the likeliest that make up ``top_p`` together (nucleus sampling: Holtzman et al. 2020).
+Classifier-free guidance makes motions follow an action more closely (Ho and Salimans 2022).
 
 Steps of training motions are remembered, to continue as people did after similar steps, as a nearest-neighbour language
 model does with words (Khandelwal et al. 2020): the distribution of the next step is that of a net, mixed with the next
@@ -22,39 +22,51 @@ from motet.generate.memory import Memory
 from motet.settings import Range, Settings
 
 WINDOW = 64
-"""Steps that a writer looks back at most, those of the windows that writers are trained on: a stream may last for ever.
-"""
+"""Steps that a writer looks back at most, as in the windows of its training; so a stream may last for ever."""
 
 
 @dataclass(frozen=True)
 class CodesSettings(Settings):
-    """hypotheses: motions that are given. first_temperature: of the first step, which decides how an action is done.
-    memory: the share of steps that are taken from what is remembered. certainty: of the action. seconds: 0 lets the
-    model end a motion, after max_seconds at most."""
+    """How codes are drawn."""
 
     hypotheses: Annotated[int, Range(1, 100)] = 1
+    """Number of motions."""
+
     temperature: Annotated[float, Range(0.01, 100)] = 1.0
+
     first_temperature: Annotated[float, Range(0.01, 100)] = 1.0
+    """Of the first step, which decides on the manner of an action."""
+
     top_p: Annotated[float, Range(0.01, 1)] = 1.0
+
     guidance: Annotated[float, Range(0, 10)] = 1.0
+
     memory: Annotated[float, Range(0, 1)] = 0.0
+    """Share of the steps that are remembered ones."""
+
     certainty: Annotated[float, Range(0.01, 100)] = 1.0
+    """Exponent of the probabilities of actions."""
+
     seconds: Annotated[float, Range(0, 600, "s")] = 0.0
+    """Length of a motion; 0 where it ends by itself."""
+
     max_seconds: Annotated[float, Range(0, 600, "s")] = 30.0
+    """Length after which a motion is cut that has not ended by itself."""
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What writers draw from: the graphs "step" and "part", and a memory.
-
-    end: the move that ends a motion; the one after it stands for what comes before the first step.
-    null_action: the action that says nothing, for guidance.
-    """
+    """The sources that writers draw from."""
 
     step: Graph
     part: Graph
+
     end: int
+    """The move that ends a motion; the one after it stands for the time before the first step."""
+
     null_action: int
+    """The action that stands for no action, for guidance."""
+
     memory: Memory
 
     @property
@@ -64,31 +76,41 @@ class Source:
 
     def uniform(self, noise: Sequence[Noise]) -> Scores:
         """A block (B, P + 2) of uniform numbers from the noise of each row."""
-        return np.stack([one.random((self.parts + 2,), np.float32) for one in noise]).astype(np.float64)
+        return np.stack([row.random((self.parts + 2,), np.float32) for row in noise]).astype(np.float64)
 
 
 class Writer:
-    """Draws codes for B rows, each of its own action and noise; holds all state of one request.
+    """Draws codes for B rows, each with its action and noise; holds all state of one request."""
 
-    age: (B,) int64 steps since the action began. done: (B,) the share of its movement that is over.
-    """
+    age: Ids
+    """(B,) int64 steps since the action began."""
+
+    done: Scores
+    """(B,) the share of the action's movement that is over."""
 
     def __init__(self, source: Source, noise: Sequence[Noise], drawing: CodesSettings) -> None:
-        self.source, self.noise, self.drawing = source, list(noise), drawing
-        rows = 2 * len(self.noise)  # told the action, and not told
+        self.source = source
+        self.noise = list(noise)
+        self.drawing = drawing
         self.begin()
+        # The graphs run on 2 B rows: those that know the action, then those that do not.
+        rows = 2 * len(self.noise)
         self.state = zero_state(source.step, rows)
         self.last = np.zeros((rows, source.parts), dtype=np.int64)
         self.last[:, 0] = source.end + 1
         self.recent: list[Floats] = []  # numbers (B, L) of the last steps, the latest first
-        self._before = self.last, self.state, self.recent, self.age, self.done
+        self._remember()
+
+    def _remember(self) -> None:
+        self._before = (self.last, self.state, self.recent, self.age, self.done)
 
     def begin(self) -> None:
         """Begin an action in every row."""
-        self.age, self.done = np.zeros(len(self.noise), dtype=np.int64), np.zeros(len(self.noise))
+        self.age = np.zeros(len(self.noise), dtype=np.int64)
+        self.done = np.zeros(len(self.noise))
 
     def see(self, codes: Ids) -> None:
-        """Take steps (N, P) as what every row did before, whatever action it was."""
+        """Take steps (N, P) as the past of every row, whatever the action was."""
         for step in codes:
             self._known(np.full(len(self.noise), self.source.null_action))
             self.last = np.tile(step, (len(self.last), 1))
@@ -102,27 +124,41 @@ class Writer:
         whole: whether all of an action is shown; else, of long recordings, an act (:meth:`Memory.next`). Each row takes
         one block of uniform numbers (P + 2,) from its noise.
         """
-        known, uniform, memory = self._known(actions), self.source.uniform(self.noise), self.source.memory
+        known = self._known(actions)
+        uniform = self.source.uniform(self.noise)
+        self.age = self.age.copy()
+        self.done = self.done.copy()
+
+        # Steps of some rows are remembered ones; -1 marks parts that are still to be drawn.
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
         share = self.drawing.memory
-        self.age, self.done = self.age.copy(), self.done.copy()
-        for row in np.flatnonzero((uniform[:, 0] < share) | (steps > 0 and share > 0)):
-            if (action := int(actions[row])) in memory.rows:
-                recent, number = [numbers[row] for numbers in self.recent], float(uniform[row, 1])
-                if steps:
-                    place = memory.busiest(action, recent, steps, number)
-                    self.age[row] = memory.ages[place]
-                else:
-                    age, done = int(self.age[row]), float(self.done[row])
-                    place = memory.next(action, recent, age, ends, number, done, whole)
-                over, self.done[row] = memory.over(action, place, whole)
-                codes[row] = memory.codes[place]
-                codes[row, 0] = self.source.end if over and ends else codes[row, 0]
+        for row in np.flatnonzero((uniform[:, 0] < share) | (steps > 0 and share > 0)).tolist():
+            if int(actions[row]) in self.source.memory.rows:
+                codes[row] = self._remembered(row, int(actions[row]), float(uniform[row, 1]), ends, steps, whole)
+
+        # The others are drawn, and end no sooner than remembered motions.
+        memory = self.source.memory
         shortest = np.array([memory.shortest.get(int(action), 0) for action in actions])
-        begun = self.age < (1 - memory.settings.skip) * shortest
-        again = self._parts(known, uniform[:, 2:], codes, ends, begun)
+        is_early = self.age < (1 - memory.settings.skip) * shortest
+        again = self._parts(known, uniform[:, 2:], codes, ends, is_early)
         self.last = np.tile(codes, (2, 1))
-        self.age, self.done = np.where(again, 0, self.age + 1), np.where(again, 0.0, self.done)
+        self.age = np.where(again, 0, self.age + 1)
+        self.done = np.where(again, 0.0, self.done)
+        return codes
+
+    def _remembered(self, row: int, action: int, uniform: float, ends: bool, steps: int, whole: bool) -> Ids:
+        """The codes (P,) of a remembered step at which a row continues; see :meth:`draw`."""
+        memory = self.source.memory
+        recent = [numbers[row] for numbers in self.recent]
+        if steps:
+            place = memory.busiest(action, recent, steps, uniform)
+            self.age[row] = memory.ages[place]
+        else:
+            place = memory.next(action, recent, int(self.age[row]), ends, uniform, float(self.done[row]), whole)
+        is_over, self.done[row] = memory.over(action, place, whole)
+        codes: Ids = memory.codes[place].copy()
+        if is_over and ends:
+            codes[0] = self.source.end
         return codes
 
     def take_back(self) -> None:
@@ -130,66 +166,98 @@ class Writer:
         self.last, self.state, self.recent, self.age, self.done = self._before
 
     def _known(self, actions: Ids) -> Floats:
-        self._before = self.last, self.state, self.recent, self.age, self.done
-        told = np.concatenate([actions, np.full(len(actions), self.source.null_action)]).astype(np.int64)
-        inputs = {"codes": self.last, "action": told, "age": np.tile(self.age, 2)}
+        """Advance by the last step: what the graph "part" has to know (2 B, H) of the next one."""
+        self._remember()
+        no_action = np.full(len(actions), self.source.null_action)
+        inputs = {
+            "codes": self.last,
+            "action": np.concatenate([actions, no_action]).astype(np.int64),
+            "age": np.tile(self.age, 2),
+        }
         outputs, self.state = advance(self.source.step, self.state, inputs)
-        for name, array in self.state.items():  # attention falls with the distance in time
-            sizes = self.source.step.spec.start_shape(name)
-            if 0 in sizes and array.shape[axis := 1 + sizes.index(0)] > WINDOW:
-                self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
+        self._keep_window()
         if self.last[0, 0] != self.source.end + 1:
-            self.recent = [outputs["numbers"][: len(actions)], *self.recent][: self.source.memory.settings.past_steps]
+            numbers = outputs["numbers"][: len(actions)]
+            self.recent = [numbers, *self.recent][: self.source.memory.settings.past_steps]
         known: Floats = outputs["known"]
         return known
 
+    def _keep_window(self) -> None:
+        """Drop the states of steps before the window: attention falls with the distance in time."""
+        for name, array in self.state.items():
+            sizes = self.source.step.spec.start_shape(name)
+            if 0 not in sizes:
+                continue
+            axis = 1 + sizes.index(0)
+            if array.shape[axis] > WINDOW:
+                self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
+
     def _parts(
-        self, known: Floats, uniform: Scores, codes: Ids, ends: bool, begun: NDArray[np.bool_]
+        self, known: Floats, uniform: Scores, codes: Ids, ends: bool, is_early: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
-        """Draw the parts of steps (B, P) one after the other where they are not given; which rows (B,) begin again.
-        begun: rows (B,) that do not end yet."""
-        drawing, end = self.drawing, self.source.end
+        """Draw the parts of steps (B, P) one after the other, except in rows that are remembered already.
+
+        is_early: rows (B,) that may not end yet. Returns the rows (B,) that begin their action again."""
+        end = self.source.end
+        top_p = self.drawing.top_p
         again: NDArray[np.bool_] = (codes[:, 0] == end) & (not ends)
         rows = np.flatnonzero((codes[:, 0] < 0) | again)
-        told = known[np.concatenate([rows, rows + len(codes)])]
-        temperature = np.where(self.age == 0, drawing.first_temperature, drawing.temperature)[rows]
+        if not len(rows):
+            return again
+        known = known[np.concatenate([rows, rows + len(codes)])]
+        temperature = np.where(self.age == 0, self.drawing.first_temperature, self.drawing.temperature)[rows]
         codes[rows] = 0
-        for part in range(self.source.parts) if len(rows) else ():
-            asked = {"known": told, "codes": np.tile(codes[rows], (2, 1))}
-            with_action, without = np.split(self.source.part(asked)["log_probabilities"][:, part].astype(np.float64), 2)
-            chances = without + drawing.guidance * (with_action - without)
-            drawn = nucleus(chances, uniform[rows, part], temperature, drawing.top_p)
+        for part in range(self.source.parts):
+            chances = self._chances(known, codes[rows], part)
+            drawn = nucleus(chances, uniform[rows, part], temperature, top_p)
             if part == 0:
-                early, ended = begun[rows] | (not ends), drawn == end
-                again[rows] |= ended & (not ends)
-                chances[early, end] = -np.inf
-                other = uniform[rows, part] * 1024 % 1  # the same number would give a neighbour of the end
-                number = np.where(again[rows] | ended & early, other, uniform[rows, part])
-                drawn = nucleus(chances, number, temperature, drawing.top_p)
+                # An end that may not be is drawn again from the other moves; the same number would give a neighbour.
+                never_ends = is_early[rows] | (not ends)
+                has_ended = drawn == end
+                again[rows] |= has_ended & (not ends)
+                chances[never_ends, end] = -np.inf
+                other = uniform[rows, part] * 1024 % 1
+                number = np.where(again[rows] | has_ended & never_ends, other, uniform[rows, part])
+                drawn = nucleus(chances, number, temperature, top_p)
             codes[rows, part] = drawn
         return again
+
+    def _chances(self, known: Floats, codes: Ids, part: int) -> Scores:
+        """Guided log-probabilities (R, K) of a part of rows, from the parts (R, P) drawn before it."""
+        outputs = self.source.part({"known": known, "codes": np.tile(codes, (2, 1))})
+        log_probabilities = outputs["log_probabilities"][:, part].astype(np.float64)
+        with_action, without = np.split(log_probabilities, 2)
+        chances: Scores = without + self.drawing.guidance * (with_action - without)
+        return chances
 
     def keep(self, rows: NDArray[np.intp]) -> None:
         """Go on with some of the rows only."""
         both = np.concatenate([rows, rows + len(self.noise)])
-        self.noise, self.age, self.done = [self.noise[row] for row in rows], self.age[rows], self.done[rows]
+        self.noise = [self.noise[row] for row in rows]
+        self.age = self.age[rows]
+        self.done = self.done[rows]
         self.recent = [numbers[rows] for numbers in self.recent]
-        self.last, self.state = self.last[both], {name: array[both] for name, array in self.state.items()}
+        self.last = self.last[both]
+        self.state = {name: array[both] for name, array in self.state.items()}
 
 
 def nucleus(log_weights: Scores, uniform: Scores, temperature: Scores | float, top_p: float) -> Ids:
-    """One of V things for each row of (B, V), by uniform numbers (B,): of those likeliest that make up ``top_p``."""
+    """One of V ids for each row of (B, V), by uniform numbers (B,): of the likeliest that make up ``top_p``."""
     divisor = np.broadcast_to(temperature, len(log_weights))[:, None]
     weights = np.exp((log_weights - log_weights.max(axis=1, keepdims=True)) / divisor)
+
+    # The nucleus: the likeliest, up to the one that goes beyond top_p.
     order = np.argsort(-weights, axis=1, kind="stable")
-    shares = np.cumsum(np.take_along_axis(weights, order, axis=1), axis=1)
-    kept = shares - np.take_along_axis(weights, order, axis=1) < top_p * shares[:, -1:]  # the last goes beyond it
+    sorted_weights = np.take_along_axis(weights, order, axis=1)
+    shares = np.cumsum(sorted_weights, axis=1)
+    kept = shares - sorted_weights < top_p * shares[:, -1:]
     inside = np.zeros_like(weights)
     np.put_along_axis(inside, order, kept, axis=1)
-    # in the order of the things themselves: that of their weights would change with a rounding
+
+    # Drawn in the order of their ids, since that of their weights would change with a rounding.
     places = np.cumsum(weights * inside, axis=1)
-    found: Ids = (places > uniform[:, None] * places[:, -1:]).argmax(axis=1)
-    return found
+    drawn: Ids = (places > uniform[:, None] * places[:, -1:]).argmax(axis=1)
+    return drawn
 
 
 def drawn_actions(source: Source, contexts: Floats, noise: Sequence[Noise], certainty: float) -> Ids:
@@ -201,7 +269,7 @@ def drawn_actions(source: Source, contexts: Floats, noise: Sequence[Noise], cert
 def draw_codes(writer: Writer, actions: Ids, longest: int, exactly: bool = False) -> list[Ids]:
     """Steps (N, P) that each row of a writer draws for its action (B,): up to its end, or to ``longest`` steps.
 
-    exactly: to ``longest`` steps; an action that ends before is done again, and of a longer one the most is shown.
+    exactly: to ``longest`` steps; an action that ends before is repeated, and of a longer one the most is shown.
     """
     steps: list[list[Ids]] = [[] for _ in actions]
     for rows, codes in drawn_steps(writer, actions, longest, exactly):
@@ -213,10 +281,10 @@ def draw_codes(writer: Writer, actions: Ids, longest: int, exactly: bool = False
 def drawn_steps(
     writer: Writer, actions: Ids, longest: int, exactly: bool = False, whole: bool = False
 ) -> Iterator[tuple[Ids, Ids]]:
-    """Step by step what :func:`draw_codes` gives: the rows (R,) that have not ended, and their codes (R, P).
+    """The codes of :func:`draw_codes` step by step: the rows (R,) that have not ended, and their codes (R, P).
 
-    whole: all of an action is shown, as where ``exactly`` so many steps are asked for, not one act of a long recording.
-    A writer whose rows have all ended can draw other actions from there.
+    whole: show all of an action, as with ``exactly``, and not one act of a long recording. A writer whose rows have all
+    ended can draw other actions from there.
     """
     rows = np.arange(len(actions))
     writer.begin()

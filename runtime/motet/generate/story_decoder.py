@@ -1,9 +1,9 @@
-"""How a story is drawn: parts one after another, in pieces as they come, or to a measure where a part has numbers."""
+"""Drawing a story: one request after another, in pieces as they come, or to a measure where a request has numbers."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby, islice, pairwise
+from itertools import islice, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,72 +18,88 @@ from motet.representation.contract import MotionContract
 from motet.text.numeric_phrases import Kind, Quantities
 
 LONGEST = 300.0
-"""Seconds that a part with a number lasts at most."""
+"""Seconds that a request with a number lasts at most."""
 
 STRETCH = 20.0
-"""Seconds, at most, of the stretches in which a part is made whose length comes first."""
+"""Seconds, at most, of the stretches in which a request is drawn whose length comes first."""
 
 SLOWEST: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
-"""How much is done in a second at least, but for ten seconds: who does less is not drawn on."""
+"""Least progress per second, after ten seconds of grace: a motion that is slower is not continued."""
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """A part of a story: its sentence, what that asks for in numbers, its context (A,), seconds, 0 where it ends by
-    itself, and how many times as fast as drawn it is played to last so long."""
+class Request:
+    """A text to be shown, as :class:`motet.generate.model.CodesModel` reads it once for generate, story and stream."""
 
     text: str
-    asked: Quantities
+    """A sentence, or a part of one."""
+
+    quantities: Quantities
+    """The numbers in the text, and the text that is shown."""
+
     context: Floats
+    """(A,) log-probabilities of actions."""
+
     seconds: float
+    """Its length, 0 where it ends by itself."""
+
     pace: float = 1.0
+    """Factor by which it is played faster than drawn, to last as long."""
 
     @property
     def to_measure(self) -> bool:
-        """Whether it is drawn until it has as much as was asked; a length alone is kept by the decoder."""
-        return bool(self.asked.amounts.keys() - {"seconds"}) or self.pace != 1
+        """Whether it is drawn until its numbers are reached; a length alone is kept by the decoder."""
+        return bool(self.quantities.amounts.keys() - {"seconds"}) or self.pace != 1
 
     @property
     def exactly(self) -> bool:
         """Whether its length comes first."""
-        told = self.asked.amounts.keys()
-        return self.seconds > 0 and ("seconds" not in told or not told - {"seconds", "pace"})
+        kinds = self.quantities.amounts.keys()
+        return self.seconds > 0 and ("seconds" not in kinds or not kinds - {"seconds", "pace"})
 
 
-def pace_of(part: Part, source: Source, codec: Codec) -> float:
-    """How many times as fast as drawn a part is played: as its sentence says, or as shows its act in its seconds
-    (:meth:`motet.generate.codes.Memory.paced`)."""
-    if not part.exactly:
+def pace_of(request: Request, source: Source, codec: Codec) -> float:
+    """The factor by which a request is played faster than drawn: as its text says, or as shows its act in its seconds
+    (:meth:`motet.generate.memory.Memory.paced`)."""
+    if not request.exactly:
         return 1.0
-    steps = codec.steps(part.seconds)
-    return part.asked.amounts.get("pace") or source.memory.paced(int(part.context.argmax()), steps) / steps
+    if "pace" in request.quantities.amounts:
+        return request.quantities.amounts["pace"]
+    steps = codec.steps(request.seconds)
+    return source.memory.paced(int(request.context.argmax()), steps) / steps
 
 
 class Piece(NamedTuple):
-    """Frames (T, D) that become final, the number of the part drawn with them, its action, and by how many frames that
-    part becomes longer. The first piece of a part comes before its frames."""
+    """Frames of a story that become final. The first piece of a request comes before its frames."""
 
     number: int
+    """Of the request that was drawn with them."""
+
     action: int
     frames: Array
+    """(T, D)."""
+
     longer: int
+    """Frames by which the passage of that request becomes longer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Teller:
-    """Draws the parts of a story. settings: of the loop. seconds: of a motion's end that the next part continues."""
+    """Draws the requests of a story."""
 
     source: Source
     codec: Codec
     contract: MotionContract
     noise: Sequence[Noise]
     settings: Mapping[str, Any]
-    seconds: float
+    """Settings of the loop."""
 
-    def pieces(self, parts: Sequence[Part], context: Context | None) -> Iterator[Piece]:
-        """The pieces of all parts. context: the end of the motion that they continue."""
-        runs = [[*run] for alone, group in groupby(enumerate(parts), lambda one: one[1].to_measure)
-                for run in ([[one] for one in group] if alone else [group])]  # fmt: skip
+    seconds: float
+    """The length of a motion's end that the next request continues."""
+
+    def pieces(self, requests: Sequence[Request], context: Context | None) -> Iterator[Piece]:
+        """The pieces of all requests. context: the end of the motion that they continue."""
+        runs = _runs(requests)
         for run in runs:
             tail = [] if context is None else [context.frames]
             for piece in self._pieces_of(run, context):
@@ -103,85 +119,150 @@ class Teller:
             writer.see(context.codes)
         return writer
 
-    def _action(self, part: Part) -> Ids:
-        return drawn_actions(self.source, part.context[None], self.noise, self.settings["certainty"])
+    def _action(self, request: Request) -> Ids:
+        return drawn_actions(self.source, request.context[None], self.noise, self.settings["certainty"])
 
-    def _pieces_of(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
-        number, part = parts[0]
-        if not part.to_measure:
-            return self._flowing(parts, context)
-        return self._timed(number, part, context) if part.exactly else self._measured(number, part, context)
+    def _pieces_of(self, run: Sequence[tuple[int, Request]], context: Context | None) -> Iterator[Piece]:
+        number, request = run[0]
+        if not request.to_measure:
+            return self._flowing(run, context)
+        if request.exactly:
+            return self._timed(number, request, context)
+        return self._measured(number, request, context)
 
-    def _flowing(self, parts: Sequence[tuple[int, Part]], context: Context | None) -> Iterator[Piece]:
-        """Pieces of a step of codes of parts without numbers; then the remaining frames."""
-        writer, decoder, fps = self._writer(context), StreamingDecoder(self.codec, context), self.contract.fps
-        done, given, end, limit = 0, 0, 0.0, None
-        for number, part in parts:
-            action = self._action(part)
-            yield Piece(number, int(action[0]), np.empty((0, len(self.contract.channels))), 0)
-            end += part.seconds
-            longest = self.codec.steps(end) - done if part.seconds else self.codec.steps(self.settings["max_seconds"])
-            limit = max(1, round(end * fps)) if part.seconds else None
-            for _, step in drawn_steps(writer, action, longest, exactly=part.seconds > 0):
-                done += 1
-                frames = decoder.push(step)[: None if limit is None else limit - given]
-                given += len(frames)
-                yield Piece(number, int(action[0]), frames, self.codec.field.hop)
-            end = end if part.seconds else done * self.codec.seconds
-        rest = decoder.finish()[: None if limit is None else limit - given]
-        yield Piece(number, int(action[0]), rest, given + len(rest) - done * self.codec.field.hop)
+    def _flowing(self, run: Sequence[tuple[int, Request]], context: Context | None) -> Iterator[Piece]:
+        """Pieces of one step of codes each, of requests without numbers; then the remaining frames."""
+        writer = self._writer(context)
+        decoder = StreamingDecoder(self.codec, context)
+        hop = self.codec.field.hop
+        steps_drawn = 0
+        frames_shown = 0
+        end = 0.0  # seconds at which a request is to end
+        limit: int | None = None  # frames by then
+        number = action = 0
+        for number, request in run:
+            actions = self._action(request)
+            action = int(actions[0])
+            yield Piece(number, action, np.empty((0, len(self.contract.channels))), 0)
 
-    def _timed(self, number: int, part: Part, context: Context | None) -> Iterator[Piece]:
-        """A part whose length comes first, stretch by stretch: each has its share of the turn and of the length."""
-        action = self._action(part)
-        steps = self.codec.steps(part.seconds * part.pace)
-        drawn = drawn_steps(self._writer(context), action, steps, exactly=True, whole=True)
-        decoder, asked, field = StreamingDecoder(self.codec, context), part.asked, self.codec.field
-        length = max(1, round(part.seconds * self.contract.fps))
-        edges = np.linspace(0, length, math.ceil(part.seconds / STRETCH) + 1).round().astype(int).tolist()
-        rest = np.empty((0, len(self.contract.channels)))
-        lead = rest  # the last frame before a stretch
-        pushed, total = 0, 0.0
+            # Lengths count from the start of the run, so that rounding errors do not add up.
+            exactly = request.seconds > 0
+            end += request.seconds
+            if exactly:
+                longest = self.codec.steps(end) - steps_drawn
+                limit = max(1, round(end * self.contract.fps))
+            else:
+                longest = self.codec.steps(self.settings["max_seconds"])
+                limit = None
+            for _, step in drawn_steps(writer, actions, longest, exactly=exactly):
+                steps_drawn += 1
+                frames = decoder.push(step)[: None if limit is None else limit - frames_shown]
+                frames_shown += len(frames)
+                yield Piece(number, action, frames, hop)
+            if not exactly:
+                end = steps_drawn * self.codec.seconds
+        remaining = decoder.finish()[: None if limit is None else limit - frames_shown]
+        yield Piece(number, action, remaining, frames_shown + len(remaining) - steps_drawn * hop)
+
+    def _timed(self, number: int, request: Request, context: Context | None) -> Iterator[Piece]:
+        """A request whose length comes first, stretch by stretch: each has its share of the turn and of the length."""
+        actions = self._action(request)
+        action = int(actions[0])
+        steps = self.codec.steps(request.seconds * request.pace)
+        drawn = drawn_steps(self._writer(context), actions, steps, exactly=True, whole=True)
+        frames_drawn = self._decoded_on_demand(drawn, steps, context)
+        length = max(1, round(request.seconds * self.contract.fps))
+        stretches = math.ceil(request.seconds / STRETCH)
+        edges = np.linspace(0, length, stretches + 1).round().astype(int).tolist()
+        lead = np.empty((0, len(self.contract.channels)))  # the last frame before a stretch
+        degrees = 0.0
         for start, stop in pairwise(edges):
-            # as many frames as drawn
-            ends = stop == length
-            until = steps if ends else min(steps, math.ceil(stop * part.pace / field.hop) + field.ahead + 1)
-            codes = [row for _, step in islice(drawn, until - pushed) for row in step]
-            pushed = until
-            rest = np.concatenate([rest, decoder.push(np.array(codes)), *([decoder.finish()] if ends else [])])
-            count = round(stop * part.pace) - round(start * part.pace)
-            frames, rest = np.concatenate([lead, rest[:count]]), rest[count:]
-            # turned by their share
-            if "degrees" in asked.amounts:
+            # As many frames as are played in the stretch.
+            count = round(stop * request.pace) - round(start * request.pace)
+            frames = np.concatenate([lead, frames_drawn(stop * request.pace, count, stop == length)])
+            # Turned by its share of the turn.
+            if "degrees" in request.quantities.amounts:
                 seen = Seen.of(self.contract, frames)
-                total = total or turn_to_make(seen, asked)
-                frames = turned(seen, frames, total * (stop - start) / length, begins=start == 0, ends=ends)
-            # and played to their share of the length
+                degrees = degrees or turn_to_make(seen, request.quantities)
+                share = degrees * (stop - start) / length
+                frames = turned(seen, frames, share, begins=start == 0, ends=stop == length)
+            # And played to its share of the length.
             shown = played(frames, len(frames) / (len(lead) + stop - start))[len(lead) :]
             lead = frames[-1:]
-            yield Piece(number, int(action[0]), shown, len(shown))
+            yield Piece(number, action, shown, len(shown))
 
-    def _measured(self, number: int, part: Part, context: Context | None) -> Iterator[Piece]:
-        """The whole of a part: drawn again and again until it has as much as was asked, and fitted."""
-        writer, action, codes = self._writer(context), self._action(part), np.empty((0, self.source.parts), np.int64)
-        times = int(part.asked.amounts.get("times", 1))
-        rounds = 1 if part.asked.act else times
-        slow = sum(abs(part.asked.amounts.get(kind, 0)) / least for kind, least in SLOWEST.items())
-        most, steps = self.codec.steps(min(LONGEST, 10 + slow)), self.codec.steps(self.settings["max_seconds"])
-        steps, looked = self.codec.steps(part.seconds) if part.seconds else steps, 0
+    def _decoded_on_demand(
+        self, drawn: Iterator[tuple[Ids, Ids]], steps: int, context: Context | None
+    ) -> Callable[[float, int, bool], Array]:
+        """A function that decodes no more of the drawn steps than it is called for: the next ``count`` frames, up to
+        the frame ``until``. Where the motion ends, all steps are decoded."""
+        decoder = StreamingDecoder(self.codec, context)
+        field = self.codec.field
+        waiting = np.empty((0, len(self.contract.channels)))
+        pushed = 0
+
+        def decoded(until: float, count: int, ends: bool) -> Array:
+            nonlocal waiting, pushed
+            needed = steps if ends else min(steps, math.ceil(until / field.hop) + field.ahead + 1)
+            codes: list[Ids] = []
+            for _, step in islice(drawn, needed - pushed):
+                codes += list(step)
+            pushed = needed
+            waiting = np.concatenate([waiting, decoder.push(np.array(codes))])
+            if ends:
+                waiting = np.concatenate([waiting, decoder.finish()])
+            frames = waiting[:count]
+            waiting = waiting[count:]
+            return frames
+
+        return decoded
+
+    def _measured(self, number: int, request: Request, context: Context | None) -> Iterator[Piece]:
+        """The whole of a request: drawn again and again until its numbers are reached, and fitted to them."""
+        quantities = request.quantities
+        writer = self._writer(context)
+        actions = self._action(request)
+        steps = self.codec.steps(request.seconds or self.settings["max_seconds"])
+        most = self._most_steps(quantities)
+        times = int(quantities.amounts.get("times", 1))
+        least_rounds = 1 if quantities.act else times
+        rounds = 0
+        steps_measured = 0
+        codes = np.empty((0, self.source.parts), np.int64)
         while True:
-            drawn = [step for _, step in drawn_steps(writer, action, steps, whole=True)]
-            codes, rounds = np.concatenate([codes, *drawn]), rounds - 1
+            drawn = [step for _, step in drawn_steps(writer, actions, steps, whole=True)]
+            codes = np.concatenate([codes, *drawn])
+            rounds += 1
             over = len(codes) >= most
-            if over or (rounds < 1 and len(codes) >= 1.2 * looked):  # a long one is not looked at after each draw
-                frames, looked = self._decoded(codes, context), len(codes)
-                seen = Seen.of(self.contract, frames)
-                never = "times" in part.asked.amounts and 1 - rounds >= times and not seen.done(part.asked.act)
-                if over or never or enough(seen, part.asked):
-                    break
-        frames = fitted(self.contract, frames, part.asked)
-        yield Piece(number, int(action[0]), frames, len(frames))
+            # A long motion is not decoded and measured after each draw.
+            if not over and (rounds < least_rounds or len(codes) < 1.2 * steps_measured):
+                continue
+            frames = self._decoded(codes, context)
+            steps_measured = len(codes)
+            seen = Seen.of(self.contract, frames)
+            tries = 1 - least_rounds + rounds
+            never = "times" in quantities.amounts and tries >= times and not seen.done(quantities.act)
+            if over or never or enough(seen, quantities):
+                break
+        frames = fitted(self.contract, frames, quantities)
+        yield Piece(number, int(actions[0]), frames, len(frames))
+
+    def _most_steps(self, quantities: Quantities) -> int:
+        """Steps after which a motion is not continued, by the slowest progress towards its numbers."""
+        seconds = sum(abs(quantities.amounts.get(kind, 0)) / slowest for kind, slowest in SLOWEST.items())
+        return self.codec.steps(min(LONGEST, 10 + seconds))
 
     def _decoded(self, codes: Ids, context: Context | None) -> Array:
         decoder = StreamingDecoder(self.codec, context)
         return np.concatenate([decoder.push(codes), decoder.finish()])
+
+
+def _runs(requests: Sequence[Request]) -> list[list[tuple[int, Request]]]:
+    """Numbered requests in groups that are drawn together: one with numbers alone, others with their neighbours."""
+    runs: list[list[tuple[int, Request]]] = []
+    for numbered in enumerate(requests):
+        _, request = numbered
+        if not runs or request.to_measure or runs[-1][-1][1].to_measure:
+            runs.append([])
+        runs[-1].append(numbered)
+    return runs
