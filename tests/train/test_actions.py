@@ -18,7 +18,7 @@ from motet_train.data.sentences import actions_of, mirror_text
 from motet_train.data.store import Store
 from motet_train.data.word_table import nearest, principal, read_word_vectors, word_table
 from motet_train.models.action_net import ActionNet, ActionsConfig, stem, stems_of
-from motet_train.recipes.actions import Said
+from motet_train.recipes.actions import ActionSentences
 from motet_train.recipes.language import divided
 
 
@@ -207,26 +207,26 @@ def test_what_is_understood_is_what_a_naive_twin_finds(store: Store) -> None:
         asked = [action for action, said in enumerate(actions.unseen) if s in said]
         right.append(chances.index(max(chances)) in asked)
         losses.append(-np.log(sum(chances[action] for action in asked)))
-    said = Said(actions, found.vocabulary)
-    assert said.measured(net) == {
+    sentences = ActionSentences(actions, found.vocabulary)
+    assert sentences.measured(net) == {
         "validation": pytest.approx(np.mean(losses), abs=1e-4),
         "understood": pytest.approx(np.mean(right), abs=1e-4),
     }
-    drawn = said.draw(300, np.random.default_rng(0))
+    drawn = sentences.draw(300, np.random.default_rng(0))
     for row in range(300):
         ids = drawn.words[row, : int(drawn.lengths[row])].tolist()
-        wanted = actions.sentences[int(drawn.asked[row])]
+        wanted = actions.sentences[int(drawn.actions[row])]
         assert ids in [found.vocabulary.encode(s)[0].tolist() for s in wanted]
         assert not drawn.words[row, len(ids) :].any()
     assert torch.equal(drawn[1::2].lengths, drawn.lengths[1::2])
-    assert set(drawn.asked.tolist()) == set(range(len(actions)))
+    assert set(drawn.actions.tolist()) == set(range(len(actions)))
 
 
 def test_sentences_without_a_known_word_are_not_measured_by(store: Store) -> None:
     found = divided(store, mirror=True)
     actions = actions_of(store, found.parts.train)
     more = replace(actions, unseen=(("pirouettes", "a person pirouettes"), *actions.unseen[1:]))
-    known = Said(more, found.vocabulary)
+    known = ActionSentences(more, found.vocabulary)
     assert known.unseen is not None
     asked = {s for said in more.unseen for s in said}
     assert len(known.unseen[1]) == len(known.alike) == len(asked) - 1

@@ -1,4 +1,4 @@
-"""The recipe of the net that tells which action a sentence asks for, and its training on the sentences of a store."""
+"""The recipe of the net that recognises the action in a sentence, and its training on the sentences of a store."""
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -44,53 +44,62 @@ class WordVectors:
 
 @dataclass(frozen=True, eq=False)
 class SentenceBatch(Rows):
-    """S sentences. words: ids (S, W) int64. lengths: (S,). asked: the actions (S,) that they ask for."""
+    """S sentences. words: ids (S, W) int64. lengths: (S,). actions: (S,) the action of each."""
 
     words: Tensor
     lengths: Tensor
-    asked: Tensor
+    actions: Tensor
 
 
 def train_actions(store: Store, job: Job, data: str = "", by: str = "trial", vectors: WordVectors | None = None) -> Run:
     """Train on the sentences of a store's training part, see :meth:`motet_train.recipes.recipe.Job.run`.
 
-    vectors: of words, those of sentences and common ones, which the net then knows by their vectors alone.
+    vectors: of the words of sentences and of common words, which the net then knows by their vectors alone.
     """
-    found = divided(store, mirror=True, by=by)
-    actions = spoken(store, found.parts.train)
-    words = found.vocabulary.words
+    corpus = divided(store, mirror=True, by=by)
+    actions = spoken(store, corpus.parts.train)
+    words = corpus.vocabulary.words
     table = vectors and word_table(vectors.file, words, job.recipe.config.vector)
     common = table.common if table else {}
-    vocabulary = replace(found.vocabulary, common=common)
-    sizes = {"words": len(words), "actions": len(actions), "common": len(common)}
+    sentences = ActionSentences(actions, replace(corpus.vocabulary, common=common))
+
+    # the net, with the vectors of words if there are any
     torch.manual_seed(job.about.seed)
-    config = job.recipe.sized(**sizes, stems=stems_of(words, tuple(common)))
+    config = job.recipe.sized(
+        words=len(words),
+        actions=len(actions),
+        common=len(common),
+        stems=stems_of(words, tuple(common)),
+    )
     net = ActionNet(config if table else replace(config, vector=0))
-    said = Said(actions, vocabulary)
-    about = manifest(job, found, asdict(net.config), data, by)
+    about = manifest(job, corpus, asdict(net.config), data, by)
     about["actions"] = described(actions)
     if vectors and table:
         net.start_from(torch.from_numpy(table.vectors).float())
-        of = {"file": vectors.file.name, "words": int(table.vectors.any(axis=1).sum())}
-        about |= {"common": common}
-        about["training"]["word_vectors"] = {**of, "origin": vectors.origin}
+        about["common"] = common
+        about["training"]["word_vectors"] = {
+            "file": vectors.file.name,
+            "words": int(table.vectors.any(axis=1).sum()),
+            "origin": vectors.origin,
+        }
 
     def loss(batch: SentenceBatch) -> Terms:
-        chances = net(batch.words, batch.lengths)
-        return (Term(functional.nll_loss(chances.float(), batch.asked, reduction="none"), len(batch)),)
+        log_probabilities = net(batch.words, batch.lengths).float()
+        losses = functional.nll_loss(log_probabilities, batch.actions, reduction="none")
+        return (Term(losses, len(batch)),)
 
     learner = GradientLearner(
         net.to(job.device),
         job.training,
         loss,
-        lambda rng: (said.draw(job.training.batch, rng),),
-        lambda: said.measured(net),
+        lambda rng: (sentences.draw(job.training.batch, rng),),
+        lambda: sentences.measured(net),
     )
     return job.run(net, learner, about)
 
 
 def spoken(store: Store, records: tuple[int, ...]) -> Actions:
-    """The actions of some records; DataError where one has no usable sentence."""
+    """The actions of some records; DataError if one has no usable sentence."""
     actions = actions_of(store, records)
     if not all(actions.sentences):
         raise DataError("each action needs a sentence that can be used: of 1 to 40 words")
@@ -99,41 +108,50 @@ def spoken(store: Store, records: tuple[int, ...]) -> Actions:
 
 def described(actions: Actions) -> list[dict[str, Any]]:
     """A sentence of each action and the words of all its sentences, for manifests."""
-    return [
-        {"sentence": sentences[0], "words": sorted({word for s in sentences for word in RULES.words(s)})}
-        for sentences in actions.sentences
-    ]
+    descriptions = []
+    for sentences in actions.sentences:
+        words = {word for sentence in sentences for word in RULES.words(sentence)}
+        descriptions.append({"sentence": sentences[0], "words": sorted(words)})
+    return descriptions
 
 
-class Said:
+class ActionSentences:
     """The sentences of all actions, to draw from and to measure by."""
 
     def __init__(self, actions: Actions, vocabulary: Vocabulary) -> None:
-        self.known = [[vocabulary.encode(s)[0] for s in said] for said in actions.sentences]
-        asking: dict[str, set[int]] = {}
-        for action, said in enumerate(actions.unseen):
-            for s in said:
-                if any(map(vocabulary.meant, RULES.words(s))):
-                    asking.setdefault(s, set()).add(action)
-        self.unseen = padded([vocabulary.encode(s)[0] for s in asking], "int64") if asking else None
-        self.alike = torch.zeros(len(asking), len(actions), dtype=torch.bool)
-        for row, asked in enumerate(asking.values()):
-            self.alike[row, list(asked)] = True
+        self.known = [[vocabulary.encode(sentence)[0] for sentence in known] for known in actions.sentences]
+
+        # the sentences that are not in training, and the actions that each is about
+        actions_by_sentence: dict[str, set[int]] = {}
+        for action, unseen in enumerate(actions.unseen):
+            for sentence in unseen:
+                if any(map(vocabulary.meant, RULES.words(sentence))):
+                    actions_by_sentence.setdefault(sentence, set()).add(action)
+        ids = [vocabulary.encode(sentence)[0] for sentence in actions_by_sentence]
+        self.unseen = padded(ids, "int64") if ids else None
+        self.alike = torch.zeros(len(ids), len(actions), dtype=torch.bool)
+        for row, sentence_actions in enumerate(actions_by_sentence.values()):
+            self.alike[row, list(sentence_actions)] = True
 
     def draw(self, count: int, rng: np.random.Generator) -> SentenceBatch:
-        """Sentences of actions drawn at random, each as often as another."""
-        asked = rng.integers(len(self.known), size=count)
-        ids, lengths = padded([self.known[a][rng.integers(len(self.known[a]))] for a in asked], "int64")
-        return SentenceBatch(torch.from_numpy(ids), torch.from_numpy(lengths), torch.from_numpy(asked))
+        """Sentences of random actions, each action with the same probability."""
+        actions = rng.integers(len(self.known), size=count)
+        ids = []
+        for action in actions:
+            sentences = self.known[action]
+            ids.append(sentences[rng.integers(len(sentences))])
+        words, lengths = padded(ids, "int64")
+        return SentenceBatch(torch.from_numpy(words), torch.from_numpy(lengths), torch.from_numpy(actions))
 
     @torch.no_grad()
     def measured(self, net: ActionNet) -> dict[str, float]:
-        """For sentences in wordings never seen, the surprise at the actions they were said of (validation), and how
-        often the likeliest action is one of those (understood)."""
+        """For sentences in unseen wordings the cross-entropy of their actions (validation), and how often the most
+        likely action is one of these (understood)."""
         if self.unseen is None:
             return {}
         words, lengths = (torch.from_numpy(part).to(net.mean.device) for part in self.unseen)
-        chances = net(words, lengths).cpu()
-        best, right = chances.argmax(dim=1), chances.masked_fill(~self.alike, -torch.inf).logsumexp(dim=1)
+        log_probabilities = net(words, lengths).cpu()
+        best = log_probabilities.argmax(dim=1)
+        right = log_probabilities.masked_fill(~self.alike, -torch.inf).logsumexp(dim=1)
         understood = self.alike[torch.arange(len(best)), best].float().mean()
         return {"validation": round(-float(right.mean()), 4), "understood": round(float(understood), 4)}

@@ -36,6 +36,7 @@ DRAWING: dict[str, Any] = {
     "max_seconds": 30.0,
 }
 
+
 ALIKE_PAIRS = 0.2018
 """Share of the pairs of steps within long recordings that count as alike."""
 
@@ -45,7 +46,7 @@ MEASURED_RECORDINGS = 1000
 
 @dataclass(frozen=True)
 class CodeVisits:
-    """window: steps of codes. first: how many times a motion's first step counts."""
+    """window: steps of codes. first: weight of a motion's first step."""
 
     window: int = 64
     first: float = 8.0
@@ -67,27 +68,21 @@ RECIPES = {"default": DEFAULT}
 
 def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions: Run) -> Run:
     """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store
-    and split. DataError where they were not."""
+    and split. DataError if they were not."""
     visits = job.recipe.visits
-    found = divided(store, mirror=True, by=by)
-    mirror = frame_mirror(found.contract)
-    shown = spoken(store, found.parts.train)
-    if not isinstance(codec.model, MotionCodec):
-        raise DataError(f"codes need the run of a codec (motet train codec), not of {codec.manifest['model']}")
-    if not isinstance(actions.model, ActionNet):
-        kind = actions.manifest["model"]
-        raise DataError(f"codes need the run of a net of actions (motet train actions), not of {kind}")
-    known = {"vocabulary": list(found.vocabulary.words), "actions": described(shown)}
-    if any(actions.manifest[key] != value for key, value in known.items()):
-        name = actions.manifest["name"]
-        raise DataError(
-            f"the net of actions {name} was trained on other sentences: train it on the same data and split"
-        )
+    corpus = divided(store, mirror=True, by=by)
+    actions_shown = spoken(store, corpus.parts.train)
+    sentences = {"vocabulary": list(corpus.vocabulary.words), "actions": described(actions_shown)}
+    codec_net, action_net = _parts(codec, actions, sentences)
+
+    # the writer, and the memory of the training motions
     torch.manual_seed(job.about.seed)
-    motions = coded(store, found.parts.train, codec.model.eval(), shown, mirror)
-    memory, writer = memory_of(motions), job.recipe.sized(actions=len(shown))
-    net = MotionCodes(MotionCodesConfig(codec.model.config, actions.model.config, writer, len(memory)))
-    net.take(codec.model, actions.model)
+    mirror = frame_mirror(corpus.contract)
+    motions = coded(store, corpus.parts.train, codec_net.eval(), actions_shown, mirror)
+    memory = memory_of(motions)
+    config = job.recipe.sized(actions=len(actions_shown))
+    net = MotionCodes(MotionCodesConfig(codec_net.config, action_net.config, config, len(memory)))
+    net.take(codec_net, action_net)
     net.memory.copy_(memory)
     windows = CodeWindows(motions, visits.window, net.end, visits.first)
 
@@ -95,12 +90,17 @@ def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions:
         losses = net.losses(batch.codes, batch.before, batch.action, batch.age)
         return (Term(losses.mean(dim=-1) * batch.weights / batch.weights.mean(), len(batch)),)
 
-    drawn = job.training.batch, writer.unsaid, len(shown)
-    learner = GradientLearner(net.to(job.device), job.training, loss, lambda rng: (windows.draw(*drawn, rng),))
-    about = manifest(job, found, asdict(net.config), data, by)
+    learner = GradientLearner(
+        net.to(job.device),
+        job.training,
+        loss,
+        lambda rng: (windows.draw(job.training.batch, config.unsaid, len(actions_shown), rng),),
+    )
+    about = manifest(job, corpus, asdict(net.config), data, by)
     about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
-    about["training"] |= {"codec": _made(codec.manifest["training"]), "actions": _made(actions.manifest["training"])}
-    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(shown)),))
+    about["training"]["codec"] = _origin(codec.manifest["training"])
+    about["training"]["actions"] = _origin(actions.manifest["training"])
+    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(actions_shown)),))
 
 
 def memory_settings(tables: Mapping[str, NDArray[Any]], actions: int) -> MemorySettings:
@@ -114,8 +114,8 @@ def memory_settings(tables: Mapping[str, NDArray[Any]], actions: int) -> MemoryS
 
 
 def alike_distance(memory: Memory) -> float:
-    """The squared distance, to three digits, within which the share :data:`ALIKE_PAIRS` of the pairs of steps is that
-    long recordings have; the memory's own setting where it has no recording longer than an act."""
+    """The squared distance, to three digits, within which the share :data:`ALIKE_PAIRS` of the pairs of steps in long
+    recordings lies; the memory's own setting if it has no recording longer than an act."""
     lengthy = []
     for action in memory.rows:
         for recording in memory.recordings(action):
@@ -130,40 +130,62 @@ def alike_distance(memory: Memory) -> float:
     return max(float(f"{alike:.3g}"), MemorySettings.RANGES["alike_distance"][1].low)
 
 
-def _made(training: Mapping[str, Any]) -> dict[str, Any]:
-    """How a part was made, and what it started from."""
-    start = {"start": _made(training["start"])} if "start" in training else {}
-    kept = ("command", "seed", "steps", "seconds", "word_vectors")
-    return {**{key: training[key] for key in kept if key in training}, **start}
+def _parts(codec: Run, actions: Run, sentences: Mapping[str, Any]) -> tuple[MotionCodec, ActionNet]:
+    """The nets of two runs; DataError for other runs, or for a net of actions that was trained on other sentences."""
+    if not isinstance(codec.model, MotionCodec):
+        raise DataError(f"codes need the run of a codec (motet train codec), not of {codec.manifest['model']}")
+    if not isinstance(actions.model, ActionNet):
+        kind = actions.manifest["model"]
+        raise DataError(f"codes need the run of a net of actions (motet train actions), not of {kind}")
+    if any(actions.manifest[key] != value for key, value in sentences.items()):
+        name = actions.manifest["name"]
+        raise DataError(
+            f"the net of actions {name} was trained on other sentences: train it on the same data and split"
+        )
+    return codec.model, actions.model
+
+
+def _origin(training: Mapping[str, Any]) -> dict[str, Any]:
+    """How a part was trained, and what it started from."""
+    keys = ("command", "seed", "steps", "seconds", "word_vectors")
+    origin = {key: training[key] for key in keys if key in training}
+    if "start" in training:
+        origin["start"] = _origin(training["start"])
+    return origin
 
 
 @torch.no_grad()
 def coded(
     store: Store, records: tuple[int, ...], codec: MotionCodec, actions: Actions, mirror: FrameMirror
 ) -> list[CodedMotion]:
-    """The acts of every span of some records, as they are and mirrored, by a codec."""
-    found = []
+    """The acts of every span of some records, as they are and mirrored, in the codes of a codec."""
+    motions = []
     for record in records:
         entry = store.records[record]
-        shown = acts(store.motion(record))
-        acted = shown[0][1] < len(store.sequence(record))
-        starts, ends = entry.starts or acted, entry.ends or acted
-        for (begin, end), (start, stop) in product(entry.spans, shown):
+        parts = acts(store.motion(record))
+        cut = parts[0][1] < len(store.sequence(record))  # a long take that repeats an act
+        for (begin, end), (start, stop) in product(entry.spans, parts):
             frames = np.array(store.frames[begin + start : min(begin + stop, end)], np.float64)
             for mirrored in (False, True):
                 codes = codes_of(codec, mirror(frames) if mirrored else frames, store.fps)
                 if not len(codes):
                     continue
-                if ends:
-                    codes = np.pad(codes, ((0, 1), (0, 0)))
-                    codes[-1, 0] = codec.config.moves
+                if entry.ends or cut:
+                    codes = _ended(codes, codec.config.moves)
                 first = begin == entry.spans[0][0]
-                found.append(CodedMotion(codes, actions.of[record, mirrored], starts, first))
-    return found
+                motions.append(CodedMotion(codes, actions.of[record, mirrored], entry.starts or cut, first))
+    return motions
+
+
+def _ended(codes: Codes, end: int) -> Codes:
+    """Codes (N, P) with the move that ends a motion after them."""
+    ended = np.pad(codes, ((0, 1), (0, 0)))
+    ended[-1, 0] = end
+    return ended
 
 
 def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float) -> Codes:
-    """Frames (T, D) to codes (N, P), what is left over of the last step left out."""
+    """Frames (T, D) to codes (N, P), without the frames of an incomplete last step."""
     hop = codec.config.hop
     frames = frames[: len(frames) // hop * hop]
     if not len(frames):

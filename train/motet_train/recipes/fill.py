@@ -25,8 +25,8 @@ from motet_train.runs import Run
 
 @dataclass(frozen=True)
 class FillVisits:
-    """context: the most frames seen before and after a gap; least: the fewest; whole: the share of windows with the
-    most. gaps: the shortest and the longest. feet: how many times their places count."""
+    """context, least: the largest and smallest number of frames before and after a gap; whole: the share of windows
+    with the largest. gaps: the shortest and the longest. feet: weight of their positions."""
 
     context: int = 20
     least: int = 4
@@ -59,22 +59,22 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
         )
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
+    mirror = frame_mirror(contract)
     longest = 2 * visits.context + visits.gaps[1]
-    train, validation = (
-        GapWindows(store, part, longest, frame_mirror(contract)) for part in (parts.train, parts.validation)
-    )
+    train = GapWindows(store, parts.train, longest, mirror)
+    validation = _validation_windows(GapWindows(store, parts.validation, longest, mirror), visits)
     torch.manual_seed(job.about.seed)
     net = _untrained(job.recipe, contract, train).to(job.device)
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
-    rng = np.random.default_rng(0)
-    sizes = [(visits.context, max(1, round(part * visits.gaps[1])), visits.context) for part in (0.25, 0.5, 1.0)]
-    seen = [validation.draw(256, size, rng).to(job.device) for size in sizes]
+    on_device = [window.to(job.device) for window in validation]
 
-    def loss(window: GapWindow) -> Terms:
-        return _loss(net, window, weights, store.fps)
-
-    drawn = partial(_batches, train, visits, job.training.batch)
-    learner = GradientLearner(net, job.training, loss, drawn, lambda: _measured(kept, seen))
+    learner = GradientLearner(
+        net,
+        job.training,
+        lambda window: _loss(net, window, weights, store.fps),
+        partial(_batches, train, visits, job.training.batch),
+        lambda: _measured(kept, on_device),
+    )
     assert isinstance(learner.kept, Filler)
     kept: Filler = learner.kept
     about: dict[str, Any] = {
@@ -85,8 +85,19 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
     return job.run(kept, learner, job.manifest(contract, asdict(net.config), defaults, None, about))
 
 
+def _validation_windows(windows: GapWindows, visits: FillVisits) -> list[GapWindow]:
+    """Windows with gaps of a quarter, a half and the whole of the longest length."""
+    rng = np.random.default_rng(0)
+    drawn = []
+    for share in (0.25, 0.5, 1.0):
+        gap = max(1, round(share * visits.gaps[1]))
+        drawn.append(windows.draw(256, (visits.context, gap, visits.context), rng))
+    return drawn
+
+
 def _batches(windows: GapWindows, visits: FillVisits, size: int, rng: np.random.Generator) -> tuple[GapWindow]:
-    before = after = visits.context
+    before = visits.context
+    after = visits.context
     count = int(rng.integers(visits.gaps[0], visits.gaps[1] + 1))
     if rng.random() >= visits.whole:
         before, after = rng.integers(visits.least, visits.context + 1, size=2).tolist()
@@ -94,42 +105,50 @@ def _batches(windows: GapWindows, visits: FillVisits, size: int, rng: np.random.
 
 
 def _untrained(recipe: Recipe, contract: MotionContract, windows: GapWindows) -> Filler:
-    """A net that has its normalisation of frames around a gap from some windows."""
+    """A new net, with the normalisation of the frames around gaps in some windows."""
     net = Filler(recipe.sized(channels=PLACED_CHANNELS, tree=tree_of(contract)))
-    context, (_, longest) = recipe.visits.context, recipe.visits.gaps
-    some = windows.draw(1024, (context, longest // 2, context), np.random.default_rng(0))
-    frames = torch.cat([some.past, some.truth, some.after], dim=1).flatten(0, 1).numpy().astype(np.float64)
+    context = recipe.visits.context
+    _, longest = recipe.visits.gaps
+    window = windows.draw(1024, (context, longest // 2, context), np.random.default_rng(0))
+    frames = torch.cat([window.past, window.truth, window.after], dim=1).flatten(0, 1).numpy().astype(np.float64)
     net.measure_by(frames.mean(axis=0), np.maximum(frames.std(axis=0), 0.02))
     return net
 
 
 def _loss(net: Filler, window: GapWindow, weights: Tensor, fps: float) -> Terms:
-    """Errors of joints' places (m), of frames in standard deviations and of joints' speeds (m/s), and the speeds of
-    feet that stand: those slower than 0.2 m/s."""
+    """Errors of positions (m), of frames in standard deviations and of speeds of joints (m/s), and the speeds of feet
+    that stand: those slower than 0.2 m/s."""
     frames = net.once(window.past, window.plain, window.after).float()
-    off = functional.smooth_l1_loss(frames / net.scale, window.truth / net.scale, beta=0.2)
+    frame_error = functional.smooth_l1_loss(frames / net.scale, window.truth / net.scale, beta=0.2)
     with torch.autocast(frames.device.type, enabled=False):
-        # one frame on each side, so that the joins count
-        found, true = (
-            net.joints(torch.cat([window.past[:, -1:], one, window.after[:, :1]], dim=1))
-            for one in (frames, window.truth)
-        )
-        places = ((found - true).square().sum(-1) + 1e-8).sqrt() * weights
-        speeds, was = found.diff(dim=1) * fps, true.diff(dim=1) * fps
-        unlike = ((speeds - was).square().sum(-1) + 1e-4).sqrt() * weights
-        stands = (was.norm(dim=-1) < 0.2) & (weights > 1)
-        slide = (speeds.square().sum(-1) + 1e-4).sqrt() * stands
-    total = places.mean() + 0.05 * off + 0.1 * unlike.mean() + 0.1 * slide.mean()
+        places = _joints_with_seams(net, window, frames)
+        true_places = _joints_with_seams(net, window, window.truth)
+        place_errors = ((places - true_places).square().sum(-1) + 1e-8).sqrt() * weights
+
+        velocities = places.diff(dim=1) * fps
+        true_velocities = true_places.diff(dim=1) * fps
+        velocity_errors = ((velocities - true_velocities).square().sum(-1) + 1e-4).sqrt() * weights
+        stands = (true_velocities.norm(dim=-1) < 0.2) & (weights > 1)
+        slide = (velocities.square().sum(-1) + 1e-4).sqrt() * stands
+    total = place_errors.mean() + 0.05 * frame_error + 0.1 * velocity_errors.mean() + 0.1 * slide.mean()
     return (Term(total, len(window)),)
 
 
+def _joints_with_seams(net: Filler, window: GapWindow, frames: Tensor) -> Tensor:
+    """The joints (B, N + 2, J, 3) of a gap filled with frames, and of one frame on each side."""
+    return net.joints(torch.cat([window.past[:, -1:], frames, window.after[:, :1]], dim=1))
+
+
 @torch.no_grad()
-def _measured(net: Filler, seen: list[GapWindow]) -> dict[str, float]:
-    """On validation windows of each length of gap: the mean error of joints in cm, and that of the plain way."""
-    found: dict[str, float] = {}
-    counts = [window.truth.shape[1] for window in seen]
-    for count, window in zip(counts, seen, strict=True):
-        true = net.joints(window.truth)
-        for name, frames in (("", net(window.past, window.plain, window.after)), ("plain_", window.plain)):
-            found[f"{name}{count}"] = round(100 * float((net.joints(frames) - true).norm(dim=-1).mean()), 3)
-    return {"validation": round(float(np.mean([found[str(count)] for count in counts])), 4), **found}
+def _measured(net: Filler, windows: list[GapWindow]) -> dict[str, float]:
+    """On validation windows of each gap length: the mean error of joints in cm, and that of the plain way."""
+    errors = {}
+    net_errors = []
+    for window in windows:
+        frames = window.truth.shape[1]
+        true_places = net.joints(window.truth)
+        for name, filled in (("", net(window.past, window.plain, window.after)), ("plain_", window.plain)):
+            distances = (net.joints(filled) - true_places).norm(dim=-1)
+            errors[f"{name}{frames}"] = round(100 * float(distances.mean()), 3)
+        net_errors.append(errors[str(frames)])
+    return {"validation": round(float(np.mean(net_errors)), 4), **errors}

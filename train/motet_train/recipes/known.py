@@ -1,7 +1,7 @@
-"""The recipe of the known motions that answer for describe: which they are, and how sure their answers can be.
+"""The recipe of the known motions behind the answers of describe: which they are, and how sure their answers can be.
 
-The probability that an answer is right is learned from people who are kept back, those of one corpus together: on their
-motions, spaces that have never seen them answer. The space that is kept then knows everybody.
+The probability that an answer is right is learned on held-out people, those of one corpus together: spaces that were
+fitted without them answer about their motions. The final space is then fitted with everybody.
 """
 
 import re
@@ -34,8 +34,8 @@ from motet_train.runs import Run, surroundings
 
 @dataclass(frozen=True)
 class KnownVisits(search.SearchVisits):
-    """kept: of the views of each motion, how many are known, beside the whole motion. folds: into how many groups
-    people are divided to learn how sure answers are. sure: how often an answer that is trusted is to be right."""
+    """kept: the number of views of each motion that are known, besides the whole motion. folds: groups of people, held
+    out in turn to learn how sure answers are. sure: how often a sure answer should be right."""
 
     kept: int = 4
     folds: int = 5
@@ -56,46 +56,50 @@ DEFAULT = Recipe(
 RECIPES = {"default": DEFAULT}
 
 TRIED = "tried.npz"
-"""Of a run: the answers about people kept back that their probability was learned from."""
+"""File of a run: the answers about held-out people from which their probability was learned."""
 
 TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
-"""Beginnings of words of a path that is not straight."""
+"""Beginnings of words for a path that is not straight."""
 
 GOING = frozenset({"walk", "run", "skip", "backwards", "turn", "jump", "carry", "sidestep"})
-"""Kinds of going, of which it is worth telling where to."""
+"""Kinds of locomotion, whose direction is worth mentioning."""
 
 SIDEWAYS = frozenset({"sidestep", "jump"})
-"""Kinds of going to a side without turning there."""
+"""Kinds of locomotion to a side without turning there."""
 
 
 def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
-    """Gather the known motions of a store, for the run of a net that writes sentences, of the same channels. DataError
-    where it is not."""
-    began, visits = perf_counter(), job.recipe.visits
-    found = divided(store, mirror=True, by=by)
+    """Gather the known motions of a store, for the run of a net that writes sentences; DataError unless it has the
+    store's channels."""
+    began = perf_counter()
+    visits = job.recipe.visits
+    corpus = divided(store, mirror=True, by=by)
     if not isinstance(writer.model, MotionToLanguage):
         raise DataError("known motions need a run of describe (--writer)")
-    if writer.manifest["motion"]["channels"] != list(found.contract.channels):
+    if writer.manifest["motion"]["channels"] != list(corpus.contract.channels):
         raise DataError(f"{writer.manifest['name']} describes motions of other channels than those of {data}")
-    config = replace(search.config_for(store, found, search.DEFAULT), words=0)  # it reads no sentences
+
+    # the space, first without each group of people, then with all
+    config = replace(search.config_for(store, corpus, search.DEFAULT), words=0)  # it reads no sentences
     space = JointEmbedding(config).eval()
-    space.measure_by(found.contract.mean, found.contract.std)
-    examples = found.examples(found.parts.train)
-    seen = search.seen_by(space, examples, visits, job.about.seed, whole=True)
-    tried = _tried(found, examples, space, seen, visits)
-    discriminate(space, _cut(seen))
-    known = _gathered(found, examples, space, seen, visits.kept)
+    space.measure_by(corpus.contract.mean, corpus.contract.std)
+    examples = corpus.examples(corpus.parts.train)
+    views = search.seen_by(space, examples, visits, job.about.seed, whole=True)
+    tried = _tried(corpus, examples, space, views, visits)
+    discriminate(space, _without_whole(views))
+    known = _gathered(corpus, examples, space, views, visits.kept)
     np.savez(job.folder / TRIED, **tried._asdict())
     settings = learned(tried, visits.sure)
+
     net = KnownMotions.of(writer.model, space, known)
-    about = manifest(job, found, asdict(net.config), data, by)
+    about = manifest(job, corpus, asdict(net.config), data, by)
     about |= {key: writer.manifest[key] for key in ("motion", "text", "vocabulary")}
     about["training"] |= {
         "epochs": job.training.epochs,
         "kept_epoch": job.training.epochs,
         "seconds": round(perf_counter() - began, 1),
-        "parameters": sum(one.numel() for one in net.parameters()),
-        "writer": _made(writer),
+        "parameters": sum(parameter.numel() for parameter in net.parameters()),
+        "writer": _origin(writer),
         **surroundings("cpu"),
     }
     about["settings"] = {**writer.manifest["settings"], settings.FEATURE: asdict(settings)}
@@ -104,47 +108,64 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
     return run
 
 
-def _made(run: Run) -> dict[str, object]:
-    kept = ("command", "seed", "epochs", "seconds")
-    return {key: run.manifest["training"][key] for key in kept if key in run.manifest["training"]}
+def _origin(run: Run) -> dict[str, object]:
+    training = run.manifest["training"]
+    return {key: training[key] for key in ("command", "seed", "epochs", "seconds") if key in training}
 
 
-def _gathered(found: Divided, examples: Examples, space: JointEmbedding, seen: Views, kept: int) -> Known:
-    """What is known of some examples. seen: their views, the last one whole."""
-    actions = actions_of(found.store, examples.records)
-    titles = {actions.of[r, m]: found.store.records[r].action for r in examples.records for m in (False, True)}
-    shows = [shown_by(said, titles[action]) for action, said in enumerate(actions.sentences)]
-    kinds, sentences, said = list(KINDS), list[str](), list[int]()
+def _gathered(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, kept: int) -> Known:
+    """The known motions of some examples. views: of these, the last one whole."""
+    actions = actions_of(corpus.store, examples.records)
+    titles = {}
+    motion_actions = []
+    for mirrored in (False, True):
+        for record in examples.records:
+            action = actions.of[record, mirrored]
+            titles[action] = corpus.store.records[record].action
+            motion_actions.append(action)
+
+    # what each action shows, and a few clear sentences about it
+    shown = [shown_by(wordings, titles[action]) for action, wordings in enumerate(actions.sentences)]
+    sentences: list[str] = []
+    sentence_actions: list[int] = []
     for action, wordings in enumerate(actions.sentences):
-        clear = [one for one in wordings if {"left", "right"} - {*RULES.words(one)}] or wordings  # "left, right, left"
-        kept_here = careful(clear, shows[action].shown, 3) or list(clear[:1])
-        sentences += kept_here
-        said += [action] * len(kept_here)
-    shown = [[2 if kind in one.shown else int(kind in one.sayable) for kind in kinds] for one in shows]
+        clear = [sentence for sentence in wordings if not _names_both_sides(sentence)] or wordings
+        kept_sentences = careful(clear, shown[action].shown, 3) or list(clear[:1])
+        sentences += kept_sentences
+        sentence_actions += [action] * len(kept_sentences)
+
     with torch.no_grad():
-        views = torch.cat([seen.seen[:, :, :kept], seen.seen[:, :, -1:]], dim=2)
-        vectors = space.embed_statistics(views).flatten(0, 1).numpy()
-    of = [actions.of[record, mirrored] for mirrored in (False, True) for record in examples.records]
+        kept_views = torch.cat([views.seen[:, :, :kept], views.seen[:, :, -1:]], dim=2)
+        vectors = space.embed_statistics(kept_views).flatten(0, 1).numpy()
     return Known(
         np.rint(vectors * 127).astype(np.int8),
-        np.array(of, dtype=np.int16),
-        np.array(shown, dtype=np.uint8),
+        np.array(motion_actions, dtype=np.int16),
+        np.array([_kind_row(action_shown) for action_shown in shown], dtype=np.uint8),
         tuple(sentences),
-        np.array(said, dtype=np.int16),
-        np.array([[kind in named(one) for kind in kinds] for one in sentences], dtype=np.uint8),
-        np.array([way_of(one) for one in sentences], dtype=np.int16),
+        np.array(sentence_actions, dtype=np.int16),
+        np.array([[kind in named(sentence) for kind in KINDS] for sentence in sentences], dtype=np.uint8),
+        np.array([way_of(sentence) for sentence in sentences], dtype=np.int16),
     )
 
 
+def _names_both_sides(sentence: str) -> bool:
+    """Whether a sentence names left and right, as in "left, right, left"."""
+    return {"left", "right"} <= set(RULES.words(sentence))
+
+
+def _kind_row(shown: Shown) -> list[int]:
+    """For each kind 2 if it is shown, 1 if it may be mentioned, else 0."""
+    return [2 if kind in shown.shown else int(kind in shown.sayable) for kind in KINDS]
+
+
 def way_of(sentence: str) -> tuple[int, int, int]:
-    """Where a sentence says that somebody goes, the degrees that it gives, 0 for none, and whether it is about going
-    alone."""
+    """The direction of travel in a sentence, its degrees, 0 for none, and whether it is about locomotion alone."""
     text = " ".join(RULES.words(sentence))
     kinds = named(sentence)
     going = bool(kinds) and kinds <= GOING
 
-    # a side is that of the path where a word of turning says so, or where the sentence is about nothing but going:
-    # "walks straight and then continues to the left"
+    # a side is that of the path if there is a word of turning, or if the sentence is about nothing but locomotion, as
+    # in "walks straight and then continues to the left"
     sides = frozenset(re.findall(r"\b(?:left|right)\b(?! angle)", text))
     of_the_path = re.search(TURNING, text) is not None or (going and not kinds & SIDEWAYS)
     of_a_limb = re.search(r"\b(?:foot|feet|legs?|arms?|hands?|shoulder)\b", text) is not None
@@ -152,14 +173,19 @@ def way_of(sentence: str) -> tuple[int, int, int]:
     if of_the_path and not of_a_limb:
         way = {frozenset({"left"}): LEFT, frozenset({"right"}): RIGHT}.get(sides, way)
 
+    # degrees in digits, or a right angle
     digits = re.search(r"\b(\d(?: ?\d)*) degrees?\b", text)
-    degrees = int(digits[1].replace(" ", "")) if digits else 90 if re.search(r"right angle|quarter", text) else 0
+    degrees = 0
+    if digits:
+        degrees = int(digits[1].replace(" ", ""))
+    elif re.search(r"right angle|quarter", text):
+        degrees = 90
     return way, min(degrees, 720), int(going)
 
 
 class Tried(NamedTuple):
-    """Answers about motions of people kept back: the share of near motions that each is right about, the similarity of
-    the nearest, the group of people, and whether it is right, (N,) each."""
+    """Answers about motions of held-out people, (N,) each: the share of near motions for which each is right, the
+    similarity of the nearest, the group of people, and whether it is right."""
 
     share: NDArray[np.float64]
     similarity: NDArray[np.float64]
@@ -167,83 +193,96 @@ class Tried(NamedTuple):
     right: NDArray[np.bool_]
 
 
-def _tried(found: Divided, examples: Examples, space: JointEmbedding, seen: Views, visits: KnownVisits) -> Tried:
-    """For each group of people what spaces that never saw them answer about them: about each motion as it is, and
+def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, visits: KnownVisits) -> Tried:
+    """The answers of spaces fitted without each group of people about their motions: about each motion as it is, and
     about two views."""
-    entries, tried = [found.store.records[record] for record in examples.records], []
-    shows = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
+    entries = [corpus.store.records[record] for record in examples.records]
+    shown = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
     groups = grouped([entry.subject for entry in entries], visits.folds)
+    answers = []
     for fold in range(groups.max() + 1):
-        rest, kept_back = (np.flatnonzero(rows).tolist() for rows in (groups != fold, groups == fold))
-        if not rest or not kept_back:
+        others = np.flatnonzero(groups != fold).tolist()
+        held_out = np.flatnonzero(groups == fold).tolist()
+        if not others or not held_out:
             continue
-        mine = seen.only(rest)
-        discriminate(space, _cut(mine))
-        part = found.examples(tuple(examples.records[row] for row in rest))
-        known = _gathered(found, part, space, mine, visits.kept)
+
+        # a space of the others, and what it knows
+        other_views = views.only(others)
+        discriminate(space, _without_whole(other_views))
+        part = corpus.examples(tuple(examples.records[row] for row in others))
+        known = _gathered(corpus, part, space, other_views, visits.kept)
+
+        # its answers about the held-out motions: whole, and two views
         for view in (-1, 0, 1):
             with torch.no_grad():
-                vectors = space.embed_statistics(seen.seen[0, kept_back, view]).numpy()
-            tried.append(_answered(known, vectors, fold, [shows[row] for row in kept_back]))
-    return Tried(*map(np.concatenate, zip(*tried, strict=True)))
+                vectors = space.embed_statistics(views.seen[0, held_out, view]).numpy()
+            answers.append(_answered(known, vectors, fold, [shown[row] for row in held_out]))
+    return Tried(*map(np.concatenate, zip(*answers, strict=True)))
 
 
-def _cut(seen: Views) -> Views:
-    """Without the last view, of whole motions: those that are disguised tell what does not matter."""
-    return replace(seen, seen=seen.seen[:, :, :-1])
+def _without_whole(views: Views) -> Views:
+    """Without the last view, of whole motions: disguised ones show which differences do not matter."""
+    return replace(views, seen=views.seen[:, :, :-1])
 
 
 def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown]) -> Tried:
-    """What is answered about motions at some places of the space, of which is known what they show."""
-    counted, alike = known.near(vectors)
+    """The answers about motions at some places of the space, by what these show."""
+    counted, similarity = known.near(vectors)
     shares = known.shares(counted)
-    best, right = shares.argmax(axis=1), []
-    for shown, names in zip(shows, known.sets[best], strict=True):
-        kinds = {kind for kind, named in zip(KINDS, names, strict=True) if named}
+    best = shares.argmax(axis=1)
+    right = []
+    for shown, flags in zip(shows, known.sets[best], strict=True):
+        kinds = {kind for kind, in_answer in zip(KINDS, flags, strict=True) if in_answer}
         right.append(shown.right_kinds(kinds))
-    said = shares[np.arange(len(best)), best]
-    return Tried(said, alike, np.full(len(best), group), np.array(right, dtype=bool))
+    best_shares = shares[np.arange(len(best)), best]
+    return Tried(best_shares, similarity, np.full(len(best), group), np.array(right, dtype=bool))
 
 
 def grouped(people: Sequence[str], count: int) -> NDArray[np.int64]:
-    """The group of each motion (N,), 0 to at most ``count``: people whose names begin alike, up to the first "_", are
-    one corpus and together; the largest come first, each into the smallest group."""
+    """The group (N,) of each motion, from 0 to below ``count``: people whose names are equal up to the first "_" are
+    one corpus and stay together; the largest corpora come first, each into the smallest group."""
     corpora = [name.partition("_")[0] for name in people]
-    sizes, of = [0] * count, dict[str, int]()
-    for corpus in sorted(set(corpora), key=lambda one: (-corpora.count(one), one)):
-        of[corpus] = sizes.index(min(sizes))
-        sizes[of[corpus]] += corpora.count(corpus)
-    return np.array([of[corpus] for corpus in corpora], dtype=np.int64)
+    sizes = [0] * count
+    groups = {}
+    for corpus in sorted(set(corpora), key=lambda corpus: (-corpora.count(corpus), corpus)):
+        groups[corpus] = sizes.index(min(sizes))
+        sizes[groups[corpus]] += corpora.count(corpus)
+    return np.array([groups[corpus] for corpus in corpora], dtype=np.int64)
 
 
 def learned(tried: Tried, sure: float) -> AnswerSettings:
-    """How probable answers are (logistic regression, in which each group counts as the root of its size), from which
-    probability on so many of them are right, and the similarity that one in a hundred motions does not have. The
-    defaults where there are too few answers or all are alike.
+    """The probability of answers (logistic regression with groups weighted by the root of their size), the probability
+    from which a share of ``sure`` is right, and the 1st percentile of the similarity. The defaults for too few answers,
+    or if all are right or all wrong.
 
-    Other people's files are like the group that is hardest to tell: the bound is the highest of the groups'.
+    Files of other people are like the most difficult group: the bound is the highest of all groups.
     """
     from sklearn.linear_model import LogisticRegression
 
     if len(tried.right) < 50 or tried.right.all() or not tried.right.any():
         return AnswerSettings()
-    odds, sizes = log_odds(tried.share)[:, None], np.bincount(tried.group)[tried.group]
+    odds = log_odds(tried.share)[:, None]
+    sizes = np.bincount(tried.group)[tried.group]
     weights = np.sqrt(len(sizes) / sizes)
-    fitted = LogisticRegression(C=10.0, max_iter=1000).fit(odds, tried.right, sample_weight=weights)
-    chances = fitted.predict_proba(odds)[:, 1]
-    bounds = [_least(chances[rows], tried.right[rows], sure) for rows in (tried.group == g for g in set(tried.group))]
-    reached = [one for one in bounds if one is not None]
+    regression = LogisticRegression(C=10.0, max_iter=1000).fit(odds, tried.right, sample_weight=weights)
+    probabilities = regression.predict_proba(odds)[:, 1]
+    bounds = []
+    for group in set(tried.group):
+        rows = tried.group == group
+        bound = _lowest(probabilities[rows], tried.right[rows], sure)
+        if bound is not None:
+            bounds.append(bound)
     return AnswerSettings(
-        bias=round(float(fitted.intercept_[0]), 4),
-        share=round(float(fitted.coef_[0, 0]), 4),
-        sure=round(max(reached, default=1.0), 4),
+        bias=round(float(regression.intercept_[0]), 4),
+        share=round(float(regression.coef_[0, 0]), 4),
+        sure=round(max(bounds, default=1.0), 4),
         outside=round(float(np.percentile(tried.similarity, 1)), 4),
     )
 
 
-def _least(chances: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> float | None:
-    """The least probability at and above which the wanted share of answers is right; None where there is none."""
-    order = np.argsort(-chances, kind="stable")
+def _lowest(probabilities: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> float | None:
+    """The lowest probability at and above which the wanted share of answers is right; None without one."""
+    order = np.argsort(-probabilities, kind="stable")
     precision = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
-    good = np.flatnonzero(precision[19:] >= wanted) + 19  # of fewer than 20 nothing is learned
-    return float(chances[order[good[-1]]]) if len(good) else None
+    good = np.flatnonzero(precision[19:] >= wanted) + 19  # fewer than 20 answers prove nothing
+    return float(probabilities[order[good[-1]]]) if len(good) else None

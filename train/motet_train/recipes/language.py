@@ -26,15 +26,15 @@ from motet_train.recipes.recipe import Job, Recipe
 from motet_train.runs import MODELS, Run
 
 SIZES = ("channels", "words")
-"""What the store decides in the configurations of both nets."""
+"""Sizes of both nets that the store determines."""
 
 
 @dataclass(frozen=True)
 class LanguageVisits:
-    """Which motions an epoch visits: see :meth:`motet_train.data.batches.Examples.epoch`.
+    """The motions that an epoch visits: see :meth:`motet_train.data.batches.Examples.epoch`.
 
-    offsets: how many down-sampling offsets of each motion. windows: frames of each. mirror: whether half of all visits
-    are to left-right mirrored motions.
+    offsets: the number of down-sampling offsets of each motion. windows: frames of each. mirror: whether half of all
+    visits are to left-right mirrored motions.
     """
 
     offsets: int | None = None
@@ -61,9 +61,9 @@ DEFAULT = replace(
     visits=LanguageVisits(offsets=3, mirror=True),
     defaults={**PAPER.defaults, "draws": 100, "temperature": 0.7},
 )
-"""What is shipped: for a small corpus, whose motions are seen through noise instead of more dropout.
+"""The shipped recipe, for a small corpus, with noise on the frames instead of more dropout.
 
-Many wordings share an action, so the most probable sentence says it better than the consensus of draws.
+Many wordings share an action, so the most probable sentence describes it better than the consensus of draws.
 """
 
 RECIPES = {"default": DEFAULT, "paper": PAPER}
@@ -71,7 +71,7 @@ RECIPES = {"default": DEFAULT, "paper": PAPER}
 
 @dataclass(frozen=True, eq=False)
 class Divided:
-    """A store, divided, with all that is taken from its training part alone."""
+    """A divided store, with everything that is derived from its training part alone."""
 
     store: Store
     parts: Split
@@ -85,34 +85,39 @@ class Divided:
 
 
 def divided(store: Store, mirror: bool, by: str = "trial") -> Divided:
-    """Divide a store; contract and vocabulary are those of its training part. DataError where that is not possible.
+    """Divide a store; contract and vocabulary are those of its training part. DataError if that is not possible.
 
-    by: see :func:`motet_train.data.store.split`; the split is drawn with seed 0 whatever the seed of the training is,
-    so that runs can be compared and chained.
+    by: see :func:`motet_train.data.store.split`; the split has seed 0 whatever the seed of the training, so that runs
+    can be compared and chained.
     """
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
-    sentences = [s for record in parts.train for s in store.records[record].sentences if usable(s)]
+    sentences = []
+    for record in parts.train:
+        sentences += [sentence for sentence in store.records[record].sentences if usable(sentence)]
     mirrored = map(mirror_text, sentences) if mirror else ()
     vocabulary = Vocabulary.of(chain(sentences, mirrored))
     return Divided(store, parts, contract, vocabulary, frame_mirror(contract) if mirror else None)
 
 
 def train_language(store: Store, job: Job, data: str = "", by: str = "trial") -> Run:
-    """Train on a store, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where it cannot be trained on.
+    """Train on a store, see :meth:`motet_train.recipes.recipe.Job.run`; DataError if it cannot be trained on.
 
-    data: its name.
+    data: the store's name.
     """
-    recipe, visits, size = job.recipe, job.recipe.visits, job.training.batch
-    found = divided(store, visits.mirror, by)
-    config = asdict(recipe.sized(channels=len(found.contract.channels), words=len(found.vocabulary)))
+    recipe = job.recipe
+    visits = recipe.visits
+    batch_size = job.training.batch
+    corpus = divided(store, visits.mirror, by)
+    config = asdict(recipe.sized(channels=len(corpus.contract.channels), words=len(corpus.vocabulary)))
     if "travelled" in config and not named(store.representation).required:
-        config["travelled"] = 0  # its channels do not say where the figure goes
+        config["travelled"] = 0  # its channels do not tell the path
     torch.manual_seed(job.about.seed)
     net = MODELS[recipe.model](config)
     assert isinstance(net, LanguageNet)
-    net.measure_by(found.contract.mean, found.contract.std)
-    train, validation = (found.examples(part) for part in (found.parts.train, found.parts.validation))
+    net.measure_by(corpus.contract.mean, corpus.contract.std)
+    train = corpus.examples(corpus.parts.train)
+    validation = corpus.examples(corpus.parts.validation)
 
     def loss(batch: Batch) -> Terms:
         losses, summary = net.terms(batch)
@@ -121,52 +126,67 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
 
     def validated() -> dict[str, Any]:
         longest = visits.windows and visits.windows[1]
-        return {"validation": round(validation_loss(net, validation, size, longest), 6)}
+        return {"validation": round(validation_loss(net, validation, batch_size, longest), 6)}
 
     learner = GradientLearner(
         net.to(job.device),
         job.training,
         loss,
-        lambda rng: train.epoch(rng, size, visits.offsets, visits.windows),
+        lambda rng: train.epoch(rng, batch_size, visits.offsets, visits.windows),
         validated,
     )
-    about = manifest(job, found, config, data, by)
+    about = manifest(job, corpus, config, data, by)
     if recipe.verb != "describe":
         return job.run(net, learner, about)
-    return job.run(net, learner, about, tuned=partial(_confidence, found))
+    return job.run(net, learner, about, tuned=partial(_confidence, corpus))
 
 
-def _confidence(found: Divided, run: Run) -> tuple[ConfidenceSettings]:
-    """From which log-probability on descriptions are believed, by those of the validation motions."""
+def _confidence(corpus: Divided, run: Run) -> tuple[ConfidenceSettings]:
+    """The log-probability from which descriptions are confident, chosen on the validation motions."""
     model = DescribeModel(Manifest.from_json(run.manifest), run.torch_graphs())
-    corpus = SplitStore(found.store, found.parts)
-    said = [record for record in found.parts.validation if corpus.sentences(record)]
-    fitting = [n for n in said if len(corpus.motion(n)) >= 2 and corpus.motion(n).duration <= MAX_SECONDS]
-    descriptions, right = judged(model, corpus, fitting)
-    return (calibrated(np.array([one.log_probability for one in descriptions]), right),)
+    split_store = SplitStore(corpus.store, corpus.parts)
+    records = []
+    for record in corpus.parts.validation:
+        if split_store.sentences(record):
+            motion = split_store.motion(record)
+            if len(motion) >= 2 and motion.duration <= MAX_SECONDS:
+                records.append(record)
+    descriptions, right = judged(model, split_store, records)
+    scores = np.array([description.log_probability for description in descriptions])
+    return (calibrated(scores, right),)
 
 
-def manifest(job: Job, found: Divided, config: Mapping[str, Any], data: str, by: str) -> dict[str, Any]:
+def manifest(job: Job, corpus: Divided, config: Mapping[str, Any], data: str, by: str) -> dict[str, Any]:
     """The manifest of a run of a model that reads or writes sentences. data: the store's name."""
-    parts, records = found.parts, found.store.records
+    parts = corpus.parts
+    records = corpus.store.records
+    sentences = [sentence for entry in records for sentence in entry.sentences]
     about = {
         "name": data,
         "motions": len(records),
-        "sentences": sum(len(entry.sentences) for entry in records),
-        "skipped": len(found.store.skipped),
-        "unusable_sentences": sum(not usable(s) for entry in records for s in entry.sentences),
+        "sentences": len(sentences),
+        "skipped": len(corpus.store.skipped),
+        "unusable_sentences": sum(not usable(sentence) for sentence in sentences),
     }
-    named = {part: [records[record].name for record in getattr(parts, part)] for part in ("validation", "test")}
-    training = {"data": about, "split": {"by": by, "train": len(parts.train), **named}}
-    known = {"text": RULES.to_json(), "vocabulary": found.vocabulary.words}
-    return job.manifest(found.contract, config, job.recipe.defaults, None, training, **known)
+    split_names = {
+        "by": by,
+        "train": len(parts.train),
+        "validation": [records[record].name for record in parts.validation],
+        "test": [records[record].name for record in parts.test],
+    }
+    training = {"data": about, "split": split_names}
+    text = {"text": RULES.to_json(), "vocabulary": corpus.vocabulary.words}
+    return job.manifest(corpus.contract, config, job.recipe.defaults, None, training, **text)
 
 
 @torch.no_grad()
 def validation_loss(net: LanguageNet, examples: Examples, batch: int, longest: int | None = None) -> float:
-    """The mean loss of a step, over every sentence of every motion, of which the ``longest`` first frames count."""
-    total, count, device = 0.0, 0, net.mean.device
+    """The mean loss of a step, over every sentence of every motion, by its ``longest`` first frames."""
+    total = 0.0
+    count = 0
+    device = net.mean.device
     for rows in examples.everything(batch, longest):
         losses, _ = net.terms(rows.to(device))
-        total, count = total + float(losses.double().sum()), count + len(losses)
+        total += float(losses.double().sum())
+        count += len(losses)
     return total / count

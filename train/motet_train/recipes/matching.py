@@ -1,4 +1,4 @@
-"""The recipe of a figure that is steered by motion matching, and its training from a store."""
+"""The recipe of a figure steered by motion matching, and its training from a store."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -26,7 +26,7 @@ from motet_train.runs import Run
 
 @dataclass(frozen=True)
 class MatchingVisits:
-    """window: consecutive rows, of which a batch has several. feet: how many times they count."""
+    """window: consecutive rows of a batch's windows. feet: their weight."""
 
     window: int = 8
     feet: float = 6.0
@@ -49,15 +49,15 @@ RECIPES = {"default": DEFAULT}
 
 
 def train_matching(store: Store, job: Job, data: str = "") -> Run:
-    """Train on the recordings of a store in ``root_sixd`` that show gaits; DataError where a gait has none."""
+    """Train on the recordings of gaits in a store in ``root_sixd``; DataError if a gait has none."""
     visits = job.recipe.visits
     if store.representation != "root_sixd":
         raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
     gaits = gaits_of(store)
     names = tuple(gait.name for gait in gaits)
-    found = recordings(store, gaits)
+    gait_recordings = recordings(store, gaits)
     contract = store.contract(tuple(range(len(store.records))))
-    rows = rows_of(found, names, STEERING)
+    rows = rows_of(gait_recordings, names, STEERING)
     torch.manual_seed(job.about.seed)
     config = job.recipe.sized(
         channels=len(contract.channels),
@@ -65,13 +65,16 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
         rows=len(rows),
         features=rows.features.shape[1],
         gaits=names,
-        speeds=tuple(_speeds(rows, shown, STEERING) for shown in rows.gaits.T),
+        speeds=tuple(_speeds(rows, in_gait, STEERING) for in_gait in rows.gaits.T),
     )
     net = Matching(config)
     net.measure_by(contract.mean, contract.std)
     take(net, rows)
+
+    # poses and the points of their joints, which codes have to reproduce
     poses = torch.from_numpy(rows.poses).float().to(job.device)
-    true = poses, net.to(job.device).points(poses[:, :-1].reshape(len(poses), -1, 4), poses[:, -1:])
+    rotations = poses[:, :-1].reshape(len(poses), -1, 4)
+    true = poses, net.to(job.device).points(rotations, poses[:, -1:])
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
     starts = torch.from_numpy(np.flatnonzero(rows.left >= visits.window))
 
@@ -86,25 +89,29 @@ def train_matching(store: Store, job: Job, data: str = "") -> Run:
         batch,
         lambda: _measured(net, true),
     )
-    about = {"data": {"name": data, "recordings": len(found), "rows": len(rows)}}
+    about = {"data": {"name": data, "recordings": len(gait_recordings), "rows": len(rows)}}
     return job.run(net, learner, job.manifest(contract, asdict(net.config), {}, None, about))
 
 
 @torch.no_grad()
 def take(net: Matching, rows: MatchingRows) -> None:
-    """Fill a net with rows: their table, and codes that are the principal components of poses and mirrored poses."""
+    """Fill a net with rows: their table, and as codes the principal components of poses and mirrored poses."""
     mean, scale = (part.round(6) for part in scaling(rows.features))
     columns, signs = mirrored_poses()
+
+    # poses relative to the mean of all poses and their mirror images, weighted by reach
     mean_pose = rows.poses.mean(axis=0)
     pose_mean = (mean_pose + mean_pose[columns] * signs) / 2
-    weights, off = _reach(net.config.tree), rows.poses - pose_mean
-    axes = []
-    for sign, count in ((1, net.config.even), (-1, net.config.odd)):
-        half = (off + sign * off[:, columns] * signs) / 2 * weights
-        axes.append(np.linalg.svd(half[:: max(1, len(half) // 4000)], full_matrices=False)[2][:count])  # of 4000 poses
-    basis = np.concatenate(axes)
+    offsets = rows.poses - pose_mean
+    weights = _reach(net.config.tree)
+    basis = np.concatenate(
+        [
+            _components((offsets + offsets[:, columns] * signs) / 2 * weights, net.config.even),
+            _components((offsets - offsets[:, columns] * signs) / 2 * weights, net.config.odd),
+        ]
+    )
     values = {
-        "codes": off * weights @ basis.T,
+        "codes": offsets * weights @ basis.T,
         "moves": np.column_stack([rows.moves, rows.speed, rows.contacts]),
         "features": np.clip(np.round((rows.features - mean) * scale * FEATURE_STEPS), -127, 127),
         "shows": rows.gaits,
@@ -118,66 +125,90 @@ def take(net: Matching, rows: MatchingRows) -> None:
         getattr(net, name).copy_(torch.from_numpy(value))
 
 
+def _components(offsets: Array, count: int) -> Array:
+    """The first ``count`` principal components (count, P) of offsets (N, P), by about 4,000 of them."""
+    every = max(1, len(offsets) // 4000)
+    _, _, components = np.linalg.svd(offsets[::every], full_matrices=False)
+    first: Array = components[:count]
+    return first
+
+
 def _reach(tree: Tree) -> Array:
-    """How far each bone carries others, at least 5 cm: by so many metres the numbers (P,) of its quaternion count."""
+    """The weight (P,) of each number of a pose: for a bone's quaternion the metres to the farthest joint that it
+    carries, at least 5 cm."""
     places = np.zeros((len(tree.parents), 3))
     for joint, parent in enumerate(tree.parents):
         if parent >= 0:
             places[joint] = places[parent] + tree.offsets[joint]
-    far = []
+    reach = []
     for bone in tree.bones:
         carried = [bone]
         for joint, parent in enumerate(tree.parents):
             if parent in carried:
                 carried.append(joint)
-        far.append(np.linalg.norm(places[carried] - places[bone], axis=1).max())
-    return np.append(np.repeat(np.maximum(far, 0.05), 4), 1.0)
+        reach.append(np.linalg.norm(places[carried] - places[bone], axis=1).max())
+    return np.append(np.repeat(np.maximum(reach, 0.05), 4), 1.0)
 
 
-def _speeds(rows: MatchingRows, shown: NDArray[np.bool_], how: SteeringSettings) -> Speeds:
-    """Those that a gait can be asked for, as its rows can be played slower and faster; all 0 if they cannot.
+def _speeds(rows: MatchingRows, in_gait: NDArray[np.bool_], settings: SteeringSettings) -> Speeds:
+    """The speeds that a gait allows, as its rows can be played slower and faster; all 0 if it has no moving rows.
 
-    They go from the 30th percentile of its moving rows, with shorter strides, or from the slowest pace if that is a
-    creep, to the 90th of each direction, or to that of means over a stride, with the longest strides, if it is less, as
-    it is of side steps; directions with a second of rows or less have none.
+    The lowest is the 30th percentile of its moving rows, with shorter strides, or the slowest pace if that is a creep.
+    The highest in each direction is the 90th percentile of its rows, or, if that is less, as for side steps, of means
+    over a stride, with the longest strides; 0 for directions with at most a second of rows.
     """
-    speed = rows.speed[shown]
-    moving = speed > how.idle
+    speed = rows.speed[in_gait]
+    moving = speed > settings.idle
     if not moving.any():
         return (0.0,) * 5
-    angle = np.abs(np.arctan2(rows.moves[shown, 1], rows.moves[shown, 0]))  # from the facing
-    low = round(float(np.percentile(speed[moving], 30.0)) * how.slowest * how.shortest, 2)
-    if low <= how.creep and is_faster(speed, how):
-        low = LEAST_PACE
-    sectors = [moving & (np.digitize(angle, (how.aside, how.back), right=True) == sector) for sector in range(3)]
-    going = stride_velocities(rows.moves[:, :2], rows.left)[shown]
-    paces, ways = np.hypot(*going.T), np.abs(np.arctan2(going[:, 1], going[:, 0]))
-    strides = [paces[(paces > how.idle) & (np.digitize(ways, (how.aside, how.back)) == sector)] for sector in range(3)]
-    fastest = [
-        min(np.percentile(speed[part], 90.0), np.percentile(own, 90.0) * how.longest) * how.fastest
-        if part.sum() > 30 and len(own)
-        else 0.0
-        for part, own in zip(sectors, strides, strict=True)
-    ]
-    forward, aside, back = (round(float(one), 2) for one in fastest)
-    return low, round(float(np.median(speed[sectors[0]])), 2), forward, aside, back
+    slowest = round(float(np.percentile(speed[moving], 30.0)) * settings.slowest * settings.shortest, 2)
+    if slowest <= settings.creep and is_faster(speed, settings):
+        slowest = LEAST_PACE
+
+    # rows, and means over a stride, by their direction from the facing: ahead, aside or back
+    bounds = (settings.aside, settings.back)
+    angles = np.abs(np.arctan2(rows.moves[in_gait, 1], rows.moves[in_gait, 0]))
+    sectors = np.digitize(angles, bounds, right=True)
+    strides = stride_velocities(rows.moves[:, :2], rows.left)[in_gait]
+    stride_speeds = np.hypot(*strides.T)
+    stride_moving = stride_speeds > settings.idle
+    stride_sectors = np.digitize(np.abs(np.arctan2(strides[:, 1], strides[:, 0])), bounds)
+    fastest = []
+    for sector in range(3):
+        row_speeds = speed[moving & (sectors == sector)]
+        long_speeds = stride_speeds[stride_moving & (stride_sectors == sector)]
+        fastest.append(_fastest(row_speeds, long_speeds, settings))
+    median = round(float(np.median(speed[moving & (sectors == 0)])), 2)
+    ahead, aside, back = fastest
+    return slowest, median, ahead, aside, back
+
+
+def _fastest(row_speeds: Array, stride_speeds: Array, settings: SteeringSettings) -> float:
+    """The highest speed of a direction by the speeds of its rows and strides, m/s; 0 for too few."""
+    if len(row_speeds) <= 30 or not len(stride_speeds):
+        return 0.0
+    by_strides = np.percentile(stride_speeds, 90.0) * settings.longest
+    return round(float(min(np.percentile(row_speeds, 90.0), by_strides) * settings.fastest), 2)
 
 
 def _loss(net: Matching, rows: Tensor, true: tuple[Tensor, Tensor], weights: Tensor, fps: float) -> Terms:
-    """Errors of joints' places (m) and speeds (m/s), and of quaternions, which places do not tell all of, in windows of
-    rows (B, W). true: poses (N, P) and the points (N, J', 3) of their joints."""
-    codes, (poses, points) = net.codes[rows], true
-    off = (net.points(*net.poses(codes)) - points[rows]) * weights[:, None]
-    speeds = off.diff(dim=1) * fps
-    turns = (net.values(codes) - poses[rows]).abs().mean()
-    return (Term(off.abs().mean() + 0.1 * speeds.abs().mean() + 0.2 * turns, len(rows)),)
+    """Errors of positions (m) and speeds (m/s) of joints, and of quaternions, which positions do not determine, in
+    windows of rows (B, W). true: poses (N, P) and the points (N, J', 3) of their joints."""
+    poses, points = true
+    codes = net.codes[rows]
+    errors = (net.points(*net.poses(codes)) - points[rows]) * weights[:, None]
+    speed_errors = errors.diff(dim=1) * fps
+    turn_error = (net.values(codes) - poses[rows]).abs().mean()
+    return (Term(errors.abs().mean() + 0.1 * speed_errors.abs().mean() + 0.2 * turn_error, len(rows)),)
 
 
 @torch.no_grad()
 def _measured(net: Matching, true: tuple[Tensor, Tensor]) -> dict[str, Any]:
-    """The mean error of joints' places in centimetres, and of bones' rotations in degrees."""
-    (quats, height), (poses, points) = net.poses(net.codes), true
-    off = (net.points(quats, height) - points).norm(dim=-1)
-    same = (quats * poses[:, :-1].reshape(quats.shape)).sum(dim=-1).abs().clamp(max=1)
-    degrees = torch.rad2deg(2 * torch.acos(same))
-    return {"joints_cm": round(100 * float(off.mean()), 3), "degrees": round(float(degrees.mean()), 3)}
+    """The mean error of joints' positions in centimetres, and of bones' rotations in degrees."""
+    poses, points = true
+    rotations, height = net.poses(net.codes)
+    distances = (net.points(rotations, height) - points).norm(dim=-1)
+    true_rotations = poses[:, :-1].reshape(rotations.shape)
+    cosines = (rotations * true_rotations).sum(dim=-1).abs().clamp(max=1)
+    degrees = torch.rad2deg(2 * torch.acos(cosines))
+    return {"joints_cm": round(100 * float(distances.mean()), 3), "degrees": round(float(degrees.mean()), 3)}

@@ -28,7 +28,7 @@ DEFAULT = Recipe(
 )
 
 FILES = replace(DEFAULT, config=replace(DEFAULT.config, hidden=96), training=replace(PREDICTOR_TRAINING, steps=12_000))
-"""Of motion files, of more people: on those held out, nets of two and four times the width are worse."""
+"""For motion files of more people; nets of two and four times the width are worse on held-out people."""
 
 RECIPES = {"default": DEFAULT, "files": FILES}
 
@@ -36,30 +36,34 @@ RECIPES = {"default": DEFAULT, "files": FILES}
 def train_predict(material: Material, job: Job) -> Run:
     """Train a predictor, see :meth:`motet_train.recipes.recipe.Job.run`; DataError for unfit sequences.
 
-    Of motion files it learns where the joints will be, and, from the sequences held out for validation, how far off it
-    is likely to be; of text files, which have no bones, it learns their channels.
+    From motion files it learns the positions of joints, and from the sequences held out for validation its expected
+    errors; from text files, which have no bones, it learns their channels.
     """
     visits = possible(job.recipe.visits, material)
     job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     net = _untrained(material, job.recipe)
-    count = net.config.frames
+    frames = net.config.frames
     about = {"data": material.about}
-    manifest = job.manifest(material.contract, asdict(net.config), {"horizon": count}, material.licence, about)
-    bones = material.contract.skeleton is not None
-    seed = net.config.seed_frames if bones else None  # text files are taken as they are
-    windows = Windows(material, net.config.seed_frames + count, **asdict(visits), seed=seed)
-    # about the inverse of the error to be expected, mean 1
-    times = 1 / (0.3 + 0.12 * torch.arange(1.0, count + 1) ** 0.8)
-    times = (times / times.mean()).to(job.device)
-    places = VectorPlaces(material.contract).to(job.device) if bones else None
-    held = windows.along(material.validation, 25).to(job.device) if net.config.doubts else None
+    manifest = job.manifest(material.contract, asdict(net.config), {"horizon": frames}, material.licence, about)
+
+    # windows of input and output; text files are taken as they are
+    has_bones = material.contract.skeleton is not None
+    seed = net.config.seed_frames if has_bones else None
+    windows = Windows(material, net.config.seed_frames + frames, **asdict(visits), seed=seed)
+    held_out = windows.along(material.validation, 25).to(job.device) if net.config.doubts else None
+
+    # frames have about the inverse of their expected error as weights, mean 1
+    weights = 1 / (0.3 + 0.12 * torch.arange(1.0, frames + 1) ** 0.8)
+    weights = (weights / weights.mean()).to(job.device)
+    places = VectorPlaces(material.contract).to(job.device) if has_bones else None
+
     learner = GradientLearner(
         net.to(job.device),
         job.training,
-        lambda drawn: _loss(net, drawn, times, places),
+        lambda drawn: _loss(net, drawn, weights, places),
         lambda rng: (windows.draw(job.training.batch, rng),),
-        lambda: {} if places is None or held is None else _error_head_fitted(trained, places, held),
+        lambda: {} if places is None or held_out is None else _error_head_fitted(trained, places, held_out),
     )
     assert isinstance(learner.kept, Predictor)
     trained: Predictor = learner.kept
@@ -73,11 +77,18 @@ def possible(visits: Visits, material: Material) -> Visits:
 
 
 def _untrained(material: Material, recipe: Recipe) -> Predictor:
-    held, kept = material.held, list(material.kept)
-    sides = {"mirrored": material.mirrored, "signs": material.signs}
-    doubts = material.contract.skeleton is not None and bool(material.mirrored) and len(material.validation) > 0
-    sizes = {"channels": len(material.contract.channels), "kept": material.kept, "held": held, "doubts": doubts}
-    net = Predictor(recipe.sized(**sizes, **sides))
+    held = material.held
+    kept = list(material.kept)
+    net = Predictor(
+        recipe.sized(
+            channels=len(material.contract.channels),
+            kept=material.kept,
+            held=held,
+            doubts=material.contract.skeleton is not None and bool(material.mirrored) and len(material.validation) > 0,
+            mirrored=material.mirrored,
+            signs=material.signs,
+        )
+    )
     if held not in (0, 6):
         raise DataError(f"the root's translation and rotation must vary in the data, but only {held} of 6 columns do")
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
@@ -86,30 +97,33 @@ def _untrained(material: Material, recipe: Recipe) -> Predictor:
     return net
 
 
-def _loss(net: Predictor, windows: Tensor, times: Tensor, places: VectorPlaces | None) -> Terms:
-    """The mean distance of predicted and true frames, each frame's by its importance: of channels, and of joints where
-    they have places, of which a metre counts like 100 units of channels."""
+def _loss(net: Predictor, windows: Tensor, weights: Tensor, places: VectorPlaces | None) -> Terms:
+    """The weighted mean distance between predicted and true frames: of channels, and of joints if they have positions,
+    a metre of which counts like 100 units of channels."""
+    seed = windows[:, : net.config.seed_frames]
+    truth = windows[:, net.config.seed_frames :]
+    predicted = net.plain(seed)
+    moved = list(net.config.kept[net.config.held :])
+    errors = _length((predicted - truth)[..., moved])
+    if places is not None:  # the channels still count, or turns about bones' own axes would not
+        errors = 10.0 * _length(places(predicted) - places(truth)).mean(-1) + 0.1 * errors
+    return (Term((errors * weights).mean(), len(windows)),)
 
-    def length(vectors: Tensor) -> Tensor:
-        """Of vectors (..., K), with gradients at 0: (...)."""
-        return (vectors.square().sum(-1) + 1e-6).sqrt()
 
-    seed, truth = windows[:, : net.config.seed_frames], windows[:, net.config.seed_frames :]
-    predicted, moved = net.plain(seed), list(net.config.kept[net.config.held :])
-    off = length((predicted - truth)[..., moved])
-    if places is not None:  # without channels, turns about bones' own axes would not count
-        off = 10.0 * length(places(predicted) - places(truth)).mean(-1) + 0.1 * off
-    return (Term((off * times).mean(), len(windows)),)
+def _length(vectors: Tensor) -> Tensor:
+    """Lengths (...) of vectors (..., K), with gradients at 0."""
+    return (vectors.square().sum(-1) + 1e-6).sqrt()
 
 
 @torch.no_grad()
-def _error_head_fitted(net: Predictor, places: VectorPlaces, held: Tensor) -> dict[str, float]:
-    """Teach a net its errors where it was not trained; the mean distance of joints there, in centimetres."""
+def _error_head_fitted(net: Predictor, places: VectorPlaces, held_out: Tensor) -> dict[str, float]:
+    """Fit a net's expected errors to windows that it was not trained on; their mean joint error in centimetres."""
     net.eval()
-    held = torch.cat([held, net.mirror(held)])
-    seed, truth = held[:, : net.config.seed_frames], held[:, net.config.seed_frames :]
+    windows = torch.cat([held_out, net.mirror(held_out)])
+    seed = windows[:, : net.config.seed_frames]
+    truth = windows[:, net.config.seed_frames :]
     predicted, disagreement = net.with_disagreement(seed)
-    off = (places(predicted) - places(truth)).norm(dim=-1).mean(-1)
+    errors = (places(predicted) - places(truth)).norm(dim=-1).mean(-1)
     assert net.doubt is not None
-    net.doubt.fit(net.error_signs(seed, predicted, disagreement), off)
-    return {"validation": round(100 * float(off.mean()), 4)}
+    net.doubt.fit(net.error_signs(seed, predicted, disagreement), errors)
+    return {"validation": round(100 * float(errors.mean()), 4)}

@@ -29,23 +29,23 @@ class Visits:
 
 
 AUGMENTED = Visits(warp=0.15, reverse=0.3, mirror=0.5)
-"""Of every predictor that is trained on poses, motet's own and those it is compared with."""
+"""For every predictor that is trained on poses, motet's own and those it is compared with."""
 
 
 ADAMW = Training(optimiser="adamw", learning_rate=2e-3, keep="last")
 MUON = Training(
     batch=32, optimiser="muon", learning_rate=2e-3, weight_decay=0.01, clip=1.0, keep="last", precision="bfloat16"
 )
-"""What trainings of motet's own nets share."""
+"""Shared by the trainings of motet's own nets."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is trained, and how.
+    """A net, its data and its training.
 
-    verb, model, loop: as in the manifest. config: the model's sizes, a dataclass, of which ``derived`` are found in the
-    data. training: None where the config says it. visits: how the data is visited, a dataclass. defaults: of the loop.
-    settings: of the features whose numbers are not their code's.
+    verb, model, loop: as in the manifest. config: the model's sizes, a dataclass, whose fields ``derived`` come from
+    the data. training: None if the config has it. visits: how the data is visited, a dataclass. defaults: of the loop.
+    settings: of features whose numbers differ from their code's.
     """
 
     verb: str
@@ -58,15 +58,18 @@ class Recipe:
     defaults: Mapping[str, Any] = field(default_factory=dict)
     settings: tuple[Settings, ...] = ()
 
-    def sized(self, **found: Any) -> Any:
-        """The config with what was found in the data."""
-        assert set(found) == set(self.derived)
-        return replace(self.config, **found)
+    def sized(self, **derived: Any) -> Any:
+        """The config with the sizes derived from the data."""
+        assert set(derived) == set(self.derived)
+        return replace(self.config, **derived)
 
     def to_json(self) -> dict[str, Any]:
-        """How it is trained, for the manifest."""
-        parts = (part for part in (self.training, self.visits) if part is not None)
-        return {key: value for part in parts for key, value in asdict(part).items()}
+        """The training, for the manifest."""
+        fields: dict[str, Any] = {}
+        for part in (self.training, self.visits):
+            if part is not None:
+                fields |= asdict(part)
+        return fields
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class Job:
 
     @property
     def training(self) -> Training:
-        """How its recipe trains by gradients."""
+        """The gradient training of its recipe."""
         assert self.recipe.training is not None
         return self.recipe.training
 
@@ -95,12 +98,13 @@ class Job:
         training: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> dict[str, Any]:
-        """The manifest of a run that begins, ready for JSON; the bundle's begins with it.
+        """The manifest of a new run, ready for JSON; the bundle's begins with it.
 
-        data_licence: what the data itself says, which counts if nobody stated another. training: what was trained on.
-        more: what only some verbs have.
+        data_licence: the data's own, unless the user states another. training: the data that is trained on. more:
+        entries of some verbs only.
         """
-        about, recipe = self.about, self.recipe
+        about = self.about
+        recipe = self.recipe
         trained = {} if recipe.training is None else {"recipe": recipe.to_json()}
         manifest = {
             "name": about.name,
@@ -127,11 +131,11 @@ class Job:
         more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
         tuned: Callable[[Run], Sequence[Settings]] = lambda run: (),
     ) -> Run:
-        """Train; the folder is a run after the first chunk, and one that was stopped resumes.
+        """Train; the folder is a run after the first chunk, and a stopped run resumes.
 
-        net: what the run will hold. more: what else the manifest says of the training, from its log.
-        tuned: settings of features that are found with the trained net.
-        RunError where the folder holds a run that was started with other settings; more epochs or steps are allowed.
+        net: the net of the run. more: further entries of the manifest's training, from its log. tuned: settings of
+        features that are tuned with the trained net.
+        RunError if the folder holds a run that was started with other settings; more epochs or steps are allowed.
         """
         if distributed.rank() == 0:
             refuse_other(self.folder / MANIFEST, manifest)
@@ -139,15 +143,9 @@ class Job:
             if self.settings is not None:
                 write_whole(self.folder / SETTINGS, self.settings)
         log = train(learner, self.about.seed, self.folder, self.progress)
-        best, seconds = kept(log, learner.keep), sum(line["seconds"] for line in log)
-        results: dict[str, Any] = {
-            f"{learner.unit}s": log[-1][learner.unit],
-            f"kept_{learner.unit}": best[learner.unit],
-            **{key: best[key] for key in ("loss", "validation") if key in best},
-            "seconds": round(seconds, 1),
-            "steps_per_second": round(sum(line["seconds"] * line["steps_per_second"] for line in log) / seconds, 3),
-            "parameters": sum(parameter.numel() for parameter in net.parameters()),
-        }
+
+        # the run, with the figures of its training and the settings that are tuned with it
+        results = _results(log, learner, net)
         training = {**manifest["training"], **results, **more(log), **surroundings(self.device)}
         run = Run({**manifest, "training": training}, net.cpu())
         if distributed.rank() == 0:
@@ -157,5 +155,20 @@ class Job:
         return run
 
 
+def _results(log: Sequence[Line], learner: Learner, net: Net) -> dict[str, Any]:
+    """The figures of a training, from its log."""
+    best = kept(log, learner.keep)
+    seconds = sum(line["seconds"] for line in log)
+    steps = sum(line["seconds"] * line["steps_per_second"] for line in log)
+    return {
+        f"{learner.unit}s": log[-1][learner.unit],
+        f"kept_{learner.unit}": best[learner.unit],
+        **{key: best[key] for key in ("loss", "validation") if key in best},
+        "seconds": round(seconds, 1),
+        "steps_per_second": round(steps / seconds, 3),
+        "parameters": sum(parameter.numel() for parameter in net.parameters()),
+    }
+
+
 def _by_feature(settings: Sequence[Settings]) -> dict[str, dict[str, Any]]:
-    return {one.FEATURE: asdict(one) for one in settings}
+    return {feature.FEATURE: asdict(feature) for feature in settings}

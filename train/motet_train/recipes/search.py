@@ -24,7 +24,7 @@ from motet_train.runs import Run
 
 @dataclass(frozen=True)
 class SearchVisits:
-    """How motions are seen: see :func:`motet_train.data.batches.views`, and for windows and disguise
+    """The views of motions: see :func:`motet_train.data.batches.views`, and for windows and disguise
     :func:`motet_train.data.disguise.seen_as`. mirror: also mirrored."""
 
     views: int = 12
@@ -43,45 +43,55 @@ DEFAULT = Recipe(
     SearchVisits(),
     {"count": 5},
 )
-"""What is shipped."""
+"""The shipped recipe."""
 
 RECIPES = {"default": DEFAULT}
 
 
 def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> Run:
     """Train on a store, see :func:`motet_train.recipes.language.train_language`."""
-    visits, training = job.recipe.visits, job.training
-    found = divided(store, visits.mirror, by)
-    config = config_for(store, found, job.recipe)
+    visits = job.recipe.visits
+    corpus = divided(store, visits.mirror, by)
+    config = config_for(store, corpus, job.recipe)
     torch.manual_seed(job.about.seed)
     net = JointEmbedding(config)
-    net.measure_by(found.contract.mean, found.contract.std)
-    asked = _Asked(found, found.parts.validation)
-    seen = seen_by(net, found.examples(found.parts.train), visits, job.about.seed)
-    learner = space_learner(net.to(job.device), training, seen, lambda: asked.measures(net))
-    return job.run(net, learner, manifest(job, found, asdict(config), data, by))
+    net.measure_by(corpus.contract.mean, corpus.contract.std)
+    queries = _UnseenSentences(corpus, corpus.parts.validation)
+    train_views = seen_by(net, corpus.examples(corpus.parts.train), visits, job.about.seed)
+    learner = space_learner(net.to(job.device), job.training, train_views, lambda: queries.measures(net))
+    return job.run(net, learner, manifest(job, corpus, asdict(config), data, by))
 
 
-def config_for(store: Store, found: Divided, recipe: Recipe) -> JointEmbeddingConfig:
+def config_for(store: Store, corpus: Divided, recipe: Recipe) -> JointEmbeddingConfig:
     """The configuration of a recipe's net for a store."""
-    sizes = {"channels": len(found.contract.channels), "words": len(found.vocabulary)}
-    config: JointEmbeddingConfig = recipe.sized(**sizes, figure=figure_of(found.contract))
+    config: JointEmbeddingConfig = recipe.sized(
+        channels=len(corpus.contract.channels),
+        words=len(corpus.vocabulary),
+        figure=figure_of(corpus.contract),
+    )
     if named(store.representation).required:
         return config
-    return replace(config, travelled=0)  # its channels do not say where the figure goes
+    return replace(config, travelled=0)  # its channels do not tell the path
 
 
 def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed: int, whole: bool = False) -> Views:
-    """The views of examples that a net is trained on. whole: and of each motion as it is."""
-    windows, store = (visits.windows[0], visits.windows[1]), examples.store
-    cut = partial(seen_as, disguise=visits.disguise, windows=windows, channels=store.channels, fps=store.fps)
+    """The views of examples that a net is trained on. whole: also of each motion as it is."""
+    store = examples.store
+    shortest, longest = visits.windows
+    cut = partial(
+        seen_as,
+        disguise=visits.disguise,
+        windows=(shortest, longest),
+        channels=store.channels,
+        fps=store.fps,
+    )
     return views(examples, net.statistics, visits.views, cut, seed, whole)
 
 
 def space_learner(
     net: JointEmbedding, training: Training, seen: Views, validate: Callable[[], dict[str, float]] = dict
 ) -> GradientLearner:
-    """What trains a net on views, by which it is measured first."""
+    """A learner of a net on views, whose statistics the net takes first."""
     net.see_by(seen.seen)
     return GradientLearner(
         net,
@@ -92,31 +102,43 @@ def space_learner(
     )
 
 
-class _Asked:
-    """The motions of a part of a store, and sentences about them that no training has seen."""
+class _UnseenSentences:
+    """The motions of a part of a store, and sentences about them that are not in training."""
 
-    def __init__(self, found: Divided, records: tuple[int, ...]) -> None:
-        entries = [found.store.records[record] for record in records]
-        self.groups = torch.tensor(alike([[*map(RULES.normalise, (*e.sentences, *e.unseen))] for e in entries]))
-        frames, lengths = padded([found.store.sequence(record) for record in records], "float32")
+    def __init__(self, corpus: Divided, records: tuple[int, ...]) -> None:
+        entries = [corpus.store.records[record] for record in records]
+        frames, lengths = padded([corpus.store.sequence(record) for record in records], "float32")
         self.motions = torch.from_numpy(frames), torch.from_numpy(lengths)
-        said = [(s, row) for row, e in enumerate(entries) for s in e.unseen or e.sentences if usable(s)]
-        known = found.vocabulary.ids.keys()
-        said = [(s, row) for s, row in said if not known.isdisjoint(RULES.words(s))]
-        words, counts = padded([found.vocabulary.encode(s)[0] for s, _ in said], "int64")
+
+        # the same number for motions described alike
+        descriptions = []
+        for entry in entries:
+            descriptions.append([RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
+        self.groups = torch.tensor(alike(descriptions))
+
+        # the sentences with a known word, and the row of each one's motion
+        known = corpus.vocabulary.ids.keys()
+        ids = []
+        rows = []
+        for row, entry in enumerate(entries):
+            for sentence in entry.unseen or entry.sentences:
+                if usable(sentence) and not known.isdisjoint(RULES.words(sentence)):
+                    ids.append(corpus.vocabulary.encode(sentence)[0])
+                    rows.append(row)
+        words, counts = padded(ids, "int64")
         self.texts = torch.from_numpy(words), torch.from_numpy(counts)
-        self.rows = torch.tensor([row for _, row in said])
+        self.rows = torch.tensor(rows)
 
     @torch.no_grad()
     def measures(self, net: JointEmbedding) -> dict[str, float]:
-        """The mean surprise at the motions that show what a sentence says, and how often one is among the best 5."""
+        """The mean cross-entropy of the motions that a sentence describes, and how often one is among the best 5."""
         device = net.mean.device
         motions = net.embed_motion(*(part.to(device) for part in self.motions)).cpu()
         texts = net.embed_text(*(part.to(device) for part in self.texts)).cpu()
         scores = texts @ motions.T
         right = self.groups[self.rows][:, None] == self.groups
-        chances = functional.log_softmax(scores / net.config.temperature, dim=1)
-        surprise = -chances.masked_fill(~right, -torch.inf).logsumexp(dim=1)
+        log_probabilities = functional.log_softmax(scores / net.config.temperature, dim=1)
+        losses = -log_probabilities.masked_fill(~right, -torch.inf).logsumexp(dim=1)
         best = scores.topk(min(5, scores.shape[1]), dim=1).indices
         first = right.gather(1, best).any(dim=1).float().mean()
-        return {"validation": round(float(surprise.mean()), 6), "first_5": round(float(first), 4)}
+        return {"validation": round(float(losses.mean()), 6), "first_5": round(float(first), 4)}
