@@ -1,7 +1,6 @@
 """The recipe of the codec of motions, and its training from a store."""
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
@@ -18,7 +17,7 @@ from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import joint_weights, tree_of
 from motet_train.models.motion_codes import MotionCodes
-from motet_train.recipes.recipe import MUON, Job, Recipe
+from motet_train.recipes.recipe import MUON, Job, Recipe, data_of
 from motet_train.runs import Run
 
 
@@ -91,19 +90,10 @@ def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start
         lambda rng: (train.draw(job.training.batch, book, rng),),
         lambda: _measured(net, validation_window),
     )
-    about = _about(store, data, by, len(parts.train), start)
-    return job.run(net, learner, job.manifest(contract, asdict(config), {}, None, about))
-
-
-def _about(store: Store, data: str, by: str, train_count: int, start: Run | None) -> dict[str, Any]:
-    """The data and the start of a training, for the manifest."""
-    about: dict[str, Any] = {
-        "data": {"name": data, "motions": len(store.records)},
-        "split": {"by": by, "train": train_count},
-    }
+    about = data_of(store, data, by, parts)
     if start is not None:
         about["start"] = start.manifest["training"]
-    return about
+    return job.run(net, learner, job.manifest(contract, asdict(config), {}, None, about))
 
 
 def _started(start: Run, settled: bool) -> MotionCodec:

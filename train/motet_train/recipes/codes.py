@@ -23,7 +23,7 @@ from motet_train.models.codec import MotionCodec
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
 from motet_train.recipes.actions import described, spoken
 from motet_train.recipes.language import divided, manifest
-from motet_train.recipes.recipe import MUON, Job, Recipe
+from motet_train.recipes.recipe import MUON, Job, Recipe, origin
 from motet_train.runs import Run
 
 DRAWING: dict[str, Any] = {
@@ -98,8 +98,8 @@ def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions:
     )
     about = manifest(job, corpus, asdict(net.config), data, by)
     about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
-    about["training"]["codec"] = _origin(codec.manifest["training"])
-    about["training"]["actions"] = _origin(actions.manifest["training"])
+    about["training"]["codec"] = origin(codec.manifest["training"])
+    about["training"]["actions"] = origin(actions.manifest["training"])
     return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(actions_shown)),))
 
 
@@ -143,15 +143,6 @@ def _parts(codec: Run, actions: Run, sentences: Mapping[str, Any]) -> tuple[Moti
             f"the net of actions {name} was trained on other sentences: train it on the same data and split"
         )
     return codec.model, actions.model
-
-
-def _origin(training: Mapping[str, Any]) -> dict[str, Any]:
-    """How a part was trained, and what it started from."""
-    keys = ("command", "seed", "steps", "seconds", "word_vectors")
-    origin = {key: training[key] for key in keys if key in training}
-    if "start" in training:
-        origin["start"] = _origin(training["start"])
-    return origin
 
 
 @torch.no_grad()

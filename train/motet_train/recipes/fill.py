@@ -2,7 +2,6 @@
 
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import torch
@@ -19,7 +18,7 @@ from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.filler import Filler, FillerConfig
 from motet_train.models.kinematics import joint_weights, tree_of
-from motet_train.recipes.recipe import MUON, Job, Recipe
+from motet_train.recipes.recipe import MUON, Job, Recipe, data_of
 from motet_train.runs import Run
 
 
@@ -77,10 +76,7 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
     )
     assert isinstance(learner.kept, Filler)
     kept: Filler = learner.kept
-    about: dict[str, Any] = {
-        "data": {"name": data, "motions": len(store.records)},
-        "split": {"by": by, "train": len(parts.train)},
-    }
+    about = data_of(store, data, by, parts)
     defaults = {"context": visits.context, "least": visits.least, "longest": visits.gaps[1]}
     return job.run(kept, learner, job.manifest(contract, asdict(net.config), defaults, None, about))
 

@@ -28,7 +28,7 @@ from motet_train.models.known_motions import KnownMotions, KnownMotionsConfig
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.recipes import language, search
 from motet_train.recipes.language import Divided, divided, manifest
-from motet_train.recipes.recipe import Job, Recipe
+from motet_train.recipes.recipe import Job, Recipe, origin
 from motet_train.runs import Run, surroundings
 
 
@@ -99,18 +99,13 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
         "kept_epoch": job.training.epochs,
         "seconds": round(perf_counter() - began, 1),
         "parameters": sum(parameter.numel() for parameter in net.parameters()),
-        "writer": _origin(writer),
+        "writer": origin(writer.manifest["training"]),
         **surroundings("cpu"),
     }
     about["settings"] = {**writer.manifest["settings"], settings.FEATURE: asdict(settings)}
     run = Run(about, net)
     run.save(job.folder)
     return run
-
-
-def _origin(run: Run) -> dict[str, object]:
-    training = run.manifest["training"]
-    return {key: training[key] for key in ("command", "seed", "epochs", "seconds") if key in training}
 
 
 def _gathered(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, kept: int) -> Known:

@@ -10,6 +10,7 @@ from motet.files import write_whole
 from motet.representation.contract import MotionContract
 from motet.settings import Settings
 from motet_train import distributed
+from motet_train.data.store import Split, Store
 from motet_train.descent import Training
 from motet_train.models.net import Net
 from motet_train.progress import SILENT, Watcher
@@ -168,6 +169,23 @@ def _results(log: Sequence[Line], learner: Learner, net: Net) -> dict[str, Any]:
         "steps_per_second": round(steps / seconds, 3),
         "parameters": sum(parameter.numel() for parameter in net.parameters()),
     }
+
+
+def data_of(store: Store, name: str, by: str, parts: Split) -> dict[str, Any]:
+    """The data of a training, for the manifest."""
+    return {
+        "data": {"name": name, "motions": len(store.records)},
+        "split": {"by": by, "train": len(parts.train)},
+    }
+
+
+def origin(training: Mapping[str, Any]) -> dict[str, Any]:
+    """How a part of a net was trained, and what it started from, by its manifest's training."""
+    keys = ("command", "seed", "epochs", "steps", "seconds", "word_vectors")
+    parts = {key: training[key] for key in keys if key in training}
+    if "start" in training:
+        parts["start"] = origin(training["start"])
+    return parts
 
 
 def _by_feature(settings: Sequence[Settings]) -> dict[str, dict[str, Any]]:

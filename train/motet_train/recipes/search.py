@@ -12,9 +12,10 @@ from motet.representation.contract import named
 from motet.text.vocabulary import RULES
 from motet_train.data.batches import Examples, Views, views
 from motet_train.data.disguise import Disguise, seen_as
-from motet_train.data.sentences import alike, usable
+from motet_train.data.sentences import usable
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Training
+from motet_train.evaluate.language.split_store import description_groups
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
 from motet_train.recipes.language import Divided, divided, manifest
@@ -110,11 +111,7 @@ class _UnseenSentences:
         frames, lengths = padded([corpus.store.sequence(record) for record in records], "float32")
         self.motions = torch.from_numpy(frames), torch.from_numpy(lengths)
 
-        # the same number for motions described alike
-        descriptions = []
-        for entry in entries:
-            descriptions.append([RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
-        self.groups = torch.tensor(alike(descriptions))
+        self.groups = torch.tensor(description_groups(entries))
 
         # the sentences with a known word, and the row of each one's motion
         known = corpus.vocabulary.ids.keys()

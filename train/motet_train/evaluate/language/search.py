@@ -12,11 +12,9 @@ from motet.models.describe import DescribeModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.search.model import Hit, Index, IndexSettings, Member, SearchModel
-from motet.text.vocabulary import RULES
-from motet_train.data.sentences import alike
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
-from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
+from motet_train.evaluate.language.split_store import SplitStore, description_groups, unknown_words_allowed
 from motet_train.evaluate.tables import Goals, Report, gathered
 
 SEARCH_GOALS: Goals = {"text.first_5": (0.8, None)}
@@ -40,7 +38,7 @@ def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeMode
 
 
 def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
-    groups = _description_groups(corpus)
+    groups = np.array(description_groups(corpus.store.records))
     train_groups = groups[list(corpus.parts.train)]
     queries = _TestQueries.of(corpus, groups)
     yield {"asked": queries.figures(train_groups)}
@@ -64,14 +62,6 @@ def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeMode
     yield {"like": _likeness(model, corpus, groups)}
     nearest_groups = {"alike": train_groups[by_model], "features_alike": train_groups[by_features]}
     yield {"motion": _shares(nearest_groups, queries.groups, train_groups)}
-
-
-def _description_groups(corpus: SplitStore) -> Numbers:
-    """A number (N,) for each record, equal for records that share a sentence, directly or through others."""
-    descriptions = []
-    for entry in corpus.store.records:
-        descriptions.append([RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
-    return np.array(alike(descriptions))
 
 
 @dataclass(frozen=True, eq=False)

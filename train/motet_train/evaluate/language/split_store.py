@@ -1,7 +1,7 @@
 """A prepared corpus, divided as in the training of a model."""
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,8 +14,8 @@ from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
 from motet.text.vocabulary import RULES
 from motet_train.data.errors import DataError
-from motet_train.data.sentences import usable
-from motet_train.data.store import Split, Store
+from motet_train.data.sentences import alike, usable
+from motet_train.data.store import Entry, Split, Store
 from motet_train.evaluate.tables import Report
 
 
@@ -139,6 +139,14 @@ def plain(sentence: str) -> str:
 
 def _plain(sentences: Iterable[str]) -> tuple[str, ...]:
     return tuple(plain(sentence) for sentence in sentences if usable(sentence))
+
+
+def description_groups(entries: Sequence[Entry]) -> list[int]:
+    """A number for each record, equal for records that share a sentence, directly or through others."""
+    descriptions = []
+    for entry in entries:
+        descriptions.append([RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
+    return alike(descriptions)
 
 
 @contextmanager
