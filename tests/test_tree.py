@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 303
+MOST_LARGE_FUNCTIONS = 302
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 974
-MOST_TUPLE_ASSIGNMENTS = 374
-MOST_NESTED_COMPREHENSIONS = 225
+MOST_BANNED_NAMES = 923
+MOST_TUPLE_ASSIGNMENTS = 347
+MOST_NESTED_COMPREHENSIONS = 216
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
