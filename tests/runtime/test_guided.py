@@ -72,8 +72,8 @@ def test_no_gaze_goes_farther_or_faster_than_people_turn_their_heads(model: Stee
         session.look_at(point)
         seen += [gaze(pose)[0] for pose in ticks(session, 20)]
     found = np.array(seen)
-    assert np.abs(found[:, 0]).max() < np.degrees(looking.MOST[0]) + 1
-    assert np.abs(found[:, 1]).max() < np.degrees(looking.MOST[1]) + 1
+    assert np.abs(found[:, 0]).max() < np.degrees(looking.LookSettings().aside) + 1
+    assert np.abs(found[:, 1]).max() < np.degrees(looking.LookSettings().up) + 1
     assert np.abs(np.diff(found, axis=0)).max() * model.fps < 600
     assert np.ptp(found[:, 0]) > 160  # over both shoulders
 
@@ -119,7 +119,7 @@ def test_a_point_out_of_reach_is_reached_for_and_told(model: SteerModel) -> None
     assert np.linalg.norm(along) > 0.58
     chest, _ = joint(poses[-1], "upperChest")
     side = quat_rotated(conjugate(chest[2:]), (palm(poses[-1], "left") - joint(poses[-1], "leftUpperArm")[1])[2:])[0]
-    assert side @ [1, 0, 1] / np.sqrt(2) / np.linalg.norm(side) > reaching.WIDEST - 0.01
+    assert side @ [1, 0, 1] / np.sqrt(2) / np.linalg.norm(side) > np.cos(reaching.ReachSettings().widest) - 0.01
     speeds = np.linalg.norm(np.diff([palm(pose, "left") for pose in poses], axis=0), axis=2) * model.fps
     assert speeds.max() < 5
     session.reach("left", None)

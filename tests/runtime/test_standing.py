@@ -9,9 +9,10 @@ from motet import SteerModel, SteerSession, load
 from motet.figures.humanoid import HUMANOID
 from motet.motion.rotations import Array, conjugate, quat_product
 from motet.motion.springs import damping_of
-from motet.steering.idle import DEPTH, PERIOD, SETTLES, TURNS
+from motet.steering.idle import TURNS, IdleSettings
 from motet.steering.pose import Pose
 
+IDLE = IdleSettings()
 TURNED = [bone for bone, by in TURNS.items() if by]
 """Bones that a breath turns: spine, upper chest, neck and shoulders."""
 
@@ -65,7 +66,7 @@ def test_figures_that_stand_breathe_with_their_chests(minute: list[Pose]) -> Non
     assert head.max() < 0.01
     off = np.stack([np.diff(pose.positions()[:, [0, HUMANOID.index("upperChest")]], axis=1)[:, 0] for pose in minute])
     spectrum = np.abs(np.fft.rfft(off[:1800] - off[:1800].mean(axis=0), axis=0)).sum(axis=2)
-    assert (spectrum.argmax(axis=0) == 60 / PERIOD).all()
+    assert (spectrum.argmax(axis=0) == 60 / IDLE.breath).all()
 
 
 def breaths(model: SteerModel) -> tuple[Array, Array]:
@@ -81,10 +82,12 @@ def test_breaths_begin_and_end_without_a_jump_and_are_none_while_figures_go(mode
     breath, apart = breaths(model)
     assert not breath[:GOES].any()
     assert not apart[:GOES].any()
-    assert breath[GOES + 90 : GOES + STANDS, 0].max() == pytest.approx(np.sin(DEPTH / 2), rel=0.05)
-    assert breath[GOES + 90 : GOES + STANDS, 1].max() == pytest.approx(np.sin(DEPTH), rel=0.05)
-    steepest = 2 * np.pi / PERIOD + damping_of(SETTLES) / np.e  # of a breath, and of a spring from 1 to 0, a second
-    assert np.abs(np.diff(breath, axis=0)).max() < DEPTH * steepest / 30
+    assert breath[GOES + 90 : GOES + STANDS, 0].max() == pytest.approx(np.sin(IDLE.depth / 2), rel=0.05)
+    assert breath[GOES + 90 : GOES + STANDS, 1].max() == pytest.approx(np.sin(IDLE.depth), rel=0.05)
+    steepest = (
+        2 * np.pi / IDLE.breath + damping_of(IDLE.settles) / np.e
+    )  # of a breath, and of a spring from 1 to 0, a second
+    assert np.abs(np.diff(breath, axis=0)).max() < IDLE.depth * steepest / 30
     assert not breath[-GOES_ON // 4 :].any()
     assert np.linalg.norm(np.diff(apart, axis=0), axis=1).max() < 0.005
     assert np.ptp(apart[GOES + STANDS + 1 :], axis=0).max() < 1e-9
@@ -110,6 +113,6 @@ def test_neighbours_do_not_breathe_as_one_and_a_snapshot_breathes_on(model: Stee
         session.tick()
     kept = session.snapshot()
     first = [session.tick().rotations for _ in range(40)]
-    assert max(np.abs(one[0, TURNED] - one[1, TURNED]).max() for one in first) > DEPTH / 2
+    assert max(np.abs(one[0, TURNED] - one[1, TURNED]).max() for one in first) > IDLE.depth / 2
     session.restore(kept)
     assert all(np.array_equal(one, session.tick().rotations) for one in first)

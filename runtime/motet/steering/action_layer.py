@@ -1,9 +1,9 @@
-"""What steered figures are told to do, laid over their steps: acts (:mod:`motet.steering.acts`).
+"""Acts of steered figures, laid over their steps (:mod:`motet.steering.acts`).
 
 An act is begun where it is most like what the figure does, played to its end, and left for the recorded row that is
 most like that. The whole body plays it, with its own way over the ground; or the upper body alone, turned as in the act
-seen from the facing, while the legs go on. What a pose would lose at such a change is added to it and fades
-(inertialization: Bollo 2018), and so is what the velocity over the ground would.
+seen from the facing, while the legs go on. The jump of a pose at such a change is added to it and fades
+(inertialization: Bollo 2018), and so is that of the velocity over the ground.
 
 Letters in shapes as in :mod:`motet.steering.matching`; and J bones.
 """
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from motet.figures.humanoid import BONES, LEFT_RIGHT, LEG, sided
 from motet.motion.rotations import Array, conjugate, continuous_rotvec, quat_product, wrapped
-from motet.motion.springs import damped, damping_of
+from motet.motion.springs import Inertializer
 from motet.steering.acts import Act, ActSettings
 from motet.steering.events import Done
-from motet.steering.matching import TRAJECTORY, Matcher, Playback, Rows
+from motet.steering.matching import TRAJECTORY, Flags, Matcher, Playback, Rows
 from motet.steering.pose import Pose
 from motet.steering.step import PoseCodes, body
 
@@ -28,42 +28,40 @@ UPPER = np.array([bone not in _LOWER for bone in BONES])
 """Which bones (J,) are of the upper body."""
 
 BELOW = np.append(np.repeat(~UPPER, 3), True)
-"""Which of the numbers (3 J + 1) that are added to a pose are of the lower body."""
+"""Which numbers (3 J + 1) of a pose's offset are of the lower body."""
 
 SPINE = BONES.index("spine")
 
 HANDS = slice(-6, None)
-"""The last features, where the hands are: how the upper body is."""
-
-METRE = 10.0
-"""Radians that a metre of the hips' height counts as."""
-
-LONGER = 1.75
-"""Times as long that what is lost fades at most: who is to kneel at once is down in half a second."""
+"""The last features, the places of the hands: how the upper body is."""
 
 FADED = 1e-4
-"""Radians, metres and metres a second of which nothing is seen: what is added is dropped then."""
+"""Offsets below this, in radians, metres or metres a second, are invisible and dropped."""
 
 
 class Body(NamedTuple):
-    """rotations: (B, J, 4) as of :class:`motet.steering.pose.Pose`. height: (B,) of the hips."""
+    """Bodies of B figures, without their places."""
 
     rotations: NDArray[Any]
+    """(B, J, 4) as of :class:`motet.steering.pose.Pose`."""
     height: NDArray[Any]
+    """(B,) of the hips, metres."""
 
-    def at(self, who: Rows) -> "Body":
+    def at(self, figures: Rows) -> "Body":
         """Those of some figures (n,), float64."""
-        return Body(self.rotations[who].astype(np.float64), self.height[who].astype(np.float64))
+        return Body(self.rotations[figures].astype(np.float64), self.height[figures].astype(np.float64))
 
-    def put(self, who: Rows, other: "Body") -> "Body":
-        """With others in place of those of some figures (n,)."""
-        found = self.rotations.copy(), self.height.copy()
-        found[0][who], found[1][who] = other
-        return Body(*found)
+    def put(self, figures: Rows, other: "Body") -> "Body":
+        """With other bodies for some figures (n,)."""
+        rotations = self.rotations.copy()
+        height = self.height.copy()
+        rotations[figures] = other.rotations
+        height[figures] = other.height
+        return Body(rotations, height)
 
     def since(self, other: "Body") -> Array:
-        """What is to be added (B, 3 J + 1) to other bodies to make them these: rotation vectors in the frames of the
-        parents, and height."""
+        """The offset (B, 3 J + 1) from other bodies to these: rotation vectors in the frames of the parents, and
+        height."""
         turns = quat_product(self.rotations, conjugate(other.rotations))
         turns = np.where(turns[..., 3:] < 0, -turns, turns)
         sine = np.linalg.norm(turns[..., :3], axis=-1, keepdims=True)
@@ -71,66 +69,86 @@ class Body(NamedTuple):
         vectors = turns[..., :3] * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 2.0)
         return np.column_stack([vectors.reshape(len(vectors), -1), self.height - other.height])
 
-    def plus(self, more: Array) -> "Body":
-        """With what :meth:`since` gives added."""
-        vectors = more[:, :-1].reshape(len(more), -1, 3)
+    def plus(self, offset: Array) -> "Body":
+        """With an offset of :meth:`since` added."""
+        vectors = offset[:, :-1].reshape(len(offset), -1, 3)
         angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
         turns = np.concatenate([vectors * np.sinc(angle / (2 * np.pi)) / 2, np.cos(angle / 2)], axis=-1)
-        return Body(quat_product(turns, self.rotations), self.height + more[:, -1])
+        return Body(quat_product(turns, self.rotations), self.height + offset[:, -1])
 
 
 class Playing(NamedTuple):
-    """What a figure plays. frame: that is shown. age: ticks since it was begun. whole: whether by the whole body.
-    yields: whether the legs go as soon as they are told to."""
+    """The act that a figure plays."""
 
     act: Act
     frame: int
+    """The frame that is shown."""
     age: int
+    """Ticks since it was begun."""
     whole: bool
+    """Whether the whole body plays it."""
     yields: bool
+    """Whether the legs stop playing it as soon as the figure is steered elsewhere."""
 
 
 @dataclass(eq=False)
-class Acting:
-    """The acts of B figures.
-
-    playing: what each plays. asked: the act that a figure begins in the next tick, None to end what it plays, and
-    whether by the upper body alone; None: by the whole body where it stands, or where the act is one of the legs. base:
-    bodies of the last tick without acts. shown, before: as they were shown in the last tick and in the one before. led:
-    (B,) whether an act led the whole body in the last tick. offset, offset_rate: (B, 3 J + 1) what is added, as
-    :meth:`Body.since` gives it, and how fast it changes. damping: (B, 1) by which it fades. going: (B, 3) velocity over
-    the ground, m/s along x and z and rad/s. drift: (B, 3) the part of it that fades.
-    """
+class ActionLayer:
+    """The acts of B figures; arrays are replaced, never written into."""
 
     matcher: Matcher
     codes: PoseCodes
-    how: ActSettings
+    settings: ActSettings
     playing: list[Playing | None]
-    asked: dict[int, tuple[Act | None, bool | None]]
+    """What each figure plays."""
+    orders: dict[int, tuple[Act | None, bool | None]]
+    """The act that a figure begins in the next tick, None to end the present one; and whether by the upper body alone,
+    None for the whole body where it stands or where the act is one of the legs."""
     base: Body
+    """Bodies of the last tick without acts."""
     shown: Body
-    before: Body
-    led: NDArray[np.bool_]
+    """Bodies as they were shown in the last tick."""
+    shown_before: Body
+    """Bodies as they were shown in the tick before that."""
+    led: Flags
+    """(B,) whether an act led the whole body in the last tick."""
     offset: Array
+    """(B, 3 J + 1) the inertialization offset, as :meth:`Body.since` gives it."""
     offset_rate: Array
-    damping: Array
-    going: Array
-    drift: Array
+    """(B, 3 J + 1) how fast the offset changes, a second."""
+    stretch: Array
+    """(B, 1) how many times as long as usual the offset takes to fade."""
+    velocity: Array
+    """(B, 3) over the ground, m/s along x and z and rad/s."""
+    velocity_offset: Array
+    """(B, 3) the part of the velocity that fades."""
 
     @staticmethod
-    def of(playback: Playback, matcher: Matcher, codes: PoseCodes, how: ActSettings) -> "Acting":
-        """Of figures that play none, and stand as they are played."""
+    def of(playback: Playback, matcher: Matcher, codes: PoseCodes, settings: ActSettings) -> "ActionLayer":
+        """Figures that play no act."""
         played, _ = matcher.table.at(playback)
+        figures = len(played)
         shown = Body(*body(codes, playback, played))
-        off, still = np.zeros((len(played), 3 * len(BONES) + 1)), np.zeros((len(played), 3))
-        led, damping = still[:, 0] > 0, still[:, :1]
-        return Acting(
-            matcher, codes, how, [None] * len(played), {}, shown, shown, shown, led, off, off, damping, still, still
+        no_offset = np.zeros((figures, 3 * len(BONES) + 1))
+        return ActionLayer(
+            matcher,
+            codes,
+            settings,
+            playing=[None] * figures,
+            orders={},
+            base=shown,
+            shown=shown,
+            shown_before=shown,
+            led=np.zeros(figures, dtype=bool),
+            offset=no_offset,
+            offset_rate=no_offset,
+            stretch=np.ones((figures, 1)),
+            velocity=np.zeros((figures, 3)),
+            velocity_offset=np.zeros((figures, 3)),
         )
 
-    def copy(self) -> "Acting":
-        """One that changes by itself; arrays are replaced, never written into."""
-        return replace(self, playing=list(self.playing), asked=dict(self.asked))
+    def copy(self) -> "ActionLayer":
+        """A copy that changes independently."""
+        return replace(self, playing=list(self.playing), orders=dict(self.orders))
 
     @property
     def acts(self) -> bool:
@@ -142,107 +160,136 @@ class Acting:
         """What each figure does."""
         if not self.acts:
             return (None,) * len(self.playing)
-        return tuple(one and Done(one.act.name, one.age) for one in self.playing)
+        return tuple(playing and Done(playing.act.name, playing.age) for playing in self.playing)
 
     @property
-    def whole(self) -> NDArray[np.bool_]:
+    def whole(self) -> Flags:
         """Which figures (B,) play an act with the whole body."""
-        return np.array([one is not None and one.whole for one in self.playing])
+        return np.array([playing is not None and playing.whole for playing in self.playing])
 
     def begin(self, playback: Playback, target: Array, gait: Rows) -> Rows:
-        """Before a tick: go on by a frame, begin what is asked, end what is over. The figures (n,) of which something
-        else is shown from now on; legs that no act moves any more are at the row that fits best.
+        """Before a tick: go on by a frame, begin acts that are ordered, end those that are over. The figures (n,) that
+        are shown something else from now on. Legs that no act moves any more continue from the row that fits best.
 
         target: (B, 3) velocity along x and z, and facing. gait: (B,).
         """
-        if not self.asked and not self.acts:
+        if not self.orders and not self.acts:
             return np.empty(0, dtype=np.int64)
-        changed, freed = list[int](), list[int]()
-        goes, before = np.hypot(*target[:, :2].T) > 0, list(self.playing)
-        for i, now in enumerate(before):
-            if now is None and i not in self.asked:
+        changed = list[int]()
+        freed = list[int]()
+        freed_features = list[Array]()
+        goes = np.hypot(*target[:, :2].T) > 0
+        for figure, before in enumerate(list(self.playing)):
+            ordered = figure in self.orders
+            if before is None and not ordered:
                 continue
-            self.playing[i] = after = self._after(i, playback, bool(goes[i]))
-            if i in self.asked or not after or not now or after.whole != now.whole:
-                changed.append(i)
-            if now and now.whole and not (after and after.whole):
-                freed.append(i)
-        self.asked = {}
+            after = self._next(figure, playback, bool(goes[figure]))
+            self.playing[figure] = after
+            # the pose jumps where another act is played, or by another part of the body
+            if ordered or not after or not before or after.whole != before.whole:
+                changed.append(figure)
+            # legs that an act has led so far are free
+            if before and before.whole and not (after and after.whole):
+                freed.append(figure)
+                freed_features.append(before.act.features[before.frame])
+        self.orders = {}
         if freed:
-            shown = np.stack([now.act.features[now.frame] for now in (before[i] for i in freed) if now])
-            self._free(shown, playback, target, gait, np.array(freed))
+            self._free(np.stack(freed_features), playback, target, gait, np.array(freed))
         return np.array(changed, dtype=np.int64)
 
-    def _after(self, figure: int, playback: Playback, goes: bool) -> Playing | None:
+    def _next(self, figure: int, playback: Playback, goes: bool) -> Playing | None:
         """What a figure plays in the next tick."""
-        now = self.playing[figure]
-        if figure in self.asked:
-            act, upper = self.asked[figure]
+        if figure in self.orders:
+            act, upper = self.orders[figure]
             return None if act is None else self._entered(figure, act, upper, playback, goes)
-        if now is None or now.frame + 1 >= len(now.act):
+        playing = self.playing[figure]
+        if playing is None or playing.frame + 1 >= len(playing.act):
             return None
-        return now._replace(frame=now.frame + 1, age=now.age + 1, whole=now.whole and not (goes and now.yields))
+        whole = playing.whole and not (goes and playing.yields)
+        return playing._replace(frame=playing.frame + 1, age=playing.age + 1, whole=whole)
 
     def _entered(self, figure: int, act: Act, upper: bool | None, playback: Playback, goes: bool) -> Playing:
-        """The act that is asked for, at the frame after the one that is most like the figure."""
-        now, table, how = self.playing[figure], self.matcher.table, self.how
+        """An act, at the frame after the one that is most like the figure."""
         moves = goes or np.hypot(*playback.spring[figure, :2]) > self.matcher.settings.idle
-        stays = moves and act.legs  # its legs go on as it ends
-        whole = (stays or not moves) if upper is None else not upper
-        is_now = table.features[playback.mirror[figure], playback.row[figure], TRAJECTORY:].astype(np.float64)
-        if now is not None:
-            known = slice(None) if now.whole else HANDS
-            is_now[known] = self._scaled(now.act.features[now.frame])[known]
-        entries = min(round(how.entry * self.matcher.fps), (len(act) - 1) // 3) + 1
-        off = self._scaled(act.features[:entries]) - is_now
-        cost = (off[:, slice(None) if whole else HANDS] ** 2).sum(axis=1)
-        return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not stays)
+        keeps_moving = moves and act.legs  # its legs go on as it ends
+        whole = (keeps_moving or not moves) if upper is None else not upper
+        # the first frames, compared with the figure as it is now
+        most_skipped = min(round(self.settings.entry * self.matcher.fps), (len(act) - 1) // 3)
+        entries = self._scaled(act.features[: most_skipped + 1])
+        compared = slice(None) if whole else HANDS
+        difference = (entries - self._pose_features(figure, playback))[:, compared]
+        cost = (difference**2).sum(axis=1)
+        return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not keeps_moving)
+
+    def _pose_features(self, figure: int, playback: Playback) -> Array:
+        """The scaled features (F - TRAJECTORY,) of a figure as it is shown."""
+        row = playback.mirror[figure], playback.row[figure]
+        features: Array = self.matcher.table.features[row][TRAJECTORY:].astype(np.float64)
+        playing = self.playing[figure]
+        if playing is not None:
+            acted = slice(None) if playing.whole else HANDS
+            features[acted] = self._scaled(playing.act.features[playing.frame])[acted]
+        return features
 
     def _scaled(self, features: Array) -> Array:
-        """Features of how figures are (..., F - TRAJECTORY) as the table has them."""
+        """Features of poses (..., F - TRAJECTORY) as the table has them."""
         table = self.matcher.table
-        return (features - table.mean[TRAJECTORY:]) * table.scale[TRAJECTORY:]
+        scaled: Array = (features - table.mean[TRAJECTORY:]) * table.scale[TRAJECTORY:]
+        return scaled
 
-    def _free(self, shown: Array, playback: Playback, target: Array, gait: Rows, who: Rows) -> None:
-        """Let the legs of figures (n,) go on from the rows that fit best after what is shown, features of it."""
-        matcher, table = self.matcher, self.matcher.table
-        ahead = matcher.desired_trajectory(playback, target, matcher.is_slow_walk(target[who], gait[who]), who)
-        wanted = (ahead - table.mean[:TRAJECTORY]) * table.scale[:TRAJECTORY]
-        query = matcher.query(np.concatenate([wanted, self._scaled(shown)], axis=1).astype(np.float32))
-        playback.row[who], playback.mirror[who], _ = matcher.best(query, gait[who])
-        playback.part[who], playback.rate[who] = 0, 1
-        playback.offset[who] = playback.offset_rate[who] = 0
-        playback.warp[who] = playback.warp_rate[who] = playback.stride_rate[who] = 0
-        playback.stride[who] = 1
-        played, _ = table.at(playback, who)
-        self.base = self.base.put(who, Body(*self.codes.decode(played[:, : table.codes])))
+    def _free(self, features: Array, playback: Playback, target: Array, gait: Rows, figures: Rows) -> None:
+        """Let the legs of figures (n,) go on from the rows that fit best after shown poses with features (n, F -
+        TRAJECTORY)."""
+        matcher = self.matcher
+        table = matcher.table
+        # search from the pose of the act
+        slow_walk = matcher.is_slow_walk(target[figures], gait[figures])
+        trajectory = matcher.desired_trajectory(playback, target, slow_walk, figures)
+        trajectory = (trajectory - table.mean[:TRAJECTORY]) * table.scale[:TRAJECTORY]
+        desired = np.concatenate([trajectory, self._scaled(features)], axis=1).astype(np.float32)
+        playback.row[figures], playback.mirror[figures], _ = matcher.best(matcher.query(desired), gait[figures])
+        # play that row as it is recorded
+        playback.part[figures] = 0
+        playback.rate[figures] = 1
+        playback.offset[figures] = 0
+        playback.offset_rate[figures] = 0
+        playback.warp[figures] = 0
+        playback.warp_rate[figures] = 0
+        playback.stride[figures] = 1
+        playback.stride_rate[figures] = 0
+        played, _ = table.at(playback, figures)
+        self.base = self.base.put(figures, Body(*self.codes.decode(played[:, : table.codes])))
 
-    def laid(self, pose: Pose, playback: Playback, root: Array, changed: Rows) -> Pose:
+    def update(self, pose: Pose, playback: Playback, root: Array, changed: Rows) -> Pose:
         """After a tick: its pose with acts laid over it, and the playback where they lead.
 
-        root: (B, 3) before the tick. changed: (n,) as :meth:`begin` gave them.
+        root: (B, 3) before the tick. changed: (n,) of :meth:`begin`.
         """
-        dt, base, self.base = 1 / self.matcher.fps, self.base, Body(pose.rotations, pose.height)
+        dt = 1 / self.matcher.fps
+        base_before = self.base
+        self.base = Body(pose.rotations, pose.height)
         step = playback.root - root
         step[:, 2] = wrapped(step[:, 2])
+        # without any act or offset the pose stays as it is
         if not (len(changed) or self.acts or self.led.any() or self.offset.any()):
-            self.before, self.shown, self.going = self.shown, self.base, step / dt
+            self._show(self.base, step / dt)
             return pose
-        contacts = pose.contacts.copy()
-        for i in np.flatnonzero(self.whole).tolist():
-            one = cast(Playing, self.playing[i])
-            step[i], contacts[i] = one.act.step(one.frame, root[i, 2]), one.act.contacts[one.frame]
-            playback.root[i] = root[i] + step[i]
-        self._lose(base, step / dt, changed)
-        self.before, self.led = self.shown, self.whole
-        who = np.flatnonzero([one is not None for one in self.playing] | (np.abs(self.offset).max(axis=1) > 0))
-        if not len(who):
-            self.shown, self.going = self.base, step / dt
+        # acts of the whole body lead it over the ground
+        contacts = self._step(playback, root, step, pose.contacts)
+        # the jumps of poses and velocities go into the offsets
+        if len(changed):
+            self._transition(base_before, step / dt, changed)
+        self.led = self.whole
+        # acts and offsets are laid over the pose
+        acts = np.array([playing is not None for playing in self.playing])
+        figures = np.flatnonzero(acts | (np.abs(self.offset).max(axis=1) > 0))
+        if not len(figures):
+            self._show(self.base, step / dt)
             return pose
         self._fade(dt)
-        self.shown = self.base.put(who, self._source(self.base, who, 0).plus(self.offset[who]))
-        self.going = step / dt + self.drift
-        self._lead(playback, dt)
+        acted = self._played(self.base, figures, 0).plus(self.offset[figures])
+        self._show(self.base.put(figures, acted), step / dt + self.velocity_offset)
+        self._drift(playback, dt)
         return replace(
             pose,
             ground=playback.root,
@@ -251,58 +298,92 @@ class Acting:
             contacts=contacts,
         )
 
-    def _lose(self, base: Body, going: Array, who: Rows) -> None:
-        """What figures (n,) lose from the last tick to this one is added to them: of the upper body, and where an act
-        leads the whole body, or led it, of all of it and of velocities (B, 3).
+    def _show(self, shown: Body, velocity: Array) -> None:
+        """Remember what is shown in this tick."""
+        self.shown_before = self.shown
+        self.shown = shown
+        self.velocity = velocity
 
-        base: bodies of the last tick without acts.
+    def _step(self, playback: Playback, root: Array, step: Array, contacts: NDArray[Any]) -> NDArray[Any]:
+        """Let whole bodies go where their acts do, in ``step`` and in the playback, and give the contacts of all."""
+        contacts = contacts.copy()
+        for figure in np.flatnonzero(self.whole).tolist():
+            playing = cast(Playing, self.playing[figure])
+            step[figure] = playing.act.step(playing.frame, root[figure, 2])
+            contacts[figure] = playing.act.contacts[playing.frame]
+            playback.root[figure] = root[figure] + step[figure]
+        return contacts
+
+    def _transition(self, base_before: Body, velocity: Array, figures: Rows) -> None:
+        """Turn the jump in pose of figures (n,) into an inertialization offset: of the upper body, and where an act
+        leads the whole body, or led it, of all of it and of the velocities (B, 3).
+
+        base_before: bodies of the last tick without acts.
         """
-        if not len(who):
-            return
-        shown, source = self.shown.at(who), self._source(self.base, who, 0)
-        off = shown.since(self._source(base, who, 1))
-        ahead = shown.plus(shown.since(self.before.at(who))).since(source)
-        both = np.stack([off, ahead])
-        both[..., :-1] = continuous_rotvec(both[..., :-1].reshape(2, -1, 3)).reshape(2, len(who), -1)
-        off, rate = both[0], (both[1] - both[0]) * self.matcher.fps
-        leads = (self.led | self.whole)[who]
-        kept = ~leads[:, None] & BELOW
-        off, rate = np.where(kept, self.offset[who], off), np.where(kept, self.offset_rate[who], rate)
-        turns = np.linalg.norm(off[:, :-1].reshape(len(who), -1, 3), axis=2).max(axis=1)
-        far = np.maximum(turns, METRE * np.abs(off[:, -1])) / self.how.far
-        names = ("offset", "offset_rate", "damping", "drift")
-        self.offset, self.offset_rate, self.damping, self.drift = (getattr(self, name).copy() for name in names)
-        self.offset[who], self.offset_rate[who] = off, rate
-        self.damping[who, 0] = damping_of(self.how.blend) / far.clip(1, LONGER)
-        self.drift[who[leads]] = self.going[who[leads]] - going[who[leads]]
+        # the offset that makes what is now played what was shown; and a tick later, if that had gone on
+        shown = self.shown.at(figures)
+        offset_before = shown.since(self._played(base_before, figures, 1))
+        expected = shown.plus(shown.since(self.shown_before.at(figures)))
+        offset_now = expected.since(self._played(self.base, figures, 0))
+        both = np.stack([offset_before, offset_now])
+        vectors = both[..., :-1].reshape(2, -1, 3)
+        both[..., :-1] = continuous_rotvec(vectors).reshape(2, len(figures), -1)
+        offset = both[0]
+        offset_rate = (both[1] - both[0]) * self.matcher.fps
+        # legs that play no act keep their offset
+        leads = (self.led | self.whole)[figures]
+        keeps = ~leads[:, None] & BELOW
+        offset = np.where(keeps, self.offset[figures], offset)
+        offset_rate = np.where(keeps, self.offset_rate[figures], offset_rate)
+        # large jumps fade more slowly
+        angles = np.linalg.norm(offset[:, :-1].reshape(len(figures), -1, 3), axis=2).max(axis=1)
+        distance = np.maximum(angles, self.settings.height_weight * np.abs(offset[:, -1]))
+        stretch = (distance / self.settings.far).clip(1, self.settings.longest)
+        self.offset = _with(self.offset, figures, offset)
+        self.offset_rate = _with(self.offset_rate, figures, offset_rate)
+        self.stretch = _with(self.stretch, figures, stretch[:, None])
+        # the jump in velocity
+        led = figures[leads]
+        self.velocity_offset = _with(self.velocity_offset, led, self.velocity[led] - velocity[led])
 
     def _fade(self, dt: float) -> None:
-        """What is added, a tick later; nothing where nothing is seen of it any more."""
-        off, rate = damped(self.offset, self.offset_rate, self.damping, dt)
-        left = (np.abs(off).max(axis=1) > FADED)[:, None]
-        self.offset, self.offset_rate = off * left, rate * left
-        self.drift = self.drift * left * 0.5 ** (dt / self.how.blend)
+        """The offsets a tick later, dropped once they are invisible."""
+        inertializer = Inertializer(self.settings.blend)
+        offset, offset_rate = inertializer.update(self.offset, self.offset_rate, dt, self.stretch)
+        visible = (np.abs(offset).max(axis=1) > FADED)[:, None]
+        self.offset = offset * visible
+        self.offset_rate = offset_rate * visible
+        self.velocity_offset = self.velocity_offset * visible * 0.5 ** (dt / self.settings.blend)
 
-    def _lead(self, playback: Playback, dt: float) -> None:
-        """Move figures on by what fades of their velocity; those whose whole body acts mean to go as they do."""
-        drifts = (self.drift != 0).any(axis=1)
-        playback.root[drifts] += self.drift[drifts] * dt
+    def _drift(self, playback: Playback, dt: float) -> None:
+        """Move figures on by the offset of their velocity; the springs of whole bodies that act go as they do."""
+        drifts = (self.velocity_offset != 0).any(axis=1)
+        playback.root[drifts] += self.velocity_offset[drifts] * dt
         playback.root[:, 2] = wrapped(playback.root[:, 2])
-        whole = self.led
-        playback.spring[whole] = np.column_stack([self.going[whole, :2], playback.root[whole, 2]])
-        playback.spring_rate[whole] = 0
+        playback.spring[self.led] = np.column_stack([self.velocity[self.led, :2], playback.root[self.led, 2]])
+        playback.spring_rate[self.led] = 0
 
-    def _source(self, base: Body, who: Rows, back: int) -> Body:
-        """What figures (n,) play, over bases of all, so many frames before."""
-        rotations, height = base.at(who)
-        for k, one in enumerate(self.playing[i] for i in who):
-            if one is None:
+    def _played(self, base: Body, figures: Rows, back: int) -> Body:
+        """What figures (n,) play, over bases of all, ``back`` frames ago."""
+        rotations, height = base.at(figures)
+        for n, figure in enumerate(figures):
+            playing = self.playing[figure]
+            if playing is None:
                 continue
-            played = one.act.rotations[one.frame - back]
-            if one.whole:
-                rotations[k], height[k] = played, one.act.height[one.frame - back]
+            acted = playing.act.rotations[playing.frame - back]
+            if playing.whole:
+                rotations[n] = acted
+                height[n] = playing.act.height[playing.frame - back]
             else:
-                rotations[k, UPPER] = played[UPPER]
-                seen = quat_product(played[0], played[SPINE])
-                rotations[k, SPINE] = quat_product(conjugate(rotations[k, 0]), seen)
+                rotations[n, UPPER] = acted[UPPER]
+                # the spine as it is seen from the facing, whatever the hips do
+                spine_from_facing = quat_product(acted[0], acted[SPINE])
+                rotations[n, SPINE] = quat_product(conjugate(rotations[n, 0]), spine_from_facing)
         return Body(rotations, height)
+
+
+def _with(values: Array, figures: Rows, changed: Array) -> Array:
+    """A copy with other values for some figures (n,)."""
+    values = values.copy()
+    values[figures] = changed
+    return values

@@ -1,56 +1,72 @@
 """Steered figures that go along paths and arrive at their ends.
 
 A figure goes towards the point of its path that is a little ahead of where it is (pure pursuit). It slows down to the
-end as if it braked evenly, and is told to stand where the springs of :mod:`motet.steering.step` then take it to the
-end. What is left after that, centimetres, is made up for as it comes to rest, while its feet stay where they stand.
+end as if it braked evenly, and its target becomes standing where the springs of :mod:`motet.steering.step` then take it
+to the end. The rest, centimetres, is made up for as it comes to rest, while its feet stay where they stand.
 
-Letters in shapes: B figures, P points of all paths. Metres, seconds, radians; the ground's axes are x and z.
+Letters in shapes: B figures, n of them, P points of all paths. Metres, seconds, radians; the ground's axes are x and z.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damping_of
-from motet.steering.matching import Playback
-from motet.steering.settings import SteeringSettings
+from motet.settings import Range, Settings
+from motet.steering.matching import Flags, Playback, Rows
+from motet.steering.settings import Metres, Radians, Seconds, Speed, SteeringSettings
 
-AHEAD, SOONER = 0.3, 0.25
-"""How far ahead on its path a figure aims: metres, and more for each m/s."""
 
-BRAKES = 1.5
-"""m/s^2 at which a figure slows down to the end."""
+@dataclass(frozen=True)
+class ArrivalSettings(Settings):
+    """Settings of figures on paths."""
 
-NEAR, SIDESTEP = 0.08, 0.7
-"""Metres within which a figure has arrived; and within which it steps to the end without turning there first."""
+    FEATURE: ClassVar[str] = "arrival"
 
-GLIDES_FROM, GLIDES, SETTLES = 0.16, (0.05, 0.15), 0.25
-"""Metres from the end within which a figure that stands stays there, else it goes again; the most m/s at which what is
-left is made up for, standing and for each m/s of walking; and in how many seconds."""
-
-FACES = np.radians(8)
-"""How far off a figure faces that has arrived, at most."""
-
-STANDS = 0.1
-"""m/s below which a figure stands."""
+    ahead: Metres = 0.3
+    """How far ahead on its path a figure aims."""
+    ahead_moving: Annotated[float, Range(0, 10, "s")] = 0.25
+    """What each m/s adds to that."""
+    brakes: Annotated[float, Range(0.1, 100, "m/s^2")] = 1.5
+    """Deceleration towards the end."""
+    near: Metres = 0.08
+    """Distance from the end within which a figure has arrived."""
+    sidestep: Metres = 0.7
+    """Distance from the end within which a figure steps to it without turning there first."""
+    glides_from: Metres = 0.16
+    """Distance from the end within which a figure that stands stays there; beyond it, it goes again."""
+    glides: Speed = 0.05
+    """Final correction: its largest speed at a standstill."""
+    glides_moving: Annotated[float, Range(0, 10)] = 0.15
+    """What each m/s of walking adds to that speed."""
+    settles: Seconds = 0.25
+    """Time constant of the final correction."""
+    faces: Radians = float(np.radians(8))
+    """How far off the facing of a figure that has arrived may be."""
+    stands: Speed = 0.1
+    """Speed below which a figure stands."""
+    sudden: Annotated[float, Range(0, 100, "m/s or rad")] = 0.2
+    """Change of a target in a tick above which rows are searched for it at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """Paths of B figures laid end to end. points: (P, 2). along: (P,) metres to each from where its path
-    begins. first: (B + 1,) where the paths begin."""
+    """Paths of B figures laid end to end."""
 
     points: Array
+    """(P, 2)"""
     along: Array
-    first: NDArray[np.int64]
+    """(P,) metres to each point from where its path begins."""
+    first: Rows
+    """(B + 1,) the points at which the paths begin."""
 
     @staticmethod
     def of(paths: Sequence[Array]) -> "Paths":
-        """Those of each figure, of two points (2 or more, 2) at least."""
+        """The path (2 or more points, 2) of each figure."""
         points = np.concatenate(paths)
         first = np.cumsum([0, *map(len, paths)])
         steps = np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T)
@@ -61,109 +77,138 @@ class Paths:
     @property
     def lengths(self) -> Array:
         """Metres of each path (B,)."""
-        found: Array = self.along[self.first[1:] - 1]
-        return found
+        lengths: Array = self.along[self.first[1:] - 1]
+        return lengths
 
     @property
     def ends(self) -> Array:
         """Where the paths end (B, 2)."""
-        found: Array = self.points[self.first[1:] - 1]
-        return found
+        ends: Array = self.points[self.first[1:] - 1]
+        return ends
 
     def at(self, gone: Array) -> Array:
-        """The points (B, 2) of the paths that are so many metres from their beginnings (B,)."""
-        # the first point after so many metres, by halving what lies between two others
-        after, last = self.first[:-1] + 1, self.first[1:] - 1
+        """The points (B, 2) of the paths at distances (B,) from their beginnings, in metres."""
+        # the first point beyond that distance, by bisection
+        after = self.first[:-1] + 1
+        last = self.first[1:] - 1
         while (after < last).any():
             middle = (after + last) // 2
             beyond = self.along[middle] > gone
             after = np.where(beyond, after, np.minimum(middle + 1, last))
             last = np.where(beyond, middle, last)
-        start, stop = self.along[after - 1], self.along[after]
+        # and between the point before it and itself
+        start = self.along[after - 1]
+        stop = self.along[after]
         part = ((gone - start) / np.maximum(stop - start, 1e-9)).clip(0, 1)[:, None]
-        found: Array = self.points[after - 1] + part * (self.points[after] - self.points[after - 1])
-        return found
+        points: Array = self.points[after - 1] + part * (self.points[after] - self.points[after - 1])
+        return points
 
 
 @dataclass(frozen=True, eq=False)
 class Going:
-    """Figures on their paths; replaced, never written into. gone: (B,) metres. speed: (B,) m/s at which they go.
-    gait: (B,) numbers. facing: (B,) at the end, radians, NaN for any. goes: (B,) whether they are on a path. stops:
-    (B,) whether they are told to stand. arrived: (B,) whether they stand at the end."""
+    """B figures on their paths; replaced, never written into."""
 
     paths: Paths
     gone: Array
+    """(B,) metres along the path."""
     speed: Array
-    gait: NDArray[np.int64]
+    """(B,) m/s at which they go."""
+    gait: Rows
+    """(B,) numbers of gaits."""
     facing: Array
-    goes: NDArray[np.bool_]
-    stops: NDArray[np.bool_]
-    arrived: NDArray[np.bool_]
+    """(B,) at the end, radians, NaN for any."""
+    goes: Flags
+    """(B,) whether they are on a path."""
+    stops: Flags
+    """(B,) whether their target is standing."""
+    arrived: Flags
+    """(B,) whether they stand at the end."""
 
     @staticmethod
     def nowhere(figures: int) -> "Going":
-        """Of figures that are on no path."""
-        none, zero = np.zeros(figures, dtype=bool), np.zeros(figures)
-        paths = Paths.of([np.zeros((2, 2))] * figures)
-        return Going(paths, zero, zero, np.zeros(figures, np.int64), zero + np.nan, none, none, none)
+        """Figures that are on no path."""
+        none = np.zeros(figures, dtype=bool)
+        zero = np.zeros(figures)
+        return Going(
+            Paths.of([np.zeros((2, 2))] * figures),
+            gone=zero,
+            speed=zero,
+            gait=np.zeros(figures, np.int64),
+            facing=np.full(figures, np.nan),
+            goes=none,
+            stops=none,
+            arrived=none,
+        )
 
-    def sent(self, who: NDArray[np.int64], paths: Sequence[Array], **told: NDArray[Any]) -> "Going":
+    def sent(self, figures: Rows, paths: Sequence[Array], **new_values: NDArray[Any]) -> "Going":
         """With new paths and other values for some figures (n,)."""
-        own = np.split(self.paths.points, self.paths.first[1:-1])
-        for at, path in zip(who.tolist(), paths, strict=True):
-            own[at] = path
-        changed = {"goes": True, "stops": False, "arrived": False, "gone": 0.0} | told
+        all_paths = np.split(self.paths.points, self.paths.first[1:-1])
+        for figure, path in zip(figures.tolist(), paths, strict=True):
+            all_paths[figure] = path
+        changed = {"goes": True, "stops": False, "arrived": False, "gone": 0.0} | new_values
         values = {name: getattr(self, name).copy() for name in changed}
         for name, value in changed.items():
-            values[name][who] = value
-        return replace(self, paths=Paths.of(own), **values)
+            values[name][figures] = value
+        return replace(self, paths=Paths.of(all_paths), **values)
 
-    def after(self, playback: Playback, how: SteeringSettings) -> tuple["Going", Array]:
-        """A tick later, and the velocities (B, 2) at which those that go are to go, 0 for standing."""
-        root, velocity = playback.root[:, :2], playback.spring[:, :2]
+    def after(self, playback: Playback, settings: ArrivalSettings, steering: SteeringSettings) -> tuple["Going", Array]:
+        """A tick later, and the velocities (B, 2) at which figures on paths are to go, 0 for standing."""
+        root = playback.root[:, :2]
+        speed_now = np.hypot(*playback.spring[:, :2].T)
+        lengths = self.paths.lengths
+        # how far they have come along their paths, and the point that they aim at
         here = self.paths.at(self.gone)
         way = _unit(self.paths.at(self.gone + 0.05) - here)
         gone = self.gone + ((root - here) * way).sum(axis=1).clip(0, 0.5)
-        pace, lengths = np.hypot(*velocity.T), self.paths.lengths
-        ahead = gone + AHEAD + SOONER * pace
-        off = self.paths.ends - root
-        last, far = ahead >= lengths, np.hypot(*off.T)
-        left = np.where(last, far, np.maximum(lengths - gone, far))
-        rolls = _rolling(playback, how)
-        passed = (rolls * off).sum(axis=1) >= far**2
-        arrives = last & (passed | (far < NEAR))
-        stands = pace < STANDS
-        stops = np.where(self.stops & ~(stands & (far > GLIDES_FROM)), True, arrives)
-        turned = np.isnan(self.facing) | (np.abs(wrapped(playback.root[:, 2] - self.facing)) < FACES)
-        arrived = self.goes & stops & (self.arrived | (stands & (far < NEAR) & turned))
-        speed = np.where(stops, 0.0, np.minimum(self.speed, np.sqrt(2 * BRAKES * left)))
-        wanted = _unit(self.paths.at(ahead) - root) * speed[:, None]
-        return replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=arrived), wanted
+        aim = gone + settings.ahead + settings.ahead_moving * speed_now
+        # how far it is to the end
+        to_end = self.paths.ends - root
+        distance = np.hypot(*to_end.T)
+        on_last_stretch = aim >= lengths
+        left = np.where(on_last_stretch, distance, np.maximum(lengths - gone, distance))
+        # stop where the springs roll on to the end; go again if that was too far from it
+        passes_end = (_rolling_distance(playback, steering) * to_end).sum(axis=1) >= distance**2
+        near = distance < settings.near
+        arrives = on_last_stretch & (passes_end | near)
+        stands = speed_now < settings.stands
+        too_far = stands & (distance > settings.glides_from)
+        stops = np.where(self.stops & ~too_far, True, arrives)
+        # arrived: standing there, facing as wanted
+        turned = np.isnan(self.facing) | (np.abs(wrapped(playback.root[:, 2] - self.facing)) < settings.faces)
+        arrived = self.goes & stops & (self.arrived | (stands & near & turned))
+        # towards the aim, braking evenly
+        speed = np.where(stops, 0.0, np.minimum(self.speed, np.sqrt(2 * settings.brakes * left)))
+        velocity = _unit(self.paths.at(aim) - root) * speed[:, None]
+        going = replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=arrived)
+        return going, velocity
 
-    def faces(self, playback: Playback, wanted: Array) -> Array:
-        """Where figures that go at velocities (B, 2) face, radians (B,): where they go; near the end as they do, and at
-        the end as they are to."""
-        now = playback.spring[:, 2]
-        near = np.hypot(*(self.paths.ends - playback.root[:, :2]).T) < SIDESTEP
-        ahead = np.where(near, now, np.arctan2(*wanted.T))
-        return np.where(near & ~np.isnan(self.facing), self.facing, ahead)
+    def faces(self, playback: Playback, velocity: Array, settings: ArrivalSettings) -> Array:
+        """The facings (B,), in radians, of figures that go at velocities (B, 2): where they go; near the end as they
+        face now, or as they are to face there."""
+        facing_now = playback.spring[:, 2]
+        near = np.hypot(*(self.paths.ends - playback.root[:, :2]).T) < settings.sidestep
+        facing = np.where(near, facing_now, np.arctan2(*velocity.T))
+        return np.where(near & ~np.isnan(self.facing), self.facing, facing)
 
-    def settled(self, playback: Playback, how: SteeringSettings, seconds: float) -> Array:
+    def settled(
+        self, playback: Playback, settings: ArrivalSettings, steering: SteeringSettings, seconds: float
+    ) -> Array:
         """The step (B, 2) by which figures that come to rest are moved to where they are to stand."""
-        off = self.paths.ends - playback.root[:, :2] - _rolling(playback, how)
-        far = np.hypot(*off.T)
-        standing, walking = GLIDES
-        most = (standing + walking * np.hypot(*playback.spring[:, :2].T)) * seconds
-        share = np.minimum(seconds / SETTLES, most / np.maximum(far, 1e-9))
-        return np.where((self.stops & (far < GLIDES_FROM))[:, None], off * share[:, None], 0.0)
+        missing = self.paths.ends - playback.root[:, :2] - _rolling_distance(playback, steering)
+        distance = np.hypot(*missing.T)
+        speed = np.hypot(*playback.spring[:, :2].T)
+        most = (settings.glides + settings.glides_moving * speed) * seconds
+        share = np.minimum(seconds / settings.settles, most / np.maximum(distance, 1e-9))
+        glides = self.stops & (distance < settings.glides_from)
+        return np.where(glides[:, None], missing * share[:, None], 0.0)
 
 
-def _rolling(playback: Playback, how: SteeringSettings) -> Array:
-    """How far (B, 2) figures still go that are told to stand: the integral of the spring."""
-    damping = damping_of(how.velocity)
+def _rolling_distance(playback: Playback, steering: SteeringSettings) -> Array:
+    """How far (B, 2) figures still go whose target is standing: the integral of the spring."""
+    damping = damping_of(steering.velocity)
     return (2 * playback.spring[:, :2] + playback.spring_rate[:, :2] / damping) / damping
 
 
 def _unit(vectors: Array) -> Array:
-    found: Array = vectors / np.maximum(np.hypot(*vectors.T), 1e-9)[:, None]
-    return found
+    units: Array = vectors / np.maximum(np.hypot(*vectors.T), 1e-9)[:, None]
+    return units

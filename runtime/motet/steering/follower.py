@@ -1,4 +1,4 @@
-"""Values that follow others: small steps at once, and leaps smoothly, by a spring."""
+"""Values that follow others: small steps at once, and leaps smoothly, by inertialization."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -6,31 +6,35 @@ from typing import Self
 import numpy as np
 
 from motet.motion.rotations import Array
-from motet.motion.springs import damped, damping_of
+from motet.motion.springs import Inertializer
 
 
 @dataclass(frozen=True, eq=False)
 class Follower:
-    """Of B figures; arrays (B, k) that are replaced, never written into. wanted: what is followed. off, rate: how far
-    from it each is shown, and how fast that changes, a second."""
+    """Values (B, k) of B figures; arrays are replaced, never written into."""
 
     wanted: Array
-    off: Array
-    rate: Array
+    """(B, k) the values that are followed."""
+    offset: Array
+    """(B, k) how far from them each is shown."""
+    offset_rate: Array
+    """(B, k) how fast the offset changes, a second."""
 
     @classmethod
     def at(cls, values: Array) -> Self:
-        """Followers that are where they should be."""
+        """Followers without an offset."""
         return cls(values, np.zeros_like(values), np.zeros_like(values))
 
     @property
     def shown(self) -> Array:
-        """Where they are (B, k)."""
-        return self.wanted + self.off
+        """The values (B, k) that are shown."""
+        return self.wanted + self.offset
 
     def after(self, wanted: Array, leap: float, half_life: float, seconds: float) -> Self:
-        """A tick later, where (B, k) is wanted: what moves farther than ``leap`` in a tick is caught up with."""
+        """A tick later, with new values (B, k): those that move farther than ``leap`` in a tick are caught up with."""
+        inertializer = Inertializer(half_life)
         moved = wanted - self.wanted
         leaps = np.sqrt((moved * moved).sum(axis=1, keepdims=True)) > leap
-        off, rate = damped(np.where(leaps, self.off - moved, self.off), self.rate, damping_of(half_life), seconds)
-        return type(self)(wanted, off, rate)
+        offset_before_leap = np.where(leaps, self.offset - moved, self.offset)
+        offset, offset_rate = inertializer.update(offset_before_leap, self.offset_rate, seconds)
+        return type(self)(wanted, offset, offset_rate)

@@ -6,12 +6,10 @@ correction fades. Hip, knee and ankle follow (:class:`motet.figures.two_bones.Tw
 how long a foot will stand, is :mod:`motet.figures.feet.hold`.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.figures.humanoid import LEG, SOLE
 from motet.figures.legs import Limb, joints_of, limbs, reached_by, with_legs
@@ -28,126 +26,164 @@ from motet.motion.scalar_or_batch import (
     where,
     yawed,
 )
-from motet.motion.springs import damping_of
+from motet.motion.springs import Inertializer
 from motet.settings import Range, Settings
+from motet.steering.matching import Flags
 from motet.steering.pose import Pose
 
 
 @dataclass(frozen=True)
 class FootLockSettings(Settings):
-    """fade: half-life in which a released foot comes back to where it is played. farthest: largest correction; beyond
-    it the foot is released. swings: above this speed a foot is swinging, even if a clip that was just jumped to marks a
-    contact. stands: contact above which a foot stands. bears: how much lower than the ball heel or tip are where they
-    bear the foot. steps: how high a foot is lifted that swings while its contact is 1; a slower one less."""
+    """Settings of the foot lock."""
 
     FEATURE: ClassVar[str] = "foot_lock"
 
     fade: Annotated[float, Range(0.001, 10, "s")] = 0.1
+    """Half-life in which a released foot returns to where it is played."""
     farthest: Annotated[float, Range(0, 1, "m")] = 0.2
+    """Largest correction; beyond it the foot is released."""
     swings: Annotated[float, Range(0.01, 100, "m/s")] = 1.0
+    """Above this speed a foot swings, even if a clip that was just jumped to marks a contact."""
     stands: Annotated[float, Range(0, 1)] = 0.5
+    """Contact above which a foot stands."""
     bears: Annotated[float, Range(0, 1, "m")] = 0.02
+    """How much lower than the ball the heel or the tip must be to bear the foot."""
     steps: Annotated[float, Range(0, 1, "m")] = 0.08
+    """How high a foot is lifted that swings while its contact is 1; a slower foot is lifted less."""
+    lifts: Annotated[float, Range(0.001, 10, "s")] = 0.035
+    """Half-life in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
 
 
 POINTS = [(LEG.index(part), point) for part, points in SOLE.items() for point in points]
 """Points of a sole, heel, ball and tip, and which joint of a leg carries each."""
 
-LIFTS = 0.035
-"""Half-life (s) in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
-
 Pair = tuple[Part, Part]
-"""Along x and z."""
 
 
 class Foot(NamedTuple):
-    """By how much a foot is moved and how fast that changes, how high it steps and how fast that changes, and where the
-    points of its sole were, None before the first tick."""
+    """The correction of a foot."""
 
     shift: Pair = (0.0, 0.0)
+    """Offset over the ground along x and z, metres."""
     drift: Pair = (0.0, 0.0)
+    """How fast the shift changes, m/s."""
     height: Pair = (0.0, 0.0)
+    """How high it steps, and how fast that changes."""
     soles: tuple[Vector, ...] | None = None
+    """Where the points of its sole were in the last tick, None before the first."""
 
 
 @dataclass(eq=False)
 class FootLock:
-    """The lock of B characters. dt: seconds of a tick.
-
-    feet: those of one character, left and right, in floats; of more the feet of all as one, in float64 arrays (2, B).
-    They are replaced, never written into. new: (B,) which of several have not been held yet, None for none.
-    """
+    """The lock of B characters."""
 
     characters: int
     dt: float
+    """Seconds of a tick."""
     settings: FootLockSettings = FootLockSettings()
     feet: tuple[Foot, ...] = (Foot(), Foot())
-    new: NDArray[np.bool_] | None = None
+    """Those of a single character, left and right, in floats; those of several as one, in float64 arrays (2, B).
+    Replaced, never written into."""
+    new: Flags | None = None
+    """(B,) which of several have not been held yet, None for none."""
 
     def held(self, pose: Pose) -> Pose:
         """The next pose, one tick later, with standing feet held in place and above ground."""
-        half = (pose.ground[:, 2] / 2).astype(np.float32)
-        hips = yawed(parts(pose.rotations[:, 0]), *parts(np.array([np.sin(half), np.cos(half)]).T))
-        (x, z, _), (height,) = parts(pose.ground), parts(pose.height[:, None])
-        legs = zip(self.feet, limbs(pose.rotations, pose.contacts), strict=False)
-        found = [self._stood(foot, limb, hips, (x, height, z)) for foot, limb in legs]
-        self.feet = tuple(foot for foot, _ in found)
+        half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
+        sine, cosine = parts(np.array([np.sin(half_facing), np.cos(half_facing)]).T)
+        hips = yawed(parts(pose.rotations[:, 0]), sine, cosine)
+        x, z, _ = parts(pose.ground)
+        (height,) = parts(pose.height[:, None])
+        feet = list[Foot]()
+        turns = list[list[Quaternion]]()
+        for foot, limb in zip(self.feet, limbs(pose.rotations, pose.contacts), strict=False):
+            foot_after, leg_turns = self._stood(foot, limb, hips, (x, height, z))
+            feet.append(foot_after)
+            turns.append(leg_turns)
+        self.feet = tuple(feet)
         self.new = None
-        rotations = with_legs(pose.rotations, [turns for _, turns in found])
-        return Pose(pose.ground, rotations, pose.height, pose.contacts)
+        return Pose(pose.ground, with_legs(pose.rotations, turns), pose.height, pose.contacts)
 
     def _stood(self, foot: Foot, limb: Limb, hips: Quaternion, place: Vector) -> tuple[Foot, list[Quaternion]]:
         """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
         turned, places = joints_of(limb, hips, place)
         soles = tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
-        after, lift = self._shifted(foot, soles, limb.contact)
-        played, (shift_x, shift_z) = limb.local[:3], after.shift
+        foot_after, lift = self._shifted(foot, soles, limb.contact)
+        played = limb.local[:3]
+        shift_x, shift_z = foot_after.shift
         moves = (shift_x != 0) | (shift_z != 0) | (lift > 0)
         if moves is False:
-            return after, played
+            return foot_after, played
+        # the leg reaches for the corrected ankle
         x, y, z = places[2]
         reached = reached_by(hips, turned, places, (x + shift_x, y + lift, z + shift_z))
         if moves is True or moves.all():
-            return after, reached
-        return after, [
-            (where(moves, a, e), where(moves, b, f), where(moves, c, g), where(moves, d, h))
-            for (a, b, c, d), (e, f, g, h) in zip(reached, played, strict=True)
-        ]
+            return foot_after, reached
+        return foot_after, [_chosen(moves, *pair) for pair in zip(reached, played, strict=True)]
 
     def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Foot, Part]:
-        """A foot a tick later, and by how much it is lifted."""
-        how, before = self.settings, self._before(foot, soles)
-        (x, lowest, z), (from_x, _, from_z) = soles[1], before[1]
-        x, z, height = x - from_x, z - from_z, lowest - how.bears
-        for (to_x, y, to_z), (from_x, _, from_z) in zip(soles[::2], before[::2], strict=True):
-            lower, lowest = y < height, smaller(lowest, y)
-            height, x, z = where(lower, y, height), where(lower, to_x - from_x, x), where(lower, to_z - from_z, z)
-        held_x, held_z = foot.shift[0] - x, foot.shift[1] - z
-        stands = (contact > how.stands) & (root(held_x * held_x + held_z * held_z) < how.farthest)
-        stands = stands & (root(x * x + z * z) < how.swings * self.dt)
-        (faded_x, slower_x), (faded_z, slower_z) = (
-            self._faded(*one, how.fade) for one in zip(foot.shift, foot.drift, strict=True)
-        )
-        shift_x, shift_z = where(stands, held_x, faded_x), where(stands, held_z, faded_z)
-        x, z = shift_x - held_x, shift_z - held_z  # over the ground
-        steps = contact * smaller(root(x * x + z * z) * (how.steps / (how.swings * self.dt)), how.steps)
-        off, rise = self._faded(foot.height[0] - steps, foot.height[1], LIFTS)
-        drift = where(stands, 0.0, slower_x), where(stands, 0.0, slower_z)
-        return Foot((shift_x, shift_z), drift, (steps + off, rise), soles), larger(steps + off - lowest, 0.0)
+        """A foot a tick later, and by how much it is lifted above where it is played."""
+        settings = self.settings
+        swing_step = settings.swings * self.dt
+        move_x, move_z, lowest = self._sole_move(foot, soles)
 
-    def _before(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Vector, ...]:
-        """Where the points of a sole were; of who is new, where they are."""
+        # a foot that stands stays where it was: its move since the last tick is taken from its offset
+        held_x = foot.shift[0] - move_x
+        held_z = foot.shift[1] - move_z
+        near = _length(held_x, held_z) < settings.farthest
+        slow = _length(move_x, move_z) < swing_step
+        stands = (contact > settings.stands) & near & slow
+
+        # one that does not stand returns to where it is played
+        fade = Inertializer(settings.fade)
+        faded_x, fade_rate_x = fade.update(foot.shift[0], foot.drift[0], self.dt)
+        faded_z, fade_rate_z = fade.update(foot.shift[1], foot.drift[1], self.dt)
+        shift_x = where(stands, held_x, faded_x)
+        shift_z = where(stands, held_z, faded_z)
+        drift_x = where(stands, 0.0, fade_rate_x)
+        drift_z = where(stands, 0.0, fade_rate_z)
+
+        # a foot that moves over the ground while it is marked as a contact steps, higher the faster it moves
+        speed_over_ground = _length(shift_x - held_x, shift_z - held_z)
+        step_goal = contact * smaller(speed_over_ground * (settings.steps / swing_step), settings.steps)
+        lift = Inertializer(settings.lifts)
+        height_error, height_rate = lift.update(foot.height[0] - step_goal, foot.height[1], self.dt)
+        height = step_goal + height_error
+        foot_after = Foot((shift_x, shift_z), (drift_x, drift_z), (height, height_rate), soles)
+        # no point of the sole is below the ground
+        return foot_after, larger(height - lowest, 0.0)
+
+    def _sole_move(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Part, Part, Part]:
+        """How far the point that bears a foot has moved over the ground since the last tick, along x and z; and the
+        height of the lowest point."""
+        heel, ball, tip = soles
+        heel_before, ball_before, tip_before = self._soles_before(foot, soles)
+        # the ball bears the foot, unless the heel or the tip is clearly lower
+        move_x = ball[0] - ball_before[0]
+        move_z = ball[2] - ball_before[2]
+        lowest = ball[1]
+        bearing_height = ball[1] - self.settings.bears
+        for point, point_before in ((heel, heel_before), (tip, tip_before)):
+            bears = point[1] < bearing_height
+            lowest = smaller(lowest, point[1])
+            bearing_height = where(bears, point[1], bearing_height)
+            move_x = where(bears, point[0] - point_before[0], move_x)
+            move_z = where(bears, point[2] - point_before[2], move_z)
+        return move_x, move_z, lowest
+
+    def _soles_before(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Vector, ...]:
+        """Where the points of a sole were; those of new characters where they are now."""
         if foot.soles is None:
             return soles
         if self.new is None:
             return foot.soles
-        pairs = zip(soles, foot.soles, strict=True)
-        return tuple(
-            (where(self.new, a, d), where(self.new, b, e), where(self.new, c, f)) for (a, b, c), (d, e, f) in pairs
-        )
+        return tuple(_chosen(self.new, *pair) for pair in zip(soles, foot.soles, strict=True))
 
-    def _faded(self, off: Part, rate: Part, half_life: float) -> Pair:
-        """What a foot is off and its rate, as the spring of a half-life takes it back."""
-        damping = damping_of(half_life)
-        rise, left = (rate + damping * off) * self.dt, math.exp(-damping * self.dt)
-        return (off + rise) * left, (rate - damping * rise) * left
+
+def _length(x: Part, z: Part) -> Part:
+    return root(x * x + z * z)
+
+
+def _chosen(condition: Part, yes: tuple[Part, ...], no: tuple[Part, ...]) -> tuple[Part, ...]:
+    """A vector or quaternion, or another, by a condition."""
+    return tuple(where(condition, this, other) for this, other in zip(yes, no, strict=True))

@@ -1,16 +1,16 @@
 """Figures that stand keep their place, and breathe.
 
-Recordings of people who stand sway, and every jump between two of them leaves a rest of that: without a hold a figure
-creeps. While one stands, what is played moves it over the ground no more; its feet are held by the foot lock. Its chest
-goes forward and up and back again, by small turns that are added to whatever is played; head and arms stay where they
-are. Breaths are a wave over the ground, so that neighbours do not breathe as one. Letters in shapes: B figures, J
-bones.
+Recordings of people who stand sway, and each transition between two of them leaves a small displacement, so an idle
+figure would drift. While one stands, the playback moves it over the ground no more, and its feet are held by the foot
+lock. Its chest goes forward and up and back again, by small turns that are added to whatever is played; head and arms
+stay where they are. Breaths are a wave over the ground, to keep neighbours from breathing as one. Letters in shapes: B
+figures, J bones.
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.figures.humanoid import BONES, SPINE
 from motet.motion.rotations import Array
@@ -27,94 +27,116 @@ from motet.motion.scalar_or_batch import (
     times,
 )
 from motet.motion.springs import damped, damping_of
-from motet.steering.matching import Playback, Rows
+from motet.settings import Range, Settings
+from motet.steering.matching import Flags, Playback, Rows
 from motet.steering.pose import Floats, Pose
+from motet.steering.settings import HalfLife, Radians, Seconds, Share, Speed
 
-PERIOD = 4.0
-"""Seconds of a breath."""
+PerMetre = Annotated[float, Range(-100, 100, "rad/m")]
 
-WAVE = (2.0, 3.0)
-"""Radians of a breath by which figures differ that are a metre apart, along x and z."""
 
-DEPTH = 0.021
-"""Radians by which a breath turns the spine to either side."""
+@dataclass(frozen=True)
+class IdleSettings(Settings):
+    """Settings of figures that stand."""
+
+    FEATURE: ClassVar[str] = "idle"
+
+    settles: HalfLife = 0.3
+    """Half-life in which a figure that has stopped comes to rest and to breathe, or ceases to breathe."""
+    slow: Speed = 0.1
+    """A figure without a target speed stands once it is slower than this."""
+    stands: Share = 0.5
+    """A figure stands while the contacts of both feet are above this."""
+    breath: Seconds = 4.0
+    """Duration of a breath."""
+    depth: Radians = 0.021
+    """How far a breath turns the spine to either side."""
+    wave_x: PerMetre = 2.0
+    """Phase by which the breaths of figures differ along x."""
+    wave_z: PerMetre = 3.0
+    """Phase by which the breaths of figures differ along z."""
+
 
 TRUNK = [BONES.index(bone) for bone in SPINE]
 TURNS = dict(zip(TRUNK, (1.0, 0.0, -2.0), strict=True)) | {
     BONES.index(bone): 1.0 for bone in ("neck", "leftShoulder", "rightShoulder")
 }
-"""By how many times its depth a breath turns bones about the x axis of the hips: those of the trunk, and what the last
-of them carries."""
+"""Bones that a breath turns about the x axis of the hips, and by how many times its depth: those of the trunk, and what
+the last of them carries."""
 
 STILL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
-SETTLES = 0.3
-"""Half-life in seconds in which a figure that has come to stand comes to rest and to breathe, or ceases to breathe."""
-
-SLOW, STANDS = 0.1, 0.5
-"""A figure stands that is told to, goes slower than this in m/s, with contacts of both feet above that."""
-
 LEAST = 1e-3
-"""Share below which nothing is seen of a breath."""
+"""Share below which a breath is invisible."""
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
-    """Of B figures; replaced, never written into. ticks: (B,) since each began. share, rate: (B,) how far they have
-    come to rest, from 0 to 1, and how fast that changes."""
+class IdleLayer:
+    """The rest of B figures; replaced, never written into."""
 
     ticks: Rows
+    """(B,) ticks since each began."""
     share: Array
+    """(B,) how far they have come to rest, from 0 to 1."""
     rate: Array
+    """(B,) how fast the share changes, a second."""
 
     @staticmethod
-    def none(figures: int) -> "Standing":
-        """Of figures that have not yet stood."""
-        return Standing(np.zeros(figures, dtype=np.int64), np.zeros(figures), np.zeros(figures))
+    def none(figures: int) -> "IdleLayer":
+        """Figures that have not stood yet."""
+        return IdleLayer(np.zeros(figures, dtype=np.int64), np.zeros(figures), np.zeros(figures))
 
-    def kept(
+    def update(
         self,
+        pose: Pose,
         playback: Playback,
         root: Array,
-        contacts: Floats,
         target: Array,
-        acts: NDArray[np.bool_],
-        dt: float,
-    ) -> "Standing":
-        """A tick of dt seconds later; the playback's figures that stand are kept where they were before it.
+        acts: Flags,
+        settings: IdleSettings,
+        seconds: float,
+    ) -> "IdleLayer":
+        """A tick later; the playback's figures that stand are kept where they were before it.
 
-        root: (B, 3) before the tick. contacts: (B, 2). target: (B, 3) velocity along x and z, and facing. acts: (B,)
-        whether an act leads the whole body.
+        root: (B, 3) before the tick. target: (B, 3) velocity along x and z, and facing. acts: (B,) whether an act leads
+        the whole body.
         """
-        stands = (target[:, :2] == 0).all(axis=1) & ~acts & (contacts > STANDS).all(axis=1)
-        stands &= (playback.spring[:, :2] ** 2).sum(axis=1) < SLOW**2
-        off, rate = damped(self.share - stands, self.rate, damping_of(SETTLES), dt)
-        share = stands + off
-        rests = np.where(stands, share, 0.0)[:, None]
-        playback.root[:, :2] -= rests * (playback.root[:, :2] - root[:, :2])
-        return Standing(self.ticks + 1, share, rate)
+        # who stands: without a target speed, slow, and on both feet
+        stopped = (target[:, :2] == 0).all(axis=1)
+        on_both_feet = (pose.contacts > settings.stands).all(axis=1)
+        slow = (playback.spring[:, :2] ** 2).sum(axis=1) < settings.slow**2
+        stands = stopped & ~acts & on_both_feet & slow
+        # come to rest
+        error, rate = damped(self.share - stands, self.rate, damping_of(settings.settles), seconds)
+        share = stands + error
+        # and stay there
+        rest = np.where(stands, share, 0.0)[:, None]
+        playback.root[:, :2] -= rest * (playback.root[:, :2] - root[:, :2])
+        return IdleLayer(self.ticks + 1, share, rate)
 
-    def breathed(self, pose: Pose, dt: float) -> Pose:
-        """A pose after as many ticks, with its breath."""
-        (who,) = (self.share > LEAST).nonzero()
-        if not len(who):
+    def breathe(self, pose: Pose, settings: IdleSettings, seconds: float) -> Pose:
+        """A pose of the present tick, of ``seconds``, with its breath."""
+        (figures,) = (self.share > LEAST).nonzero()
+        if not len(figures):
             return pose
-        x, z, _ = parts(pose.ground[who])
-        (breath,) = parts(2 * np.pi * (self.ticks[who] * dt / PERIOD % 1)[:, None])
-        wave = breath + WAVE[0] * x + WAVE[1] * z
-        half = computed(np.sin, wave) * single(self.share[who]) * (DEPTH / 2)
-        return replace(pose, rotations=_turned(pose.rotations, who, half))
+        x, z, _ = parts(pose.ground[figures])
+        (phase,) = parts(2 * np.pi * (self.ticks[figures] * seconds / settings.breath % 1)[:, None])
+        wave = phase + settings.wave_x * x + settings.wave_z * z
+        half_angle = computed(np.sin, wave) * single(self.share[figures]) * (settings.depth / 2)
+        return replace(pose, rotations=_breathed(pose.rotations, figures, half_angle))
 
 
-def _turned(rotations: Floats, who: Rows, half: Part) -> Floats:
-    """Local quaternions (B, J, 4) with the breath of figures (n,), of half the angle of the spine."""
-    found, above = rotations.copy("K"), STILL
-    for bone, by in TURNS.items():
-        own: Quaternion = parts(rotations[who, bone])
-        if by:
-            x = rotated_axis(inverse(above), 0)  # of the hips, as the parent has it
-            turn = (*times(x, computed(np.sin, by * half)), computed(np.cos, by * half))
-            found[who, bone] = joined(product(turn, own))
+def _breathed(rotations: Floats, figures: Rows, half_angle: Part) -> Floats:
+    """Local quaternions (B, J, 4) with the breath of figures (n,). half_angle: half the turn of the spine."""
+    breathed = rotations.copy("K")
+    above = STILL
+    for bone, times_depth in TURNS.items():
+        local: Quaternion = parts(rotations[figures, bone])
+        if times_depth:
+            x_axis = rotated_axis(inverse(above), 0)  # of the hips, as the parent has it
+            half = times_depth * half_angle
+            turn = (*times(x_axis, computed(np.sin, half)), computed(np.cos, half))
+            breathed[figures, bone] = joined(product(turn, local))
         if bone in TRUNK:
-            above = product(above, own)
-    return found
+            above = product(above, local)
+    return breathed

@@ -21,10 +21,15 @@ from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 from motet.settings import checked_int
 from motet.steering.acts import Act, ActSettings
+from motet.steering.arrival import ArrivalSettings
+from motet.steering.avoidance import AvoidanceSettings
 from motet.steering.foot_lock import FootLockSettings
 from motet.steering.gaits import Gaits
+from motet.steering.idle import IdleSettings
+from motet.steering.look_layer import LookSettings
 from motet.steering.matching import FEATURES, Matcher, Playback, Rows, Table
 from motet.steering.pose import Pose
+from motet.steering.reach_layer import ReachSettings
 from motet.steering.scripts import parse_orders
 from motet.steering.sentence_acts import SaidActs
 from motet.steering.session import SteerSession
@@ -32,9 +37,10 @@ from motet.steering.settings import SteeringSettings
 from motet.steering.step import LOOPS, PoseCodes
 
 SPREAD_FROM = 32
-"""From so many characters on the searches of a session are spread over the ticks."""
+"""Number of characters from which the searches of a session are spread over the ticks."""
 
-FEATURE_STEPS = 16  # in which tables hold a scaled unit of a feature, in 8 bits
+FEATURE_STEPS = 16
+"""Steps of a scaled unit of a feature in a table, whose features have 8 bits."""
 
 
 class SteerModel(ControlModel):
@@ -47,12 +53,22 @@ class SteerModel(ControlModel):
 
     LOOPS = LOOPS
     ROLES = ()
-    SETTINGS = (SteeringSettings, FootLockSettings, ActSettings)
+    SETTINGS = (
+        SteeringSettings,
+        FootLockSettings,
+        ActSettings,
+        IdleSettings,
+        LookSettings,
+        ReachSettings,
+        ArrivalSettings,
+        AvoidanceSettings,
+    )
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
-        config, how = Fields(manifest.config, "config"), self.settings(SteeringSettings)
-        self.abilities = Gaits.read(config, how)
+        config = Fields(manifest.config, "config")
+        settings = self.settings(SteeringSettings)
+        self.abilities = Gaits.read(config, settings)
         self.gaits = self.abilities.names
         low, usual, high = (column.tolist() for column in self.abilities.speeds.T[:3])
         self.speeds = dict(zip(self.gaits, zip(low, high, strict=True), strict=True))
@@ -60,7 +76,7 @@ class SteerModel(ControlModel):
         if self.contract.channels != (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS)):
             raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
-        self.matcher = Matcher(self._table(config), how, self.fps)
+        self.matcher = Matcher(self._table(config), settings, self.fps)
         self.pose_codes = PoseCodes(
             self.table("pose_mean", "P", "float32").astype(np.float64),
             self.table("pose_basis", "K P", "float16").astype(np.float64),
@@ -71,7 +87,8 @@ class SteerModel(ControlModel):
                 raise BundleError(f"table left: no row of {gait!r} is followed by {need} more of its recording")
 
     def _table(self, config: Fields) -> Table:
-        codes, moves = self.table("codes", "N K", "float16"), self._bounded("moves", "N 6", "float32")
+        codes = self.table("codes", "N K", "float16")
+        moves = self._bounded("moves", "N 6", "float32")
         return Table.of(
             np.concatenate([codes, moves], axis=1, dtype=np.float32),
             (self.table("features", "N F", "int8") / FEATURE_STEPS).astype(np.float32),
@@ -86,10 +103,10 @@ class SteerModel(ControlModel):
         self, name: str, shape: str, dtype: str, low: float = -LARGEST, high: ArrayLike = LARGEST
     ) -> NDArray[Any]:
         """A table whose numbers are within limits, one for all or one for each; BundleError where one is not."""
-        found = self.table(name, shape, dtype)
-        if not ((found >= low) & (found <= np.asarray(high))).all():
+        table = self.table(name, shape, dtype)
+        if not ((table >= low) & (table <= np.asarray(high))).all():
             raise BundleError(f"table {name}: holds a number that is out of range")
-        return found
+        return table
 
     def start(
         self,
@@ -124,8 +141,8 @@ class SteerModel(ControlModel):
         playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
         if not (words is None or hasattr(words, "act") or isinstance(words, GenerateModel)):
             raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
-        said = SaidActs(self, words) if isinstance(words, GenerateModel) else words
-        session = SteerSession(self, playback, number, hold_feet, strict, said)
+        sentence_acts = SaidActs(self, words) if isinstance(words, GenerateModel) else words
+        session = SteerSession(self, playback, number, hold_feet, strict, sentence_acts)
         if isinstance(start, Motion):
             session.take(self.pose_of(start))
         if places is not None:
@@ -137,13 +154,13 @@ class SteerModel(ControlModel):
         every = self.matcher.settings.search_every
         if given is None:
             return np.arange(characters) % every if characters >= SPREAD_FROM else None
-        found = np.asarray(given)
-        fits = found.shape in ((), (characters,)) and found.dtype.kind in "iu"
-        if not (fits and (found >= 0).all() and (found < every).all()):
+        phases = np.asarray(given)
+        fits = phases.shape in ((), (characters,)) and phases.dtype.kind in "iu"
+        if not (fits and (phases >= 0).all() and (phases < every).all()):
             raise ControlError(
                 f"phases must be whole numbers from 0 to {every - 1}, for all or for each of {characters}"
             )
-        return np.broadcast_to(found.astype(np.int64), characters)
+        return np.broadcast_to(phases.astype(np.int64), characters)
 
     def pose_of(self, motion: Motion) -> Pose:
         """The last pose of a motion, at the origin; MotionError for one that is not of a human figure."""
@@ -154,8 +171,8 @@ class SteerModel(ControlModel):
     def act_of(self, motion: Motion, name: str = "act") -> Act:
         """A motion of any human figure as an act: what a session's ``act`` takes, for many characters and often.
 
-        A clip in place gets the path that its feet imply, and a TravelWarning tells. What rests at both ends is left
-        out. MotionError for one that is not of a human figure, ControlError for one of less than three ticks.
+        A clip in place gets the path that its feet imply, with a TravelWarning. The rest at both ends is left out.
+        MotionError for one that is not of a human figure, ControlError for one of less than three ticks.
         """
         features = self.contract.features(self.contract.frames(self.at_own_rate(travelling(motion))))
         return self._act(name, *self._bodies(features), features.select(ROOT_SIXD[:3]).values)
@@ -163,13 +180,14 @@ class SteerModel(ControlModel):
     @cached_property
     def takes(self) -> dict[str, tuple[Act, ...]]:
         """The recordings of gaits that go nowhere, such as "jump", as acts, by the gait's name."""
-        table, found = self.matcher.table, dict[str, tuple[Act, ...]]()
+        table = self.matcher.table
+        takes = dict[str, tuple[Act, ...]]()
         for gait, name in enumerate(self.gaits):
             if not self.usual[name]:
                 rows = np.flatnonzero(table.shows[:, gait])
-                each = np.split(rows, np.flatnonzero(table.left[rows] == 0)[:-1] + 1)
-                found[name] = tuple(self._take(name, table.frames[0, part]) for part in each)
-        return found
+                recordings = np.split(rows, np.flatnonzero(table.left[rows] == 0)[:-1] + 1)
+                takes[name] = tuple(self._take(name, table.frames[0, recording]) for recording in recordings)
+        return takes
 
     def _take(self, name: str, frames: Floats) -> Act:
         """Frames (T, K + 6) of the table as an act."""

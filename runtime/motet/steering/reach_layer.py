@@ -7,9 +7,9 @@ one the joints are mixed.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT, sided
 from motet.figures.two_bones import TwoBones
@@ -34,95 +34,129 @@ from motet.motion.scalar_or_batch import (
     unit,
     where,
 )
+from motet.settings import Range, Settings
 from motet.steering.follower import Follower
+from motet.steering.matching import Flags
 from motet.steering.pose import Pose
+from motet.steering.settings import HalfLife, Metres, Radians, Share
+
+
+@dataclass(frozen=True)
+class ReachSettings(Settings):
+    """Settings of hands that reach for points."""
+
+    FEATURE: ClassVar[str] = "reach"
+
+    widest: Radians = float(np.radians(105))
+    """How far an arm turns from diagonally forward, on its side."""
+    nearest: Share = 0.25
+    """Share of the arm's length: no hand is nearer to the shoulder."""
+    straight: Share = 0.95
+    """Share of the arm's length up to which points are reached exactly."""
+    stretched: Annotated[float, Range(0.001, 1)] = 0.04
+    """Share of its length by which an arm stretches at most for points farther away."""
+    reached: Metres = 0.02
+    """Distance from a point at which a hand has reached it."""
+    leap: Metres = 0.1
+    """How far a point may move in a tick and be followed at once."""
+    half_life: HalfLife = 0.12
+    """Half-life in which a hand gets to a new point, and back."""
+
 
 SPINE = ("spine", "chest", "upperChest")
 PARTS = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 
 PALM = 0.09
-"""Metres from the wrist to the middle of the hand, which is what reaches."""
-
-WIDEST = np.cos(np.radians(105))
-"""The cosine of how far an arm turns from diagonally forward, to its own side."""
-
-NEAREST, STRAIGHT, STRETCHED = 0.25, 0.95, 0.04
-"""Shares of the arm's length: what is between the first two away from the shoulder is reached exactly; and by how much
-more an arm stretches for anything farther."""
+"""Metres from the wrist to the middle of the hand, which is brought to the point."""
 
 LEAST = 1e-3
 """The weight below which an arm is as it is played."""
 
-REACHED = 0.02
-"""Metres from a point at which a hand has reached it."""
-
-LEAP, HALF_LIFE = 0.1, 0.12
-"""Metres that a point may move in a tick and be followed at once; and the half-life, in seconds, in which a hand gets
-to a new point, and back."""
-
 
 @dataclass(frozen=True, eq=False)
-class Reach:
-    """What a hand of B figures reaches for. side: 0 for the left hand, 1 for the right. points: (B, 3) in the world,
-    NaN for none. aim: (B, 3) where the hand goes for them. weight: (B, 1) from 0, the arm as it is played, to 1.
-    beyond: (B,) whether the point was out of reach in the last tick."""
+class ReachLayer:
+    """The left or the right hands of B figures."""
 
     side: int
+    """0 for the left hand, 1 for the right."""
     points: Array
+    """(B, 3) in the world, NaN for none."""
     aim: Follower
+    """(B, 3) where the hand goes for them."""
     weight: Follower
-    beyond: NDArray[np.bool_]
+    """(B, 1) from 0, the arm as it is played, to 1."""
+    beyond: Flags
+    """(B,) whether the point was out of reach in the last tick."""
 
     @staticmethod
-    def idle(side: int, figures: int) -> "Reach":
-        """Of figures whose hands reach for nothing."""
-        none, aim, weight = np.full((figures, 3), np.nan), np.zeros((figures, 3)), np.zeros((figures, 1))
-        return Reach(side, none, Follower.at(aim), Follower.at(weight), np.zeros(figures, dtype=bool))
+    def idle(side: int, figures: int) -> "ReachLayer":
+        """Hands that reach for nothing."""
+        return ReachLayer(
+            side,
+            points=np.full((figures, 3), np.nan),
+            aim=Follower.at(np.zeros((figures, 3))),
+            weight=Follower.at(np.zeros((figures, 1))),
+            beyond=np.zeros(figures, dtype=bool),
+        )
 
     @cached_property
     def _rests(self) -> bool:
         """Whether no hand reaches for anything, or is still on its way back."""
         return bool(np.isnan(self.points[:, 0]).all() and (self.weight.shown < LEAST).all())
 
-    def after(self, pose: Pose, seconds: float) -> tuple["Reach", Pose]:
-        """A tick later, and the pose of that tick with the hand there."""
+    def update(self, pose: Pose, settings: ReachSettings, seconds: float) -> tuple["ReachLayer", Pose]:
+        """A tick later, and the pose of that tick with the hands at their points."""
         if self._rests:
             return self, pose
-        told, rests = ~np.isnan(self.points[:, 0]), self.weight.shown < LEAST
-        reaches = told | ~rests[:, 0]
-        wanted = np.where(told[:, None], self.points, self.aim.wanted)
-        # an arm that does not reach yet goes to the point by its weight alone
-        before, off, rate = np.where(rests, [wanted, 0 * wanted, 0 * wanted], [*vars(self.aim).values()])
-        aim = Follower(before, off, rate).after(wanted, LEAP, HALF_LIFE, seconds)
-        weight = self.weight.after(told[:, None].astype(np.float64), 0.5, HALF_LIFE, seconds)
-        turned, beyond = _reached(pose, self.side, aim.shown, weight.shown[:, 0])
+        has_point = ~np.isnan(self.points[:, 0])
+        rests = self.weight.shown < LEAST
+        # the aim follows the point; that of an arm at rest is there at once, as its weight takes it there
+        wanted = np.where(has_point[:, None], self.points, self.aim.wanted)
+        aim = Follower(
+            np.where(rests, wanted, self.aim.wanted),
+            np.where(rests, 0 * wanted, self.aim.offset),
+            np.where(rests, 0 * wanted, self.aim.offset_rate),
+        )
+        aim = aim.after(wanted, settings.leap, settings.half_life, seconds)
+        # the weight goes to 1, or back to 0
+        weight = self.weight.after(has_point[:, None].astype(np.float64), 0.5, settings.half_life, seconds)
+        # the arm
+        turned, beyond = _reached(pose, self.side, aim.shown, weight.shown[:, 0], settings)
         rotations = pose.rotations.copy()
+        moves = has_point | ~rests[:, 0]
         for part, quats in zip(PARTS[1:3], turned, strict=True):
             bone = BONES.index(sided(LEFT_RIGHT[self.side], part))
-            rotations[reaches, bone] = np.transpose(quats).reshape(-1, 4)[reaches]
-        hand = replace(self, aim=aim, weight=weight, beyond=beyond & told)
-        return hand, replace(pose, rotations=rotations)
+            rotations[moves, bone] = np.transpose(quats).reshape(-1, 4)[moves]
+        layer = replace(self, aim=aim, weight=weight, beyond=beyond & has_point)
+        return layer, replace(pose, rotations=rotations)
 
 
 def _reached(
-    pose: Pose, side: int, points: Array, weight: Array
-) -> tuple[tuple[Quaternion, Quaternion], NDArray[np.bool_]]:
+    pose: Pose, side: int, points: Array, weight: Array, settings: ReachSettings
+) -> tuple[tuple[Quaternion, Quaternion], Flags]:
     """Rotations of upper arms and forearms in their parents' frames, with the hands on the way to points (B, 3) as far
     as weights (B,) say; and whether these are out of reach (B,)."""
     bones = [BONES.index(sided(LEFT_RIGHT[side], part)) for part in PARTS]
-    shoulder, upper, lower, hand = (parts(pose.rotations[:, bone]) for bone in bones)
-    place, above = _chest(pose)
     offsets = [HUMANOID.joints[HUMANOID.index(BONES[bone])].offset for bone in bones]
-    start = plus(offsets[0], rotated(shoulder, offsets[1]))
-    way = minus(rotated(inverse(above), minus(parts(points), place)), start)
-    arm = _ready(side, offsets[2], plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0))))
-    near = _within(way, side, arm.longest)
-    gap = minus(near, way)
-    turn_upper, turn_lower = arm.turns(near)
-    up, low = product(turn_upper, READY[side][0]), product(turn_lower, READY[side][1])
+    shoulder, upper, lower, hand = (parts(pose.rotations[:, bone]) for bone in bones)
+    # from the shoulder to the point, in the frame of the upper chest
+    chest_place, chest = _chest(pose)
+    arm_start = plus(offsets[0], rotated(shoulder, offsets[1]))
+    to_point = minus(rotated(inverse(chest), minus(parts(points), chest_place)), arm_start)
+    # the arm that is forward and half bent, brought as near as it can
+    palm = plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0)))
+    arm = _ready_arm(side, offsets[2], palm)
+    reachable = _within(to_point, side, arm.longest, settings)
+    turn_upper, turn_lower = arm.turns(reachable)
+    ready_upper, ready_lower = READY[side]
+    reaching_upper = product(turn_upper, ready_upper)
+    reaching_lower = product(turn_lower, ready_lower)
+    # mixed with the recorded arm
     (share,) = parts(weight[:, None])
-    turned = _mixed(upper, product(inverse(shoulder), up), share), _mixed(lower, product(inverse(up), low), share)
-    return turned, np.array(length(gap) > REACHED).reshape(-1)
+    mixed_upper = _mixed(upper, product(inverse(shoulder), reaching_upper), share)
+    mixed_lower = _mixed(lower, product(inverse(reaching_upper), reaching_lower), share)
+    missing = length(minus(reachable, to_point))
+    return (mixed_upper, mixed_lower), np.array(missing > settings.reached).reshape(-1)
 
 
 def _out(side: int) -> float:
@@ -131,22 +165,24 @@ def _out(side: int) -> float:
 
 
 def _chest(pose: Pose) -> tuple[Vector, Quaternion]:
-    """Where the upper chest is and how it is turned."""
-    (x, z, _), (height,) = parts(pose.ground), parts(pose.height[:, None])
-    place, above = (x, height, z), product(parts(pose.heading), parts(pose.rotations[:, 0]))
+    """Place and rotation of the upper chest in the world."""
+    x, z, _ = parts(pose.ground)
+    (height,) = parts(pose.height[:, None])
+    place: Vector = (x, height, z)
+    above = product(parts(pose.heading), parts(pose.rotations[:, 0]))
     for bone in SPINE:
         place = plus(place, rotated(above, HUMANOID.joints[HUMANOID.index(bone)].offset))
         above = product(above, parts(pose.rotations[:, BONES.index(bone)]))
     return place, above
 
 
-def _ready(side: int, along: Vector, down: Vector) -> TwoBones:
-    """The arm that is forward and half bent, in the frame of the upper chest, from the shoulder: of an upper arm and a
-    forearm with the hand, in their own frames."""
+def _ready_arm(side: int, upper_arm: Vector, forearm: Vector) -> TwoBones:
+    """The arm that is forward and half bent, in the frame of the upper chest, from the shoulder. upper_arm, forearm:
+    these bones in their own frames, the forearm with the hand."""
     upper, lower = READY[side]
-    elbow = rotated(upper, along)
+    elbow = rotated(upper, upper_arm)
     hinge = rotated(lower, (0.0, -_out(side), 0.0))
-    return TwoBones((0.0, 0.0, 0.0), elbow, plus(elbow, rotated(lower, down)), hinge)
+    return TwoBones((0.0, 0.0, 0.0), elbow, plus(elbow, rotated(lower, forearm)), hinge)
 
 
 def _turn(axis: Vector, degrees: float) -> Quaternion:
@@ -155,34 +191,43 @@ def _turn(axis: Vector, degrees: float) -> Quaternion:
     return x, y, z, float(np.cos(half))
 
 
-def _readied(side: int) -> tuple[Quaternion, Quaternion]:
-    """The upper arm and the forearm of that arm: bent by a right angle, then turned until the elbow is down."""
+def _ready(side: int) -> tuple[Quaternion, Quaternion]:
+    """Rotations of the upper arm and the forearm of that arm: bent by a right angle, then turned until the elbow is
+    down."""
     out = _out(side)
     upper = _turn((out, 0.0, 1.0), -75.0 * out)
     return upper, product(upper, _turn((0.0, -out, 0.0), 90.0))
 
 
-READY = _readied(0), _readied(1)
+READY = _ready(0), _ready(1)
 
 
-def _within(way: Vector, side: int, longest: Part) -> Vector:
-    """The place nearest to one (from the shoulder, in the frame of the upper chest) that an arm of a length reaches,
-    turned no farther and stretched no farther than it can be."""
-    axis, far = unit((_out(side), 0.0, 1.0)), length(way)
-    along = dot(way, axis)
-    aside = minus(way, times(axis, along))
-    inside = along >= WIDEST * far
-    edge = plus(times(axis, WIDEST * far), times(unit(aside), root(1 - WIDEST * WIDEST) * far))
-    x, y, z = (where(inside, own, other) for own, other in zip(way, edge, strict=True))
-    nearest, straight, more = (share * longest for share in (NEAREST, STRAIGHT, STRETCHED))
-    over = larger(far - straight, 0.0)
-    eased = straight + more * (1 - computed(np.exp, -over / more))
-    by = where(over > 0, eased, larger(far, nearest)) / larger(far, 1e-12)
-    return x * by, y * by, z * by
+def _within(to_point: Vector, side: int, longest: Part, settings: ReachSettings) -> Vector:
+    """The place nearest to a point (from the shoulder, in the frame of the upper chest) that an arm of a length reaches
+    within the limits of turning and stretching."""
+    widest_cosine = np.cos(settings.widest)
+    axis = unit((_out(side), 0.0, 1.0))
+    distance = length(to_point)
+    # directions beyond the widest are brought to the edge of that cone
+    along = dot(to_point, axis)
+    across = minus(to_point, times(axis, along))
+    edge_along = times(axis, widest_cosine * distance)
+    edge_across = times(unit(across), root(1 - widest_cosine * widest_cosine) * distance)
+    edge = plus(edge_along, edge_across)
+    inside = along >= widest_cosine * distance
+    x, y, z = (where(inside, value, limit) for value, limit in zip(to_point, edge, strict=True))
+    # distances beyond the straight arm are eased towards its full length
+    straight = settings.straight * longest
+    stretch = settings.stretched * longest
+    over = larger(distance - straight, 0.0)
+    eased = straight + stretch * (1 - computed(np.exp, -over / stretch))
+    reached = where(over > 0, eased, larger(distance, settings.nearest * longest))
+    factor = reached / larger(distance, 1e-12)
+    return x * factor, y * factor, z * factor
 
 
 def _mixed(first: Quaternion, second: Quaternion, share: Part) -> Quaternion:
     """A rotation between two, by a share of the way."""
-    near = where(sum(a * b for a, b in zip(first, second, strict=True)) < 0, -1.0, 1.0)
-    x, y, z, w = ((1 - share) * near * a + share * b for a, b in zip(first, second, strict=True))
+    sign = where(sum(a * b for a, b in zip(first, second, strict=True)) < 0, -1.0, 1.0)
+    x, y, z, w = ((1 - share) * sign * a + share * b for a, b in zip(first, second, strict=True))
     return normalised((x, y, z, w))

@@ -14,26 +14,30 @@ from motet.motion.motion import Motion, is_many
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 from motet.settings import is_number
 from motet.steering import crowd
-from motet.steering.action_layer import Acting
+from motet.steering.action_layer import ActionLayer
 from motet.steering.acts import Act, ActSettings
+from motet.steering.arrival import ArrivalSettings
+from motet.steering.avoidance import AvoidanceSettings
 from motet.steering.events import Event, Happenings
 from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.gaits import Command
-from motet.steering.idle import Standing
+from motet.steering.idle import IdleLayer, IdleSettings
+from motet.steering.look_layer import LookSettings
 from motet.steering.matched import Matched, matched
 from motet.steering.matching import Playback, Rows
-from motet.steering.path_following import led, speed_of
+from motet.steering.path_following import Ways, speed_of
 from motet.steering.pose import Pose
+from motet.steering.reach_layer import ReachSettings
 from motet.steering.scripts import Order, parse_orders
 from motet.steering.step import tick
-from motet.steering.targets import Guidance, Guided, Who
+from motet.steering.targets import CharacterIds, Guidance, Guided
 from motet.text.clauses import Shown
 
 if TYPE_CHECKING:
     from motet.steering.model import SteerModel
     from motet.steering.sentence_acts import SaidActs
 
-Doing = Motion | Act | str | None
+Action = Motion | Act | str | None
 """What can be acted."""
 
 
@@ -42,15 +46,18 @@ class SteerSnapshot:
     """The whole state of a session."""
 
     playback: Playback
-    acting: Acting
-    standing: Standing
+    actions: ActionLayer
+    idle: IdleLayer
     command: Command
     lock: FootLock | None
     poses: tuple[Pose, Pose] | None
+    """The last two ticks, of a display with another frame rate."""
     ahead: float
+    """How far the display is from the first to the second, in ticks."""
     guidance: Guidance
     happenings: Happenings
     late: tuple[Event, ...]
+    """Events of a tick that was to be shown next when characters were put elsewhere."""
 
     def __repr__(self) -> str:
         return f"SteerSnapshot({len(self.command.gait)} characters)"
@@ -70,22 +77,25 @@ class SteerSession(Guided):
         words: "SaidActs | None",
     ) -> None:
         super().__init__(len(playback.row))
-        self.model, self.strict = model, strict
-        self._playback, zero = playback, np.zeros(self.characters)
+        zero = np.zeros(self.characters)
+        self.model = model
+        self.strict = strict
+        self._words = words
+        self._warned: set[str] = set()  # gaits whose limits a warning has named
+        self._playback = playback
         self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
         self._target = np.zeros((self.characters, 3))
-        self._acting, self._words = self._no_acts(), words
+        self._actions = self._no_acts()
+        self._idle = IdleLayer.none(self.characters)
         self._lock = self._new_lock() if hold_feet else None
-        self._standing = Standing.none(self.characters)
-        self._poses: tuple[Pose, Pose] | None = None
         self._happenings = Happenings.none(self.characters)
-        self._late: tuple[Event, ...] = ()  # of a tick that was to be shown next, when characters were put elsewhere
+        self._poses: tuple[Pose, Pose] | None = None
         self._ahead = 0.0
-        self._said: set[str] = set()
+        self._late: tuple[Event, ...] = ()
 
-    def _no_acts(self) -> Acting:
+    def _no_acts(self) -> ActionLayer:
         model = self.model
-        return Acting.of(self._playback, model.matcher, model.pose_codes, model.settings(ActSettings))
+        return ActionLayer.of(self._playback, model.matcher, model.pose_codes, model.settings(ActSettings))
 
     def _new_lock(self) -> FootLock:
         return FootLock(self.characters, 1 / self.model.fps, self.model.settings(FootLockSettings))
@@ -111,34 +121,42 @@ class SteerSession(Guided):
         strict; a gait that only goes forward faces the way it goes. ControlError for values that are not numbers or do
         not fit; the control is unchanged then.
         """
-        given = {"speed": speed, "direction": direction, "facing": facing}
-        numbers = {name: self._numbers(f"{name} needs a number", one) for name, one in given.items() if one is not None}
-        numbers |= {name: np.radians(numbers[name]) for name in ("direction", "facing") if name in numbers}
-        told, gaits = self._command, None if gait is None else self._gaits(gait)
+        numbers = dict[str, Array]()
+        for name, value in (("speed", speed), ("direction", direction), ("facing", facing)):
+            if value is not None:
+                numbers[name] = self._numbers(f"{name} needs a number", value)
+        for name in numbers.keys() & {"direction", "facing"}:
+            numbers[name] = np.radians(numbers[name])
+        before = self._command
+        gaits = None if gait is None else self._gaits(gait)
         if velocity is None:
-            self._tell(told.told(gaits, **numbers))
+            self._set(before.changed(gaits, **numbers))
             return
         if speed is not None or direction is not None:
             raise ControlError("give a velocity, or speed and direction, not both")
         x, z = self._numbers("a velocity needs x and z", velocity, 2).T
         numbers["speed"] = np.hypot(x, z)
         goes = numbers["speed"] > 0
-        command = told.told(gaits, direction=np.where(goes, np.arctan2(x, z), told.direction), **numbers)
-        self._tell(command if facing is not None else replace(command, faces_way=told.faces_way | goes))
+        numbers["direction"] = np.where(goes, np.arctan2(x, z), before.direction)
+        command = before.changed(gaits, **numbers)
+        if facing is None:
+            command = replace(command, faces_way=before.faces_way | goes)
+        self._set(command)
 
     @property
     def target(self) -> Array:
         """Velocity along x and z, m/s, and facing, radians (characters, 3), within the limits of gaits."""
         return self._target.copy()
 
-    def _tell(self, command: Command) -> None:
-        target, beyond = self.model.abilities.target(command)
-        for gait, said in beyond:
+    def _set(self, command: Command) -> None:
+        """Obey a command; ControlError or one warning for each gait whose limits it exceeds."""
+        target, exceeding = self.model.abilities.target(command)
+        for gait, message in exceeding:
             if self.strict:
-                raise ControlError(said)
-            if gait not in self._said:
-                self._said.add(gait)
-                warn(said, ControlWarning)
+                raise ControlError(message)
+            if gait not in self._warned:
+                self._warned.add(gait)
+                warn(message, ControlWarning)
         changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != self._command.gait)
         self._playback.hasten(changed)
         self._target, self._command = target, command
@@ -157,56 +175,94 @@ class SteerSession(Guided):
 
     @property
     def _way(self) -> Array:
-        """The target as gaits go for it."""
+        """The target as gaits approach it."""
         return self.model.abilities.curved(self._target, self._command.gait, self._playback.root[:, 2])
 
     def _lead(self) -> None:
-        """Let those that are on a way go on, and those that move keep apart."""
+        """Let those that are on a path go on, and those that move keep apart."""
         if not (self._guidance.going.goes.any() or self._guidance.room):
             return
-        play, seconds = self._playback, 1 / self.model.fps
-        led_on = led(self._guidance, self.model.abilities, play, self._command, self._target, seconds)
-        self._guidance, self._command, self._target = led_on
+        model = self.model
+        ways = Ways(model.abilities, model.settings(ArrivalSettings), model.settings(AvoidanceSettings))
+        self._guidance, self._command, self._target = ways.lead(
+            self._guidance, self._playback, self._command, self._target, 1 / model.fps
+        )
 
-    def _start_of(self, gait: str | None, speed: Array | None, who: Rows) -> tuple[Array, Rows, Array]:
-        gaits = self._command.gait[who] if gait is None else np.full(len(who), self.model.abilities.number(gait))
-        return self._playback.root[who, :2], gaits, speed_of(self.model.abilities, gaits, speed)
+    def _start_of(self, gait: str | None, speed: Array | None, characters: Rows) -> tuple[Array, Rows, Array]:
+        if gait is None:
+            gaits = self._command.gait[characters]
+        else:
+            gaits = np.full(len(characters), self.model.abilities.number(gait))
+        return self._playback.root[characters, :2], gaits, speed_of(self.model.abilities, gaits, speed)
 
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
-        gait, root, seconds = self._command.gait, self._playback.root, 1 / self.model.fps
-        changed = self._acting.begin(self._playback, target, gait)
-        pose = tick(self.model.matcher, self.model.pose_codes, self._playback, target, gait)
+        model = self.model
+        playback = self._playback
+        gait = self._command.gait
+        root_before = playback.root
+        seconds = 1 / model.fps
+        # acts go on, begin and end; legs that an act has led so far get a row to continue from
+        changed = self._actions.begin(playback, target, gait)
+        # search, playback, springs, warping: the pose of the recordings, and the root
+        pose = tick(model.matcher, model.pose_codes, playback, target, gait)
+        # idle: figures that stand keep their place
         if self._lock is not None:
-            whole = self._acting.whole
-            self._standing = self._standing.kept(self._playback, root, pose.contacts, target, whole, seconds)
-        pose = self._acting.laid(pose, self._playback, root, changed)
+            settings = model.settings(IdleSettings)
+            acts = self._actions.whole
+            self._idle = self._idle.update(pose, playback, root_before, target, acts, settings, seconds)
+        # actions: acts are laid over the pose, and lead whole bodies
+        pose = self._actions.update(pose, playback, root_before, changed)
         self._face_as_acted()
-        pose = pose if self._lock is None else self._lock.held(self._standing.breathed(pose, seconds))
-        self._guidance, pose = self._guidance.after(pose, seconds)
+        # idle, again: breath; foot lock: standing feet stay in place
+        if self._lock is not None:
+            pose = self._idle.breathe(pose, model.settings(IdleSettings), seconds)
+            pose = self._lock.held(pose)
+        # look and reach: heads and arms
+        pose = self._point(pose, seconds)
+        # what has happened since the last tick
         return replace(pose, events=self._happened(pose)).read_only()
 
+    def _point(self, pose: Pose, seconds: float) -> Pose:
+        """A pose with heads and arms turned to their targets."""
+        before = self._guidance
+        look, pose = before.look.update(pose, self.model.settings(LookSettings), seconds)
+        reach_settings = self.model.settings(ReachSettings)
+        left, pose = before.hands[0].update(pose, reach_settings, seconds)
+        right, pose = before.hands[1].update(pose, reach_settings, seconds)
+        if look is not before.look or (left, right) != before.hands:
+            self._guidance = replace(before, look=look, hands=(left, right))
+        return pose
+
     def _happened(self, pose: Pose) -> tuple[Event, ...]:
-        gait, before = self._command.gait, self._happenings
+        gait = self._command.gait
+        before = self._happenings
         shows = self.model.matcher.table.shows[self._playback.row, gait]
-        self._happenings = before.after(pose.contacts, gait, shows, self.arrived, self._acting.done)
+        self._happenings = before.after(pose.contacts, gait, shows, self.arrived, self._actions.done)
         return tuple(self._happenings.events(before, self.model.gaits))
 
     @property
     def matched(self) -> Matched:
-        """The rows that are played, what they cost, and the path that is asked for."""
+        """The rows that are played, what they cost, and the desired path."""
         return matched(self.model.matcher, self._playback, self._way, self._command.gait)
 
     def _face_as_acted(self) -> None:
-        """Those who act with the whole body and are told to stand go on standing as they do then."""
-        told = self._command
-        if self._acting.acts and (who := self._acting.whole & (told.speed == 0)).any():
-            facing = np.where(who, self._playback.root[:, 2], told.facing)
-            direction = np.where(who, facing, told.direction)
-            self._command = replace(told, direction=direction, facing=facing)
-            self._target = np.where(who[:, None], np.insert(np.zeros((len(who), 2)), 2, facing, axis=1), self._target)
+        """After a full-body act an idle character keeps the act's final facing."""
+        if not self._actions.acts:
+            return
+        command = self._command
+        stands = self._actions.whole & (command.speed == 0)
+        if not stands.any():
+            return
+        facing = np.where(stands, self._playback.root[:, 2], command.facing)
+        direction = np.where(stands, facing, command.direction)
+        self._command = replace(command, direction=direction, facing=facing)
+        standing_target = np.insert(np.zeros((len(facing), 2)), 2, facing, axis=1)
+        self._target = np.where(stands[:, None], standing_target, self._target)
 
-    def act(self, what: Doing | Sequence[Doing], *, who: Who = None, upper: bool | None = None) -> list[Shown]:
+    def act(
+        self, what: Action | Sequence[Action], *, who: CharacterIds = None, upper: bool | None = None
+    ) -> list[Shown]:
         """Do something, from the next tick on, in place of what is being done.
 
         what: a motion of any human figure, without what it rests at both ends; an act, which
@@ -222,15 +278,22 @@ class SteerSession(Guided):
         or of which a word is left out if the session is strict, ControlError for a motion of less than three ticks, for
         characters that are not there, and for a sentence without ``words``; nothing changes then.
         """
-        characters = self._who(who).tolist()
-        each = list(what) if is_many(what) and not isinstance(what, Doing) else [what] * len(characters)
+        characters = self._chosen(who).tolist()
+        each = list(what) if is_many(what) and not isinstance(what, Action) else [what] * len(characters)
         if len(each) != len(characters):
             raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
+        # make each act once
         shown: list[Shown] = []
-        made = {id(one): self._acts_of(one, shown) for one in each}
-        for i, one in zip(characters, each, strict=True):
-            acts, chosen = made[id(one)], max if self._target[i, :2].any() else min
-            self._acting.asked[i] = (chosen(acts, key=lambda act: act.reach) if acts else None, upper)
+        made = dict[int, tuple[Act, ...]]()
+        for action in each:
+            if id(action) not in made:
+                made[id(action)] = self._acts_of(action, shown)
+        # a character that moves does the take that leads the farthest
+        for character, action in zip(characters, each, strict=True):
+            acts = made[id(action)]
+            choose = max if self._target[character, :2].any() else min
+            act = choose(acts, key=lambda act: act.reach) if acts else None
+            self._actions.orders[character] = (act, upper)
         return shown
 
     def prepare(self, *sentences: str) -> list[Shown]:
@@ -244,7 +307,7 @@ class SteerSession(Guided):
 
     def _acts_of(self, what: Any, shown: list[Shown]) -> tuple[Act, ...]:
         """The acts that are meant, of which a character does one; what a sentence is shown as is added to a list."""
-        needs(what, Doing, "a motion, an act or a sentence")
+        needs(what, Action, "a motion, an act or a sentence")
         if what is None:
             return ()
         if isinstance(what, str) and what in self.model.takes:
@@ -258,27 +321,34 @@ class SteerSession(Guided):
             return self.model.act_of(what)
         if self._words is None:
             raise ControlError("an act in words needs a model that makes it: start(words=motet.load('generate'))")
-        act, said = self._words.shown(what, self.strict)
-        shown.append(said)
+        act, shown_as = self._words.shown(what, self.strict)
+        shown.append(shown_as)
         return act
 
     @property
     def acting(self) -> list[tuple[str, float] | None]:
         """What each character does: its name and the seconds that are left; None of those that only go or stand."""
-        left = [one and (one.act.name, (len(one.act) - 1 - one.frame) / self.model.fps) for one in self._acting.playing]
-        begun = {i: act for i, (act, _) in self._acting.asked.items()}
-        asked = {i: act if act is None else (act.name, (len(act) - 1) / self.model.fps) for i, act in begun.items()}
-        return [asked.get(i, one) for i, one in enumerate(left)]
+        acting = list[tuple[str, float] | None]()
+        for playing in self._actions.playing:
+            if playing is None:
+                acting.append(None)
+            else:
+                acting.append((playing.act.name, (len(playing.act) - 1 - playing.frame) / self.model.fps))
+        for character, (act, _) in self._actions.orders.items():
+            acting[character] = None if act is None else (act.name, (len(act) - 1) / self.model.fps)
+        return acting
 
     def advance(self, seconds: float) -> Pose:
         """The pose ``seconds`` later, for a display of any frame rate: interpolated between two ticks. Its
         events are those since the pose before. A command shows within a tick. ControlError unless 0 <= seconds <= 1."""
         if not is_number(seconds) or not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
-        events, self._late = self._late, ()
+        events = self._late
+        self._late = ()
         if self._poses is None:
             first = self.tick()
-            self._poses, events = (first, self.tick()), events + first.events
+            events += first.events
+            self._poses = (first, self.tick())
         self._ahead += seconds * self.model.fps
         while self._ahead >= 1:
             events += self._poses[1].events
@@ -293,14 +363,17 @@ class SteerSession(Guided):
 
     def put(self, places: ArrayLike) -> None:
         """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
-        wanted = self._numbers("places need x, z and facing", places, 3)
-        told, facing = self._command, wrapped(np.radians(wanted[:, 2]))
-        self._playback.root = np.column_stack([wanted[:, :2], facing])
+        numbers = self._numbers("places need x, z and facing", places, 3)
+        facing = wrapped(np.radians(numbers[:, 2]))
+        self._playback.root = np.column_stack([numbers[:, :2], facing])
         self._playback.spring[:, 2] = facing
-        direction = np.where(told.speed > 0, told.direction, facing)  # standing ones move the way they face
-        self._command = replace(told, direction=direction, facing=facing, faces_way=np.zeros_like(told.faces_way))
+        before = self._command
+        direction = np.where(before.speed > 0, before.direction, facing)  # standing ones move the way they face
+        no_way = np.zeros_like(before.faces_way)
+        self._command = replace(before, direction=direction, facing=facing, faces_way=no_way)
         self._target, _ = self.model.abilities.target(self._command)
-        self._acting, self._guidance = self._no_acts(), self._guidance.ended()
+        self._actions = self._no_acts()
+        self._guidance = self._guidance.ended()
         if self._poses is not None:
             self._late += self._poses[1].events
         self._poses = None  # nothing lies between there and here
@@ -314,15 +387,15 @@ class SteerSession(Guided):
         gait, phases: like ``start`` and ``phases`` of :meth:`motet.steering.model.SteerModel.start`. ControlError for
         values out of range, and for more than 100,000 characters in all; nothing changes then.
         """
-        wanted = _places(places)
-        count = len(wanted)
+        new_places = _places(places)
+        count = len(new_places)
         total = self.characters + count
         if not 0 < count <= LARGEST_CROWD - self.characters:
             raise ControlError(f"a session has 1 to {LARGEST_CROWD} characters; places of {count} make it {total}")
         turns = self.model.phases(total) if phases is None else None
         phases = phases if turns is None else turns[self.characters :]
         held = self._lock is not None
-        more = self.model.start(gait, characters=count, places=wanted, hold_feet=held, phases=phases)
+        more = self.model.start(gait, characters=count, places=new_places, hold_feet=held, phases=phases)
         if self._poses is not None:
             more.advance(0)
         numbers = list(range(self.characters, total))
@@ -334,7 +407,7 @@ class SteerSession(Guided):
         for characters that are not there, and for all of them: one stays."""
         if who is None:
             raise ControlError("who must be the numbers of the characters that go")
-        stay = np.delete(np.arange(self.characters), self._who(who))
+        stay = np.delete(np.arange(self.characters), self._chosen(who))
         if not len(stay):
             raise ControlError("a session keeps one character at least")
         self.restore(crowd.picked([self.snapshot()], stay))
@@ -348,7 +421,7 @@ class SteerSession(Guided):
             raise ControlError("a pose must be finite numbers")
         codes = self.model.pose_codes.encode(pose.rotations, pose.height)
         self.model.matcher.pose(self._playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
-        self._acting = self._no_acts()
+        self._actions = self._no_acts()
 
     def run(self, script: str) -> list[Motion]:
         """Run a script (:mod:`motet.steering.scripts`) for all characters; one motion for each."""
@@ -369,13 +442,16 @@ class SteerSession(Guided):
         if order.goal is not None:
             self.go_to(order.goal, order.facing, speed=order.speed)
             return
-        told = self._command
-        facing, speed = np.where(told.faces_way, told.direction, told.facing), told.speed
-        aside = wrapped(told.direction - facing) if order.way is None else np.radians(order.way)
+        before = self._command
+        facing = np.where(before.faces_way, before.direction, before.facing)
+        aside = wrapped(before.direction - facing) if order.way is None else np.radians(order.way)
         if order.speed is None:
-            speed = self.model.abilities.speeds[told.gait if order.gait is None else self._gaits(order.gait), 1]
+            gaits = before.gait if order.gait is None else self._gaits(order.gait)
+            speed = self.model.abilities.speeds[gaits, 1]
         elif order.speed >= 0:
             speed = np.full(self.characters, order.speed)
+        else:
+            speed = before.speed
         degrees = np.degrees(facing) + order.turn
         self.control(gait=order.gait, speed=speed, direction=degrees + np.degrees(aside), facing=degrees)
 
@@ -386,28 +462,43 @@ class SteerSession(Guided):
         height = np.stack([pose.height for pose in poses], axis=1)[..., None]
         quats = np.stack([pose.rotations for pose in poses], axis=1).astype(np.float64)
         axes = np.swapaxes(quat_to_rotmat(quats)[..., :2], -1, -2).reshape(*height.shape[:2], -1)
-        found: Array = np.concatenate([block, height, axes], axis=-1)
-        return found
+        frames: Array = np.concatenate([block, height, axes], axis=-1)
+        return frames
 
     def snapshot(self) -> SteerSnapshot:
         """The whole state, to be restored later."""
-        lock = None if self._lock is None else replace(self._lock)  # its arrays are replaced, never written into
-        told = self._playback.copy(), self._acting.copy(), self._standing, self._command, lock
-        return SteerSnapshot(*told, self._poses, self._ahead, self._guidance, self._happenings, self._late)
+        return SteerSnapshot(
+            playback=self._playback.copy(),
+            actions=self._actions.copy(),
+            idle=self._idle,
+            command=self._command,
+            lock=None if self._lock is None else replace(self._lock),  # its arrays are replaced, never written into
+            poses=self._poses,
+            ahead=self._ahead,
+            guidance=self._guidance,
+            happenings=self._happenings,
+            late=self._late,
+        )
 
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it, of the same model and the same ``hold_feet``, else
         ControlError. The session has as many characters then as the snapshot."""
         needs(snapshot, SteerSnapshot, "a snapshot of a session")
-        command = snapshot.command
-        if (snapshot.lock is None) != (self._lock is None):
-            has, lacks = ("without", "with") if snapshot.lock is None else ("with", "without")
-            raise ControlError(f"a snapshot {has} held feet does not fit a session {lacks} them (hold_feet)")
-        self.characters = len(command.gait)
-        self._playback, self._poses, self._ahead = snapshot.playback.copy(), snapshot.poses, snapshot.ahead
-        self._acting, self._standing = snapshot.acting.copy(), snapshot.standing
-        self._command, (self._target, _) = command, self.model.abilities.target(command)
-        self._guidance, self._happenings, self._late = snapshot.guidance, snapshot.happenings, snapshot.late
+        if snapshot.lock is None and self._lock is not None:
+            raise ControlError("a snapshot without held feet does not fit a session with them (hold_feet)")
+        if snapshot.lock is not None and self._lock is None:
+            raise ControlError("a snapshot with held feet does not fit a session without them (hold_feet)")
+        self.characters = len(snapshot.command.gait)
+        self._playback = snapshot.playback.copy()
+        self._actions = snapshot.actions.copy()
+        self._idle = snapshot.idle
+        self._command = snapshot.command
+        self._target, _ = self.model.abilities.target(snapshot.command)
+        self._poses = snapshot.poses
+        self._ahead = snapshot.ahead
+        self._guidance = snapshot.guidance
+        self._happenings = snapshot.happenings
+        self._late = snapshot.late
         self._lock = None if snapshot.lock is None else replace(snapshot.lock)
 
 
@@ -415,9 +506,9 @@ def _places(values: ArrayLike) -> Array:
     """Places (n, 3) of characters, of one (3,) or more; not yet whether they are finite."""
     needed = "places need x, z and facing, for each of the characters that are added"
     try:
-        wanted = np.atleast_2d(np.array(values, dtype=np.float64))
+        places = np.atleast_2d(np.array(values, dtype=np.float64))
     except (TypeError, ValueError) as error:
         raise ControlError(needed) from error
-    if wanted.shape[1:] != (3,):
+    if places.shape[1:] != (3,):
         raise ControlError(needed)
-    return wanted
+    return places

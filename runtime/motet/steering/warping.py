@@ -30,29 +30,33 @@ from motet.motion.scalar_or_batch import (
 )
 
 BACK = [BONES.index(name) for name in SPINE]
-"""Which bones turn back, each by the same share."""
+"""Bones that turn back, each by the same share."""
 
 LEAST = 1e-4
-"""Radians below which nothing is turned."""
+"""Radians, and shares of a stride, below which nothing is changed."""
 
 
 def warped(rotations: Floats, angles: Array) -> Floats:
     """Local quaternions (B, J, 4) with hips and legs turned to the left by angles (B,) in radians; all that the
     spine carries stays as it is."""
-    who = _those(np.abs(angles) > LEAST)
-    if who is None:
+    figures = _indices(np.abs(angles) > LEAST)
+    if figures is None:
         return rotations
-    found, half = rotations.copy("K"), single(angles[who] / 2)
-    above: Quaternion = parts(rotations[who, 0])
-    found[who, 0] = joined(yawed(above, computed(np.sin, half), computed(np.cos, half)))
-    back = half / -len(BACK)
-    sine, cosine = computed(np.sin, back), computed(np.cos, back)
+    # the hips, and the legs with them
+    turned = rotations.copy("K")
+    half_angle = single(angles[figures] / 2)
+    above: Quaternion = parts(rotations[figures, 0])
+    turned[figures, 0] = joined(yawed(above, computed(np.sin, half_angle), computed(np.cos, half_angle)))
+    # the spine turns back, about the vertical as each parent has it
+    back = half_angle / -len(BACK)
+    sine = computed(np.sin, back)
+    cosine = computed(np.cos, back)
     for bone in BACK:
-        own: Quaternion = parts(rotations[who, bone])
-        up = rotated_axis(inverse(above), 1)  # as the parent has it
-        found[who, bone] = joined(product((*times(up, sine), cosine), own))
-        above = product(above, own)
-    return found
+        local: Quaternion = parts(rotations[figures, bone])
+        vertical = rotated_axis(inverse(above), 1)
+        turned[figures, bone] = joined(product((*times(vertical, sine), cosine), local))
+        above = product(above, local)
+    return turned
 
 
 BALL = SOLE[LEG[2]][-1]
@@ -63,25 +67,28 @@ UNDER = HUMANOID.rest_positions[HUMANOID.index("leftFoot"), 2] + BALL[2]
 
 
 def strided(rotations: Floats, contacts: Floats, strides: Array) -> Floats:
-    """Local quaternions (B, J, 4) with the balls of the feet led so far that strides are these times (B,) as long, in
-    whichever direction they go: one that changed with the row that is played would make feet leap."""
-    who = _those(np.abs(strides - 1) > LEAST)
-    if who is None:
+    """Local quaternions (B, J, 4) with strides relative to the recorded ones (B,), made by leading the balls of the
+    feet in all directions alike: a direction that changed with the row that is played would make feet leap."""
+    figures = _indices(np.abs(strides - 1) > LEAST)
+    if figures is None:
         return rotations
-    hips: Quaternion = parts(rotations[who, 0])
-    by: Part = single(strides[who] - 1)
+    hips: Quaternion = parts(rotations[figures, 0])
+    longer: Part = single(strides[figures] - 1)
     legs = []
-    for limb in limbs(rotations[who], contacts[who]):
+    for limb in limbs(rotations[figures], contacts[figures]):
         turned, places = joints_of(limb, hips, (0.0, 0.0, 0.0))
+        # the ball of the foot, from where it is under the hip
         x, _, z = plus(places[2], rotated(turned[2], BALL))
-        led = ((x - limb.offsets[0][0]) * by, 0.0, (z - UNDER) * by)
-        legs.append(reached_by(hips, turned, places, plus(places[2], led)))
-    found = rotations.copy("K")
-    found[who] = with_legs(rotations[who], legs)
-    return found
+        foot_offset = ((x - limb.offsets[0][0]) * longer, 0.0, (z - UNDER) * longer)
+        legs.append(reached_by(hips, turned, places, plus(places[2], foot_offset)))
+    strided_rotations = rotations.copy("K")
+    strided_rotations[figures] = with_legs(rotations[figures], legs)
+    return strided_rotations
 
 
-def _those(which: NDArray[np.bool_]) -> NDArray[np.intp] | slice | None:
-    """Those (B,) for which it holds, for indices; None for none."""
-    (found,) = which.nonzero()
-    return None if not len(found) else slice(None) if len(found) == len(which) else found
+def _indices(chosen: NDArray[np.bool_]) -> NDArray[np.intp] | slice | None:
+    """An index for the chosen figures (B,), None for none."""
+    (indices,) = chosen.nonzero()
+    if not len(indices):
+        return None
+    return slice(None) if len(indices) == len(chosen) else indices

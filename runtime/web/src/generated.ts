@@ -288,19 +288,13 @@ export const nearestSettings = {
 // motet.steering.action_layer
 export const ACTION_LAYER = {
   FADED: 0.0001,
-  LONGER: 1.75,
-  METRE: 10,
 } as const;
 
 // motet.steering.acts
 export const ACTS = {
-  BENT: 0.25,
   LARGEST: 10000,
-  MOVES: 1,
-  RAISED: 0.3,
   SHORTEST: 3,
   STANDS: 0.98,
-  TURNED: 2.6179938779914944,
   WIDTH: 92,
 } as const;
 
@@ -308,29 +302,38 @@ export const ACTS = {
 export const actSettings = {
   blend: { default: 0.12, low: 0.01, high: 10, whole: false },
   far: { default: 0.7, low: 0.01, high: 3.15, whole: false },
+  height_weight: { default: 10, low: 0, high: 100, whole: false },
+  longest: { default: 1.75, low: 1, high: 10, whole: false },
   entry: { default: 0.5, low: 0, high: 10, whole: false },
   rest: { default: 0.25, low: 0, high: 100, whole: false },
+  moves: { default: 1, low: 0, high: 10, whole: false },
+  bent: { default: 0.25, low: 0, high: 100, whole: false },
+  raised: { default: 0.3, low: 0, high: 100, whole: false },
+  turned: { default: 2.6179938779914944, low: 0, high: 3.15, whole: false },
 } as const;
 
-// motet.steering.arrival
-export const ARRIVAL = {
-  AHEAD: 0.3,
-  BRAKES: 1.5,
-  FACES: 0.13962634015954636,
-  GLIDES: [0.05, 0.15],
-  GLIDES_FROM: 0.16,
-  NEAR: 0.08,
-  SETTLES: 0.25,
-  SIDESTEP: 0.7,
-  SOONER: 0.25,
-  STANDS: 0.1,
+// motet.steering.arrival.ArrivalSettings
+export const arrivalSettings = {
+  ahead: { default: 0.3, low: 0, high: 100, whole: false },
+  ahead_moving: { default: 0.25, low: 0, high: 10, whole: false },
+  brakes: { default: 1.5, low: 0.1, high: 100, whole: false },
+  near: { default: 0.08, low: 0, high: 100, whole: false },
+  sidestep: { default: 0.7, low: 0, high: 100, whole: false },
+  glides_from: { default: 0.16, low: 0, high: 100, whole: false },
+  glides: { default: 0.05, low: 0, high: 100, whole: false },
+  glides_moving: { default: 0.15, low: 0, high: 10, whole: false },
+  settles: { default: 0.25, low: 0.01, high: 100, whole: false },
+  faces: { default: 0.13962634015954636, low: 0, high: 3.15, whole: false },
+  stands: { default: 0.1, low: 0, high: 100, whole: false },
+  sudden: { default: 0.2, low: 0, high: 100, whole: false },
 } as const;
 
-// motet.steering.avoidance
-export const AVOIDANCE = {
-  SIGHT: 5,
-  SOON: 2,
-  STRENGTH: 6,
+// motet.steering.avoidance.AvoidanceSettings
+export const avoidanceSettings = {
+  soon: { default: 2, low: 0.01, high: 100, whole: false },
+  sight: { default: 5, low: 0, high: 100, whole: false },
+  strength: { default: 6, low: 0, high: 100, whole: false },
+  waits: { default: 0.2, low: 0, high: 100, whole: false },
 } as const;
 
 // motet.steering.events
@@ -338,11 +341,6 @@ export const EVENTS = {
   DOWN: 0.5,
   FLIES: 2,
   UP: 0.2,
-} as const;
-
-// motet.steering.foot_lock
-export const FOOT_LOCK = {
-  LIFTS: 0.035,
 } as const;
 
 // motet.steering.foot_lock.FootLockSettings
@@ -353,32 +351,43 @@ export const footLockSettings = {
   stands: { default: 0.5, low: 0, high: 1, whole: false },
   bears: { default: 0.02, low: 0, high: 1, whole: false },
   steps: { default: 0.08, low: 0, high: 1, whole: false },
+  lifts: { default: 0.035, low: 0.001, high: 10, whole: false },
 } as const;
 
 // motet.steering.idle
 export const IDLE = {
-  DEPTH: 0.021,
   LEAST: 0.001,
-  PERIOD: 4,
-  SETTLES: 0.3,
-  SLOW: 0.1,
-  STANDS: 0.5,
   TRUNK: [1, 2, 3],
   TURNS: { 1: 1, 2: 0, 3: -2, 4: 1, 10: 1, 18: 1 },
-  WAVE: [2, 3],
+} as const;
+
+// motet.steering.idle.IdleSettings
+export const idleSettings = {
+  settles: { default: 0.3, low: 0.01, high: 10, whole: false },
+  slow: { default: 0.1, low: 0, high: 100, whole: false },
+  stands: { default: 0.5, low: 0, high: 1, whole: false },
+  breath: { default: 4, low: 0.01, high: 100, whole: false },
+  depth: { default: 0.021, low: 0, high: 3.15, whole: false },
+  wave_x: { default: 2, low: -100, high: 100, whole: false },
+  wave_z: { default: 3, low: -100, high: 100, whole: false },
 } as const;
 
 // motet.steering.look_layer
 export const LOOK_LAYER = {
-  BEHIND: 2.6179938779914944,
   EYES: [0, 0.07, 0.08],
-  HALF_LIFE: 0.18,
-  LEAP: 0.17453292519943295,
   LEAST: 0.0001,
-  MOST: [1.4835298641951802, 0.8726646259971648],
-  NEAR: 0.2,
   SHARES: { chest: 0.1, upperChest: 0.25, neck: 0.55, head: 1 },
-  UNDER: 0.3,
+} as const;
+
+// motet.steering.look_layer.LookSettings
+export const lookSettings = {
+  aside: { default: 1.4835298641951802, low: 0, high: 3.15, whole: false },
+  up: { default: 0.8726646259971648, low: 0, high: 3.15, whole: false },
+  behind: { default: 2.6179938779914944, low: 0, high: 3.15, whole: false },
+  near: { default: 0.2, low: 0, high: 100, whole: false },
+  under: { default: 0.3, low: 0, high: 100, whole: false },
+  leap: { default: 0.17453292519943295, low: 0, high: 3.15, whole: false },
+  half_life: { default: 0.18, low: 0.01, high: 10, whole: false },
 } as const;
 
 // motet.steering.matching
@@ -396,23 +405,21 @@ export const STEERING = {
   SPREAD_FROM: 32,
 } as const;
 
-// motet.steering.path_following
-export const PATH_FOLLOWING = {
-  SUDDEN: 0.2,
-  WAITS: 0.2,
-} as const;
-
 // motet.steering.reach_layer
 export const REACH_LAYER = {
-  HALF_LIFE: 0.12,
-  LEAP: 0.1,
   LEAST: 0.001,
-  NEAREST: 0.25,
   PALM: 0.09,
-  REACHED: 0.02,
-  STRAIGHT: 0.95,
-  STRETCHED: 0.04,
-  WIDEST: -0.25881904510252085,
+} as const;
+
+// motet.steering.reach_layer.ReachSettings
+export const reachSettings = {
+  widest: { default: 1.8325957145940461, low: 0, high: 3.15, whole: false },
+  nearest: { default: 0.25, low: 0, high: 1, whole: false },
+  straight: { default: 0.95, low: 0, high: 1, whole: false },
+  stretched: { default: 0.04, low: 0.001, high: 1, whole: false },
+  reached: { default: 0.02, low: 0, high: 100, whole: false },
+  leap: { default: 0.1, low: 0, high: 100, whole: false },
+  half_life: { default: 0.12, low: 0.01, high: 10, whole: false },
 } as const;
 
 // motet.steering.settings.SteeringSettings

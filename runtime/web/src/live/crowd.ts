@@ -87,8 +87,8 @@ export function towards(
   const figure = figures[n]!;
   const [x, z] = figure.root;
   const away = Math.hypot(toX - x, toZ - z) || 1;
-  const change = keptApart(figure, figures, ROOM);
-  const [vx, vz] = aside([((toX - x) / away) * pace, ((toZ - z) / away) * pace], change);
+  const change = keptApart(figure, figures, ROOM, net.model.avoidance);
+  const [vx, vz] = aside([((toX - x) / away) * pace, ((toZ - z) / away) * pace], change, net.model.avoidance);
   const wanted = Math.hypot(vx, vz);
   const fast = fastest(net);
   const gait = wanted > (figure.wanted.gait === fast ? 0.8 : 1) * net.speeds[net.gaits[0]!]![2]! ? fast : 0;

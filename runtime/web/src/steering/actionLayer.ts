@@ -202,7 +202,7 @@ function each(value: (i: number) => number): Ground {
  */
 function lose(
   acting: Acting,
-  { blend, far }: Settings<typeof actSettings>,
+  { blend, far, height_weight, longest }: Settings<typeof actSettings>,
   base: Body,
   step: Ground,
   dt: number,
@@ -219,9 +219,9 @@ function lose(
   acting.offset = off.map((value, i) => (isNew(i) ? value : acting.offset[i]!));
   const farthest = Math.max(
     ...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))),
-    ACTION_LAYER.METRE * Math.abs(acting.offset.at(-1)!),
+    height_weight * Math.abs(acting.offset.at(-1)!),
   );
-  acting.damping = dampingOf(blend) / clamp(farthest / far, 1, ACTION_LAYER.LONGER);
+  acting.damping = dampingOf(blend) / clamp(farthest / far, 1, longest);
   if (leads) acting.drift = each((i) => acting.going[i]! - step[i]! / dt);
 }
 

@@ -1,5 +1,5 @@
 /* Acts, short motions of the humanoid that a steered figure can be told to do: docs/reference/bundle.md, "Acts". */
-import { ACTS } from "../generated.js";
+import { ACTS, type actSettings } from "../generated.js";
 import type { Manifest } from "../bundle/bundle.js";
 import { ControlError } from "../errors.js";
 import { framesFor } from "../representation/frames.js";
@@ -21,6 +21,7 @@ import {
   type Vector,
   Y,
 } from "../motion/rotations.js";
+import type { Settings } from "../settings.js";
 import { wrapped } from "../motion/springs.js";
 import type { Played } from "./step.js";
 
@@ -41,7 +42,7 @@ export interface Act {
 /** The rate of acts, and how slow what rests in them is: those of a `ControlModel`. */
 export interface ActModel {
   readonly fps: number;
-  readonly acts: { readonly rest: number };
+  readonly acts: Settings<typeof actSettings>;
 }
 
 /**
@@ -49,7 +50,7 @@ export interface ActModel {
  * facing; x and z of the root in metres, its facing in radians; the hips' height in metres. What rests at both ends is left
  * out. ControlError for what is no act.
  */
-export function actOf({ fps, acts: { rest } }: ActModel, name: string, numbers: ArrayLike<number>): Act {
+export function actOf({ fps, acts: settings }: ActModel, name: string, numbers: ArrayLike<number>): Act {
   const values = Array.from(numbers);
   const frames = values.length / ACTS.WIDTH;
   if (!Number.isInteger(frames) || frames < ACTS.SHORTEST)
@@ -71,11 +72,12 @@ export function actOf({ fps, acts: { rest } }: ActModel, name: string, numbers: 
   const places = (at: number) => world.places[at]!.flat();
   const fast = rows.map(
     (_, at) =>
-      Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) > rest,
+      Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) >
+      settings.rest,
   );
   const [first, last] = [fast.indexOf(true), fast.lastIndexOf(true)];
   const within = <T>(all: T[]): T[] =>
-    first >= 0 && last - first >= Math.round(ACTS.MOVES * fps) ? all.slice(first, last + 1) : all;
+    first >= 0 && last - first >= Math.round(settings.moves * fps) ? all.slice(first, last + 1) : all;
   const [height, ground] = [
     within(poses.map(({ height }) => height)),
     within(poses.map(({ ground }) => ground)),
@@ -88,7 +90,7 @@ export function actOf({ fps, acts: { rest } }: ActModel, name: string, numbers: 
     ),
   );
   const contacts = within(footContacts(world, fps));
-  const legs = byLegs(height, ground, features);
+  const legs = byLegs(height, ground, features, settings);
   return {
     name,
     rotations: within(poses.map(({ rotations }) => rotations)),
@@ -100,14 +102,19 @@ export function actOf({ fps, acts: { rest } }: ActModel, name: string, numbers: 
   };
 }
 
-function byLegs(height: number[], ground: Ground[], features: number[][]): boolean {
+function byLegs(
+  height: number[],
+  ground: Ground[],
+  features: number[][],
+  settings: Settings<typeof actSettings>,
+): boolean {
   const range = (values: number[]) => Math.max(...values) - Math.min(...values);
   let facing = 0;
   const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
   return (
-    range([ACTS.STANDS, ...height]) > ACTS.BENT ||
-    Math.max(...features.map((feature) => Math.max(feature[1]!, feature[4]!))) > ACTS.RAISED ||
-    range(turned) > ACTS.TURNED
+    range([ACTS.STANDS, ...height]) > settings.bent ||
+    Math.max(...features.map((feature) => Math.max(feature[1]!, feature[4]!))) > settings.raised ||
+    range(turned) > settings.turned
   );
 }
 

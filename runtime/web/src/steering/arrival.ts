@@ -1,6 +1,7 @@
 /* Figures that go along paths and arrive at their ends, as motet/steering/arrival.py says. Metres, seconds, radians; x and z. */
-import { ARRIVAL } from "../generated.js";
+import type { arrivalSettings } from "../generated.js";
 import type { Playback } from "./matching.js";
+import type { Settings } from "../settings.js";
 import { clamp, dampingOf, wrapped } from "../motion/springs.js";
 
 export type Point = readonly [x: number, z: number];
@@ -29,31 +30,41 @@ export function sent(points: Point[], order: Pick<Going, "gait" | "speed" | "fac
 }
 
 /** A tick later: the velocity at which the figure is to go, [0, 0] for standing. */
-export function onward(going: Going, playback: Playback, halfLife: number): [x: number, z: number] {
+export function onward(
+  going: Going,
+  playback: Playback,
+  settings: Settings<typeof arrivalSettings>,
+  halfLife: number,
+): [x: number, z: number] {
   const { points, along } = going;
   const [root, velocity] = [at2(playback.root), at2(playback.spring)];
   const here = at(going, going.gone);
   const way = unit(minus(at(going, going.gone + 0.05), here));
   const gone = going.gone + clamp(dot(minus(root, here), way), 0, 0.5);
   const [pace, whole] = [Math.hypot(...velocity), along.at(-1)!];
-  const ahead = gone + ARRIVAL.AHEAD + ARRIVAL.SOONER * pace;
+  const ahead = gone + settings.ahead + settings.ahead_moving * pace;
   const off = minus(points.at(-1)!, root);
   const [last, far] = [ahead >= whole, Math.hypot(...off)];
   const left = last ? far : Math.max(whole - gone, far);
-  const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < ARRIVAL.NEAR);
-  const stands = pace < ARRIVAL.STANDS;
-  going.stops = (going.stops && !(stands && far > ARRIVAL.GLIDES_FROM)) || arrives;
-  const turned = going.facing === null || Math.abs(wrapped(playback.root[2] - going.facing)) < ARRIVAL.FACES;
-  going.arrived = going.stops && (going.arrived || (stands && far < ARRIVAL.NEAR && turned));
-  const speed = going.stops ? 0 : Math.min(going.speed, Math.sqrt(2 * ARRIVAL.BRAKES * left));
+  const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < settings.near);
+  const stands = pace < settings.stands;
+  going.stops = (going.stops && !(stands && far > settings.glides_from)) || arrives;
+  const turned = going.facing === null || Math.abs(wrapped(playback.root[2] - going.facing)) < settings.faces;
+  going.arrived = going.stops && (going.arrived || (stands && far < settings.near && turned));
+  const speed = going.stops ? 0 : Math.min(going.speed, Math.sqrt(2 * settings.brakes * left));
   going.gone = Math.min(gone, whole);
   const [x, z] = unit(minus(at(going, ahead), root));
   return [x * speed, z * speed];
 }
 
 /** Where a figure faces that goes at a velocity: where it goes; near the end as it does, and at the end as it is to. */
-export function faces({ points, facing }: Going, { root, spring }: Playback, [x, z]: Point): number {
-  if (distance(points.at(-1)!, at2(root)) >= ARRIVAL.SIDESTEP) return Math.atan2(x, z);
+export function faces(
+  { points, facing }: Going,
+  { root, spring }: Playback,
+  [x, z]: Point,
+  settings: Settings<typeof arrivalSettings>,
+): number {
+  if (distance(points.at(-1)!, at2(root)) >= settings.sidestep) return Math.atan2(x, z);
   return facing ?? spring[2];
 }
 
@@ -61,16 +72,17 @@ export function faces({ points, facing }: Going, { root, spring }: Playback, [x,
 export function settle(
   { points, stops }: Going,
   playback: Playback,
+  settings: Settings<typeof arrivalSettings>,
   halfLife: number,
   seconds: number,
 ): void {
   const [x, z, facing] = playback.root;
   const off = minus(minus(points.at(-1)!, [x, z]), rolling(playback, halfLife));
   const far = Math.hypot(...off);
-  if (!stops || far >= ARRIVAL.GLIDES_FROM) return;
+  if (!stops || far >= settings.glides_from) return;
   const most =
-    (ARRIVAL.GLIDES[0] + ARRIVAL.GLIDES[1] * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
-  const share = Math.min(seconds / ARRIVAL.SETTLES, most / Math.max(far, 1e-9));
+    (settings.glides + settings.glides_moving * Math.hypot(playback.spring[0], playback.spring[1])) * seconds;
+  const share = Math.min(seconds / settings.settles, most / Math.max(far, 1e-9));
   playback.root = [x + off[0] * share, z + off[1] * share, facing];
 }
 

@@ -1,5 +1,5 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
-import { FOOT_LOCK, footLockSettings } from "../generated.js";
+import type { footLockSettings } from "../generated.js";
 import { LEG, SOLES } from "../figures/humanoid/bones.js";
 import { legOf, reach } from "../figures/legs.js";
 import { about, minus, plus, product, rotated, type Vector, Y } from "../motion/rotations.js";
@@ -57,7 +57,7 @@ export function held(
     );
     foot.soles = soles;
     const steps = contact * settings.steps * Math.min(1, moved / (settings.swings * dt));
-    const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(FOOT_LOCK.LIFTS), dt);
+    const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(settings.lifts), dt);
     foot.height = [steps + off, rise];
     const lift = Math.max(0, steps + off - soles[lowest]![1]);
     if (foot.shift[0] || foot.shift[1] || lift)

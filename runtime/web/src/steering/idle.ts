@@ -1,9 +1,10 @@
 /* Figures that stand keep their place, and breathe: docs/reference/bundle.md, "Standing". */
-import { IDLE } from "../generated.js";
+import { IDLE, type idleSettings } from "../generated.js";
 import type { Playback, Target } from "./matching.js";
 import type { Pose as Ground } from "../motion/planar.js";
 import { about, inverse, product, type Quaternion, rotated, STILL, X } from "../motion/rotations.js";
 import { damped, dampingOf } from "../motion/springs.js";
+import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
 
 /** The bones that a breath turns about the x axis of the hips, and by how many times its depth. */
@@ -31,13 +32,14 @@ export function kept(
   [x, z]: Ground,
   target: Target,
   acts: boolean,
+  settings: Settings<typeof idleSettings>,
   dt: number,
 ): Played {
-  const slow = Math.hypot(playback.spring[0], playback.spring[1]) < IDLE.SLOW;
+  const slow = Math.hypot(playback.spring[0], playback.spring[1]) < settings.slow;
   const stands =
-    !target[0] && !target[1] && !acts && slow && pose.contacts.every((contact) => contact > IDLE.STANDS);
+    !target[0] && !target[1] && !acts && slow && pose.contacts.every((contact) => contact > settings.stands);
   const goal = stands ? 1 : 0;
-  const [off, rate] = damped(standing.share - goal, standing.rate, dampingOf(IDLE.SETTLES), dt);
+  const [off, rate] = damped(standing.share - goal, standing.rate, dampingOf(settings.settles), dt);
   Object.assign(standing, { ticks: standing.ticks + 1, share: goal + off, rate });
   const [toX, toZ, facing] = playback.root;
   const rests = goal * standing.share;
@@ -46,13 +48,20 @@ export function kept(
 }
 
 /** A pose with its breath. */
-export function breathed({ ticks, share }: Standing, pose: Played, dt: number): Played {
+export function breathed(
+  { ticks, share }: Standing,
+  pose: Played,
+  settings: Settings<typeof idleSettings>,
+  dt: number,
+): Played {
   if (share <= IDLE.LEAST) return pose;
   const [x, z] = pose.ground;
   const angle =
-    IDLE.DEPTH *
+    settings.depth *
     share *
-    Math.sin(2 * Math.PI * (((ticks * dt) / IDLE.PERIOD) % 1) + IDLE.WAVE[0] * x + IDLE.WAVE[1] * z);
+    Math.sin(
+      2 * Math.PI * (((ticks * dt) / settings.breath) % 1) + settings.wave_x * x + settings.wave_z * z,
+    );
   const rotations = [...pose.rotations];
   let above: Quaternion = STILL;
   for (const { bone, times } of TURNS) {

@@ -1,5 +1,5 @@
 /* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/steering/look_layer.py says. */
-import { LOOK_LAYER } from "../generated.js";
+import { LOOK_LAYER, type lookSettings } from "../generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { BONES, HUMANOID } from "../figures/humanoid/bones.js";
 import {
@@ -16,6 +16,7 @@ import {
   Y,
   Z,
 } from "../motion/rotations.js";
+import type { Settings } from "../settings.js";
 import { clamp } from "../motion/springs.js";
 import type { Played } from "./step.js";
 
@@ -39,15 +40,20 @@ export function ahead(): Look {
 }
 
 /** A pose with the head turned, a tick after the last; the look goes on. */
-export function looked(look: Look, pose: Played, seconds: number): Played {
+export function looked(
+  look: Look,
+  pose: Played,
+  settings: Settings<typeof lookSettings>,
+  seconds: number,
+): Played {
   if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST)) return pose;
   const seen = bonesOf(pose);
   const now = angles(rotated(seen.at(-1)!, Z));
   look.turn = followed(
     look.turn,
-    wanted(look, pose, seen, now),
-    LOOK_LAYER.LEAP,
-    LOOK_LAYER.HALF_LIFE,
+    wanted(look, pose, seen, now, settings),
+    settings.leap,
+    settings.half_life,
     seconds,
   );
   const rotations = [...pose.rotations];
@@ -65,17 +71,18 @@ function wanted(
   pose: Played,
   seen: Quaternion[],
   now: [left: number, up: number],
+  settings: Settings<typeof lookSettings>,
 ): number[] {
   if (!point) return [0, 0];
   const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
-  if (!(size(aim) > LOOK_LAYER.NEAR)) return [0, 0];
+  if (!(size(aim) > settings.near)) return [0, 0];
   const [toSide, up] = angles(aim);
   let left = toSide;
-  if (Math.abs(left) > LOOK_LAYER.BEHIND) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
-  left *= Math.min(Math.hypot(aim[0], aim[2]) / LOOK_LAYER.UNDER, 1);
+  if (Math.abs(left) > settings.behind) left = Math.abs(left) * (now[0] + turn.wanted[0]! < 0 ? -1 : 1);
+  left *= Math.min(Math.hypot(aim[0], aim[2]) / settings.under, 1);
   return [
-    clamp(left, -LOOK_LAYER.MOST[0], LOOK_LAYER.MOST[0]) - now[0],
-    clamp(up, -LOOK_LAYER.MOST[1], LOOK_LAYER.MOST[1]) - now[1],
+    clamp(left, -settings.aside, settings.aside) - now[0],
+    clamp(up, -settings.up, settings.up) - now[1],
   ];
 }
 

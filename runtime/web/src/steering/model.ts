@@ -5,7 +5,12 @@ import {
   MATCHING,
   STEERING,
   actSettings,
+  arrivalSettings,
+  avoidanceSettings,
   footLockSettings,
+  idleSettings,
+  lookSettings,
+  reachSettings,
   steeringSettings,
 } from "../generated.js";
 import { type Act, actOf, reachOf } from "./acts.js";
@@ -41,6 +46,11 @@ export class ControlModel extends Model {
   readonly steerer: Steerer;
   readonly lock: Settings<typeof footLockSettings>;
   readonly acts: Settings<typeof actSettings>;
+  readonly idle: Settings<typeof idleSettings>;
+  readonly look: Settings<typeof lookSettings>;
+  readonly reach: Settings<typeof reachSettings>;
+  readonly arrival: Settings<typeof arrivalSettings>;
+  readonly avoidance: Settings<typeof avoidanceSettings>;
   private taken?: ReadonlyMap<string, readonly Act[]>;
 
   constructor(manifest: Manifest, tables: Tables) {
@@ -51,6 +61,11 @@ export class ControlModel extends Model {
     this.gaits = names;
     this.lock = settingsOf("foot_lock", footLockSettings, manifest.settings.foot_lock);
     this.acts = settingsOf("acting", actSettings, manifest.settings.acting);
+    this.idle = settingsOf("idle", idleSettings, manifest.settings.idle);
+    this.look = settingsOf("look", lookSettings, manifest.settings.look);
+    this.reach = settingsOf("reach", reachSettings, manifest.settings.reach);
+    this.arrival = settingsOf("arrival", arrivalSettings, manifest.settings.arrival);
+    this.avoidance = settingsOf("avoidance", avoidanceSettings, manifest.settings.avoidance);
     const matcher = new Matcher(tables, odd, names.length, steering, this.fps);
     matcher.goals.forEach((goals, gait) => {
       if (!goals.rows.length)

@@ -1,5 +1,5 @@
 /* Hands that reach for points: two-bone inverse kinematics of an arm, within what a shoulder can do, as motet/steering/reach_layer.py says. */
-import { REACH_LAYER } from "../generated.js";
+import { REACH_LAYER, type reachSettings } from "../generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
 import { ARM, BONES, HUMANOID, SIDES, SPINE } from "../figures/humanoid/bones.js";
 import {
@@ -18,6 +18,7 @@ import {
   type Vector,
   Y,
 } from "../motion/rotations.js";
+import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
 import { TwoBones } from "../figures/twoBones.js";
 
@@ -42,7 +43,13 @@ export function idle(): Reach {
 }
 
 /** A pose with the hand of a side there, a tick after the last; the reach goes on. */
-export function reached(hand: Reach, side: number, pose: Played, seconds: number): Played {
+export function reached(
+  hand: Reach,
+  side: number,
+  pose: Played,
+  settings: Settings<typeof reachSettings>,
+  seconds: number,
+): Played {
   const rests = shownBy(hand.weight)[0]! < REACH_LAYER.LEAST;
   if (!hand.point && rests) return pose;
   const wanted = hand.point ?? hand.aim.wanted;
@@ -50,13 +57,13 @@ export function reached(hand: Reach, side: number, pose: Played, seconds: number
   hand.aim = followed(
     rests ? followerAt([...wanted]) : hand.aim,
     [...wanted],
-    REACH_LAYER.LEAP,
-    REACH_LAYER.HALF_LIFE,
+    settings.leap,
+    settings.half_life,
     seconds,
   );
-  hand.weight = followed(hand.weight, [hand.point ? 1 : 0], 0.5, REACH_LAYER.HALF_LIFE, seconds);
-  const { upper, lower, gap } = arm(pose, side, shownBy(hand.aim) as Vector);
-  hand.beyond = !!hand.point && gap > REACH_LAYER.REACHED;
+  hand.weight = followed(hand.weight, [hand.point ? 1 : 0], 0.5, settings.half_life, seconds);
+  const { upper, lower, gap } = arm(pose, side, shownBy(hand.aim) as Vector, settings);
+  hand.beyond = !!hand.point && gap > settings.reached;
   const rotations = [...pose.rotations];
   const [share, bones] = [shownBy(hand.weight)[0]!, ARMS[side]!];
   rotations[bones[1]!] = mixed(rotations[bones[1]!]!, upper, share);
@@ -69,6 +76,7 @@ function arm(
   pose: Played,
   side: number,
   point: Vector,
+  settings: Settings<typeof reachSettings>,
 ): { upper: Quaternion; lower: Quaternion; gap: number } {
   const bones = ARMS[side]!;
   const [shoulder, , , hand] = bones.map((bone) => pose.rotations[bone]!) as [
@@ -85,7 +93,7 @@ function arm(
     offsets[2]!,
     plus(offsets[3]!, rotated(hand, [out(side) * REACH_LAYER.PALM, 0, 0])),
   );
-  const near = within(way, side, ready.longest);
+  const near = within(way, side, ready.longest, settings);
   const { thigh, shin } = ready.turns(near);
   const [up, low] = [product(thigh, READY[side]![0]), product(shin, READY[side]![1])];
   return {
@@ -129,22 +137,25 @@ function readied(side: number, along: Vector, down: Vector): TwoBones {
 }
 
 /** The place nearest to one, from the shoulder, that an arm of a length reaches, turned and stretched no farther than it can be. */
-function within(way: Vector, side: number, longest: number): Vector {
+function within(
+  way: Vector,
+  side: number,
+  longest: number,
+  settings: Settings<typeof reachSettings>,
+): Vector {
+  const widest = Math.cos(settings.widest);
   const [axis, far] = [unit([out(side), 0, 1]), size(way)];
   const along = dot(way, axis);
   const aside = unit(minus(way, times(axis, along)));
-  const edge = plus(
-    times(axis, REACH_LAYER.WIDEST * far),
-    times(aside, Math.sqrt(1 - REACH_LAYER.WIDEST * REACH_LAYER.WIDEST) * far),
-  );
+  const edge = plus(times(axis, widest * far), times(aside, Math.sqrt(1 - widest * widest) * far));
   const [nearest, straight, more] = [
-    REACH_LAYER.NEAREST * longest,
-    REACH_LAYER.STRAIGHT * longest,
-    REACH_LAYER.STRETCHED * longest,
+    settings.nearest * longest,
+    settings.straight * longest,
+    settings.stretched * longest,
   ];
   const over = Math.max(far - straight, 0);
   const eased = over > 0 ? straight + more * (1 - Math.exp(-over / more)) : Math.max(far, nearest);
-  return times(along >= REACH_LAYER.WIDEST * far ? way : edge, eased / Math.max(far, 1e-12));
+  return times(along >= widest * far ? way : edge, eased / Math.max(far, 1e-12));
 }
 
 /** A rotation between two, by a share of the way. */

@@ -1,5 +1,12 @@
 /* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
-import type { footLockSettings } from "../generated.js";
+import type {
+  arrivalSettings,
+  avoidanceSettings,
+  footLockSettings,
+  idleSettings,
+  lookSettings,
+  reachSettings,
+} from "../generated.js";
 import { type Acting, type ActingModel, begin, laid, noAct } from "./actionLayer.js";
 import type { Going } from "./arrival.js";
 import type { Happenings } from "./events.js";
@@ -17,6 +24,11 @@ import type { Played, Steerer } from "./step.js";
 export interface SteeringModel extends ActingModel {
   readonly abilities: Gaits;
   readonly lock: Settings<typeof footLockSettings>;
+  readonly idle: Settings<typeof idleSettings>;
+  readonly look: Settings<typeof lookSettings>;
+  readonly reach: Settings<typeof reachSettings>;
+  readonly arrival: Settings<typeof arrivalSettings>;
+  readonly avoidance: Settings<typeof avoidanceSettings>;
 }
 
 export interface Steered {
@@ -76,26 +88,29 @@ export function hasten(playback: Playback): void {
 export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
   const { playback, acting, command } = figure;
   const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
-  const { steerer, lock: settings, fps } = model;
+  const { steerer, idle: settings, fps } = model;
   const [{ root }, dt] = [playback, 1 / fps];
   const changed = begin(model, acting, playback, target, command.gait);
   const whole = acting.playing?.whole ?? false;
   const played = steerer.tick(playback, target, command.gait);
-  const stood = holdFeet ? kept(figure.standing, played, playback, root, target, whole, dt) : played;
+  const stood = holdFeet
+    ? kept(figure.standing, played, playback, root, target, whole, settings, dt)
+    : played;
   const pose = laid(model, acting, stood, playback, root, changed);
   if (whole && !command.speed) stand(figure);
   return guided(
+    model,
     figure,
-    holdFeet ? held(figure.lock, breathed(figure.standing, pose, dt), settings, dt) : pose,
+    holdFeet ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt) : pose,
     dt,
   );
 }
 
 /** A pose with head and arms as the figure is told. */
-function guided({ look, hands }: Steered, pose: Played, seconds: number): Played {
+function guided(model: SteeringModel, { look, hands }: Steered, pose: Played, seconds: number): Played {
   return hands.reduce(
-    (shown, hand, side) => reached(hand, side, shown, seconds),
-    looked(look, pose, seconds),
+    (shown, hand, side) => reached(hand, side, shown, model.reach, seconds),
+    looked(look, pose, model.look, seconds),
   );
 }
 
