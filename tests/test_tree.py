@@ -13,9 +13,9 @@ LARGE_FUNCTION = 250
 MOST_LARGE_FUNCTIONS = 302
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 923
-MOST_TUPLE_ASSIGNMENTS = 347
-MOST_NESTED_COMPREHENSIONS = 216
+MOST_BANNED_NAMES = 811
+MOST_TUPLE_ASSIGNMENTS = 247
+MOST_NESTED_COMPREHENSIONS = 213
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
