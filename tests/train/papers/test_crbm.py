@@ -55,13 +55,13 @@ def test_controls_are_those_of_the_frame_that_they_drive() -> None:
 def test_the_net_makes_the_end_of_its_past_itself() -> None:
     """Against loops over rows; how many frames it makes is drawn, and all numbers of them are."""
     told = [[torch.rand(len(one), 3, generator=torch.Generator().manual_seed(3)) for one in f] for f in sequences()]
-    data = transitions(sequences(), told, taps=2, onsets=(1.0, 1.0), own=2)
+    data = transitions(sequences(), told, taps=2, onsets=(1.0, 1.0), extra=2)
     windows = [(g, i, t) for g, f in enumerate(sequences()) for i, one in enumerate(f) for t in range(4, len(one))]
     crbm, generator = small_crbm(), torch.Generator().manual_seed(0)
-    layer = CRBMLayer(crbm, data, Learning(1), generator, clamped=True, recall=Past(own=2))
+    layer = CRBMLayer(crbm, data, Learning(1), generator, clamped=True, recall=Past(unrolled=2))
     made = set()
     for _ in range(20):
-        past, control = layer._own(data.past, data.control, 1.0)
+        past, control = layer._unroll(data.past, data.control, 1.0)
         first = sequences()[0][0]
         number = next(n for n in range(3) if _close(past[0], _with_own(crbm, first, told[0][0], 4, n)))
         made.add(number)

@@ -10,28 +10,30 @@ from matplotlib.figure import Figure
 from motet.motion.rotations import Array
 from motet_train.evaluate.figures import SPACING, Drawings, bodies, panels
 from motet_train.papers.tdbn.experiments import gait_control, interrupted, late_left_leg, ramp
-from motet_train.papers.tdbn.study import ControlStudy
+from motet_train.papers.tdbn.study import ControlStudy, Leg
 
-WALK_COLOUR, RUN_COLOUR, BEND_COLOUR = "#2f6fdb", "#d2452f", "#2f9e5b"
+WALK_COLOUR = "#2f6fdb"
+RUN_COLOUR = "#d2452f"
+BEND_COLOUR = "#2f9e5b"
 
 
 def drawings(study: ControlStudy) -> Drawings:
     """The figures that the clips allow: most need two gaits, some legs, the last a motion that ends."""
-    found: dict[str, Callable[[ControlStudy], Figure]] = {"figure-5.2-limit-cycle": limit_cycle}
+    figures: dict[str, Callable[[ControlStudy], Figure]] = {"figure-5.2-limit-cycle": limit_cycle}
     if study.legs is not None:
-        found["figure-5.3-perturbed-walk"] = perturbed_walk
-        found["figure-5.4-synchronisation"] = synchronisation
+        figures["figure-5.3-perturbed-walk"] = perturbed_walk
+        figures["figure-5.4-synchronisation"] = synchronisation
     if study.run is not None:
-        found["figure-5.5-transition"] = transition
-        found["figure-5.6-hysteresis"] = hysteresis
-        found["figure-5.7-bifurcation"] = bifurcation
+        figures["figure-5.5-transition"] = transition
+        figures["figure-5.6-hysteresis"] = hysteresis
+        figures["figure-5.7-bifurcation"] = bifurcation
     if study.run is not None and study.bend is not None:
-        found["figure-5.10-interruption"] = interruption
-    return {name: partial(draw, study) for name, draw in found.items()}
+        figures["figure-5.10-interruption"] = interruption
+    return {name: partial(draw, study) for name, draw in figures.items()}
 
 
 def limit_cycle(study: ControlStudy) -> Figure:
-    """Figure 5.2: a hundred noisy starts end on one loop; where they start and end."""
+    """Figure 5.2: a hundred noisy starts end on one loop; their first and last frames."""
     rng = np.random.default_rng(0)
     clean = np.repeat(study.phases("walk", 20)[0], 5, axis=0)
     frames = study.hold(clean + rng.standard_normal(clean.shape), "walk", 3.0).frames
@@ -55,18 +57,24 @@ def perturbed_walk(study: ControlStudy) -> Figure:
 def synchronisation(study: ControlStudy) -> Figure:
     """Figure 5.4: the thigh's angle of both legs, before and after the left one is made late."""
     before, after = _made_late(study, 2.0)
-    frames, names = np.concatenate([before, after]), study.model.contract.channels
+    frames = np.concatenate([before, after])
     spread = study.loop("walk").frames[:, 0].std(axis=0)
     figure, (axes,) = panels(1, 1, (9, 3.5), "The right leg follows the left one")
     assert study.legs is not None
     for leg, colour, name in zip(study.legs, (RUN_COLOUR, WALK_COLOUR), ("left", "right"), strict=True):
-        top = [c for c in leg.channels if names[c][:-3] == names[leg.channels[0]][:-3]]  # of the topmost joint
-        thigh = top[np.argmax(spread[top])]
+        thigh = _thigh(study, leg, spread)
         axes.plot(np.arange(len(frames)) / study.fps, frames[:, thigh], color=colour, label=name)
     axes.axvline(len(before) / study.fps, color="grey", linestyle=":")
     axes.set(xlabel="seconds", ylabel="thigh, degrees")
     axes.legend()
     return figure
+
+
+def _thigh(study: ControlStudy, leg: Leg, spread: Array) -> int:
+    """The channel of a leg's topmost joint with the largest standard deviation (D,)."""
+    joints = [channel.rpartition(".")[0] for channel in study.model.contract.channels]
+    channels = [channel for channel in leg.channels.tolist() if joints[channel] == joints[leg.channels[0]]]
+    return max(channels, key=lambda channel: float(spread[channel]))
 
 
 def _made_late(study: ControlStudy, seconds: float) -> tuple[Array, Array]:
@@ -77,7 +85,8 @@ def _made_late(study: ControlStudy, seconds: float) -> tuple[Array, Array]:
 
 def transition(study: ControlStudy) -> Figure:
     """Figure 5.5: from walking to running, one figure in four frames."""
-    before, after = study.frames(1.0), study.frames(1.2)
+    before = study.frames(1.0)
+    after = study.frames(1.2)
     track = np.repeat([0.0, 1.0], [before, after])
     frames = study.play(study.start(study.phases("walk", 1)[0]), gait_control(study, track)).frames[:, 0]
     return _strip(study, frames, before, "Control changes from walking to running at the line")
@@ -89,7 +98,8 @@ def hysteresis(study: ControlStudy) -> Figure:
     frames = study.play(study.start(study.phases("walk", 1)[0]), gait_control(study, gait)).frames[:, 0]
     loops = np.concatenate([study.loop(role).frames[:, 0] for role in ("walk", "run")])
     line = _plane(study, loops)(frames)[:, 0]
-    half, sweep = len(gait) // 2, study.frames(5.0)
+    half = len(gait) // 2
+    sweep = study.frames(5.0)
     figure, axes = panels(1, 3, (13, 3.8), "A gait parameter from 0 (walk) to 1 (run) and back in 5 s")
     for panel, part in zip(axes, (slice(0, half), slice(half, None)), strict=False):
         panel.plot(np.arange(half) / study.fps, line[part], color=WALK_COLOUR)
@@ -141,12 +151,12 @@ def interruption(study: ControlStudy) -> Figure:
 
 
 def _plane(study: ControlStudy, frames: Array, *shown: Axes) -> Callable[[Array], Array]:
-    """The projection on the first two principal components of frames, in z units, which the axes show."""
+    """The projection onto the first two principal components of frames in z units; labels the axes."""
     z = study.reference.z(frames)
     mean = z.mean(axis=0)
     components = np.linalg.svd(z - mean, full_matrices=False)[2][:2]
     largest = components[np.arange(2), np.abs(components).argmax(axis=1)]
-    components *= np.sign(largest)[:, None]  # of two directions always the same
+    components *= np.sign(largest)[:, None]  # of the two signs always the same
     for panel in shown:
         panel.set(xlabel="first component, z", ylabel="second component, z")
     return lambda points: (study.reference.z(points) - mean) @ components.T
@@ -157,7 +167,7 @@ def _dots(axes: Axes, points: Array, colour: str, label: str | None = None) -> N
 
 
 def _strip(study: ControlStudy, frames: Array, changed: int, title: str) -> Figure:
-    """Every fourth frame as the player's body, and a line where something changed."""
+    """Every fourth frame as the player's body, with a line where something changed."""
     motion = study.model.contract.features(frames[::4])
     figure, (axes,) = panels(1, 1, (13, 2.6), title)
     bodies(axes, motion, len(motion))

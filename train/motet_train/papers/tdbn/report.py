@@ -1,7 +1,7 @@
-"""All figures of a control model in one nested object with stable keys, and the goals of the one we ship."""
+"""All figures of a control model in one nested object with stable keys, and the goals of the shipped model."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -11,7 +11,7 @@ from motet.papers.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Goals, Report, gathered, reached
 from motet_train.papers.tdbn import experiments
-from motet_train.papers.tdbn.clips import Clips, body_parts, is_periodic
+from motet_train.papers.tdbn.clips import BodyParts, Clips, body_parts, is_periodic
 from motet_train.papers.tdbn.study import ControlStudy, Leg, Reference
 
 # fmt: off
@@ -30,59 +30,70 @@ GOALS: Goals = {
     "random.leap": (None, 26),
 }
 # fmt: on
-"""Figure -> (least, most) that the default recipe is to reach; its clips show walk, run and bend."""
+"""Figure -> (least, most), the goals of the default recipe, whose clips show walk, run and bend."""
 
 
 def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
-    """A model beside the clips it was trained on; DataError where clips and model do not go together.
+    """A model with the clips it was trained on; DataError if clips and model do not match.
 
-    The first two periodic labels are taken for walk and run (those of these names first), the first other for bend.
+    The first two periodic labels stand for walk and run (those of these names first), the first other one for bend.
     Clips of labels that the model does not know are left out.
     """
     channels = model.contract.channels
-    motions, parts = clips.only(model.labels).frames(model.fps, channels), body_parts(clips.skeleton, channels)
+    motions = clips.only(model.labels).frames(model.fps, channels)
+    parts = body_parts(clips.skeleton, channels)
     reference = Reference(motions, np.flatnonzero(np.isin(parts.of_channel, parts.legs)))
-    by_name = sorted(motions, key=lambda label: ("walk", "run").index(label) if label in ("walk", "run") else 2)
+    names = ["walk", "run"]
+    by_name = sorted(motions, key=lambda label: names.index(label) if label in names else 2)
     gaits = [label for label in by_name if is_periodic(motions[label])]
     if not gaits:
         raise DataError("the experiments need clips of a periodic motion, such as walking")
-    run, bend = (next(iter(found), None) for found in (gaits[1:], [label for label in motions if label not in gaits]))
-    # codes are the channels themselves, or as many of each part
-    of_channel = of_code = parts.of_channel
-    if model.codes != len(of_code):
-        of_code = np.repeat(np.arange(len(parts.names)), model.codes // len(parts.names))
-    legs = [Leg(np.flatnonzero(of_channel == part), np.flatnonzero(of_code == part)) for part in parts.legs]
-    return ControlStudy(model, reference, gaits[0], run, bend, (legs[0], legs[1]) if legs else None)
+    run = gaits[1] if len(gaits) > 1 else None
+    bend = next((label for label in motions if label not in gaits), None)
+    return ControlStudy(model, reference, gaits[0], run, bend, _legs(parts, model.codes))
+
+
+def _legs(parts: BodyParts, codes: int) -> tuple[Leg, Leg] | None:
+    """The channels and codes of the left and the right leg, if there are legs."""
+    if not parts.legs:
+        return None
+    # codes are the channels themselves, or the same number of each part
+    of_code = parts.of_channel
+    if codes != len(of_code):
+        of_code = np.repeat(np.arange(len(parts.names)), codes // len(parts.names))
+    left, right = (Leg(np.flatnonzero(parts.of_channel == leg), np.flatnonzero(of_code == leg)) for leg in parts.legs)
+    return left, right
 
 
 def experiments_of(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
-    """For each group of figures the experiments that give them; names are those of CMU's labels."""
-    found: dict[str, list[Callable[..., Mapping[str, float]]]] = {
+    """The experiments of each group of figures; roles are named by CMU's labels."""
+    groups: dict[str, list[Callable[..., Mapping[str, float]]]] = {
         "cycle": [experiments.limit_cycle, experiments.convergence],
         "sync": [experiments.synchronisation],
         "feet": [experiments.standing_feet],
         "random": [experiments.leaps],
     }
     if study.run is not None:
-        found |= {
-            "cycle_run": [partial(experiments.limit_cycle, role="run")],
-            "gait": [experiments.gait_transitions],
-            "hysteresis": [experiments.ramp_hysteresis, experiments.constant_hysteresis],
-            "variety": [experiments.sampled_runs],
-        }
+        groups["cycle_run"] = [partial(experiments.limit_cycle, role="run")]
+        groups["gait"] = [experiments.gait_transitions]
+        groups["hysteresis"] = [experiments.ramp_hysteresis, experiments.constant_hysteresis]
+        groups["variety"] = [experiments.sampled_runs]
         if study.bend is not None:
-            found["bend"] = [experiments.bends, experiments.interruptions]
-    return {name: [partial(run, study) for run in group] for name, group in found.items()}
+            groups["bend"] = [experiments.bends, experiments.interruptions]
+    bound: dict[str, list[Callable[[], Mapping[str, float]]]] = {}
+    for name, group in groups.items():
+        bound[name] = [partial(experiment, study) for experiment in group]
+    return bound
 
 
 def missed_goals(study: ControlStudy, enough: int) -> list[str]:
-    """Goals that a model misses in the experiments that have some, quick ones first; stops at ``enough`` of them."""
+    """The goals that a model misses, by quick experiments first; stops at ``enough`` of them."""
     missed: list[str] = []
     groups = experiments_of(study)
     for group in ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis"):
         for run in groups.get(group, []):
-            named = {f"{group}.{key}": value for key, value in run().items()}
-            wrong = [name for name in named if name in GOALS and not reached(GOALS, name, named[name])]
+            figures = {f"{group}.{key}": value for key, value in run().items()}
+            wrong = [name for name in figures if name in GOALS and not reached(GOALS, name, figures[name])]
             missed += [by_label(study, name) for name in wrong]
             if len(missed) >= enough:
                 return missed
@@ -90,20 +101,26 @@ def missed_goals(study: ControlStudy, enough: int) -> list[str]:
 
 
 def control_report(study: ControlStudy) -> Report:
-    """All experiments. "train" repeats what training measured.
+    """The figures of all experiments, and under "train" those of the training.
 
-    A figure that does not exist (a period of no loop) is NaN, a time that never came infinite.
+    A figure that does not exist, such as the period of no loop, is NaN; a time that is never reached is infinite.
     """
     training: Mapping[str, Any] = study.model.manifest.training
     report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
-    parts = (
-        {by_label(study, name): {by_label(study, key): value for run in group for key, value in run().items()}}
-        for name, group in experiments_of(study).items()
-    )
+    parts = (_figures(study, name, group) for name, group in experiments_of(study).items())
     return report | gathered(parts, study.model.manifest.name)
 
 
+def _figures(study: ControlStudy, name: str, group: Iterable[Callable[[], Mapping[str, float]]]) -> Report:
+    """The figures of a group of experiments, by the labels of the clips."""
+    figures = {}
+    for experiment in group:
+        for key, value in experiment().items():
+            figures[by_label(study, key)] = value
+    return {by_label(study, name): figures}
+
+
 def by_label(study: ControlStudy, name: str) -> str:
-    """The name of a figure, "bend.share_from_run", with the labels of the clips: "wave.share_from_jog"."""
+    """The name of a figure, such as "bend.share_from_run", with the labels of the clips: "wave.share_from_jog"."""
     roles = r"(?<![a-z])(?:walk|run|bend)(?![a-z])"
     return re.sub(roles, lambda role: getattr(study, role[0]) or role[0], name)

@@ -1,9 +1,9 @@
-"""The thesis' family as a figure that travels: its channels say where the root goes, its control values where to.
+"""The thesis' nets as a steered figure that travels: root velocities are channels, and labels are directions.
 
-A control value is one of six numbers from 0 to 1 (:data:`LABELS`). A trained net is steered as a figure of motion
-matching is, so that the same measures see it: each tick a small rule turns speed, direction and facing into the control
-values, the velocity as the figure sees it and a turn by how far its facing is off; what the net says of the velocities
-of the root is where the figure goes.
+There are six control values from 0 to 1 (:data:`LABELS`). A trained net is steered with the interface of motion
+matching, so that the same measures apply: each tick, a simple rule turns speed, direction and facing into control
+values, for the velocity relative to the figure and a turn towards the facing; the root moves by the velocities that the
+net generates.
 """
 
 from collections.abc import Sequence
@@ -35,18 +35,19 @@ from motet_train.runs import Run
 LABELS = ("forward", "backward", "left", "right", "turn_left", "turn_right")
 
 FULL_CONTROL = (4.5, 4.5, 3.0)
-"""What a value of 1 stands for, ahead, aside (m/s) and turning (rad/s)."""
+"""The velocities of a control value of 1: forward and sideways in m/s, turning in rad/s."""
 
 
 def controls_of(velocities: ArrayLike) -> Array:
     """Velocities (..., 3), forward, to the left (m/s) and turning to the left (rad/s), as control values (..., 6)."""
     shares = np.asarray(velocities, dtype=np.float64) / FULL_CONTROL
+    # a value for each direction of each velocity
     both = np.stack([shares, -shares], axis=-1)
     return np.asarray(np.clip(both, 0, 1).reshape(*shares.shape[:-1], len(LABELS)))
 
 
 def course(features: Motion) -> Array:
-    """Velocities (T, 3) of frames in ``root_sixd``: each the mean of the next half second, or to the end."""
+    """Velocities (T, 3) of frames in ``root_sixd``, each the mean over the next half second, or to the end."""
     values = features.select(ROOT_SIXD[:3]).values
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(values, axis=0)])
     start = np.arange(len(values))
@@ -55,7 +56,7 @@ def course(features: Motion) -> Array:
 
 
 GAITS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
-"""The slowest and the fastest that each is asked for, m/s. The net has no gaits: it walks or runs as the speed asks."""
+"""Range of speeds of each gait, m/s. The net has no gaits: it walks or runs depending on the speed."""
 
 TDBN = TDBNConfig(
     hidden_per_part=60,
@@ -83,37 +84,46 @@ RECIPES = {
     "recorded-past": Recipe("control", "tdbn", "session", replace(TDBN, own=0, past_noise=0.3)),
     "crbm": Recipe("control", "angle-crbm", "session", CRBM),
 }
-"""The deep net; the same as the thesis has it, whose past is always the recorded one; and Taylor's, without the RBM."""
+"""The deep net; the same with the thesis' training, on recorded pasts only; and Taylor's net, without the RBM."""
 
 
 def train_steered(store: Store, job: Job, data: str = "") -> Run:
     """Train on the recordings of a store in ``root_sixd`` that show :data:`GAITS`, and on their mirror images.
 
-    DataError where a gait has none, or where the store is in another representation.
+    DataError if a gait has no recording, or the store is in another representation.
     """
     if store.representation != "root_sixd":
         raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
-    shown = {gait.name: gait for gait in gaits_of(store)}
-    found = recordings(store, tuple(shown.get(name, Gait(name, (), ())) for name in GAITS))
-    contract, motions = mirrored_too(store, found)
-    controls = [controls_of(course(motion)) for motion in motions]
+    known = {gait.name: gait for gait in gaits_of(store)}
+    gaits = tuple(known.get(name, Gait(name, (), ())) for name in GAITS)
+    recorded = recordings(store, gaits)
+    contract, motions = mirrored_too(store, recorded)
     assert contract.skeleton is not None
     config = replace(job.recipe.config, fps=store.fps)
     net = untrained(config, contract.skeleton, contract.channels, len(LABELS))
     net.measure_by(contract.mean, contract.std * config.sigma)
-    beginnings = [one.features.values[: config.taps] for one in found if len(one.features) >= config.taps]
-    stillest = min(beginnings, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
-    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, stillest.round(6).tolist())}
-    about = {"data": {"name": data, "recordings": len(found), "frames": sum(map(len, motions))}}
+    control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, _start(recorded, config.taps))}
+    about = {"data": {"name": data, "recordings": len(recorded), "frames": sum(map(len, motions))}}
     manifest = job.manifest(contract, net.to_config(), net.defaults, None, about, control=control)
-    return train_lessons(net, job, manifest, Lessons([[motion.values for motion in motions]], [controls], [1.0]))
+    # one group, so that long recordings weigh as much as short ones
+    sequences = [motion.values for motion in motions]
+    controls = [controls_of(course(motion)) for motion in motions]
+    return train_lessons(net, job, manifest, Lessons([sequences], [controls], [1.0]))
 
 
-def mirrored_too(store: Store, found: Sequence[Recording]) -> tuple[MotionContract, list[Motion]]:
-    """The recordings and their mirror images, and the contract with the mean and deviation of all of them."""
-    motions = [one.features for one in found]
-    plain = np.zeros(len(store.channels))
-    contract = MotionContract("root_sixd", store.channels, store.units, store.fps, plain, plain + 1, store.skeleton)
+def _start(recorded: Sequence[Recording], taps: int) -> list[list[float]]:
+    """The first frames of the recording that begins with the least movement of the root."""
+    beginnings = [recording.features.values[:taps] for recording in recorded if len(recording.features) >= taps]
+    stillest = min(beginnings, key=lambda frames: float(np.abs(frames[:, : len(ROOT_SIXD) - 1]).sum()))
+    start: list[list[float]] = stillest.round(6).tolist()
+    return start
+
+
+def mirrored_too(store: Store, recorded: Sequence[Recording]) -> tuple[MotionContract, list[Motion]]:
+    """Recordings and their mirror images, and the contract with the mean and standard deviation of all of them."""
+    motions = [recording.features for recording in recorded]
+    zero = np.zeros(len(store.channels))
+    contract = MotionContract("root_sixd", store.channels, store.units, store.fps, zero, zero + 1, store.skeleton)
     motions += [replace(motion, values=contract.mirror(motion.values)) for motion in motions]
     every = np.concatenate([motion.values for motion in motions])
     return replace(contract, mean=every.mean(axis=0), std=living(every.std(axis=0), store.units)), motions
@@ -121,39 +131,42 @@ def mirrored_too(store: Store, found: Sequence[Recording]) -> tuple[MotionContra
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """A control model with :data:`LABELS`, to be measured in place of :class:`motet.steering.model.SteerModel`: the
-    part of it that measures use."""
+    """A control model with :data:`LABELS` in place of :class:`motet.steering.model.SteerModel`, with the part of its
+    interface that measures use."""
 
     model: TdbnModel
     gaits: tuple[str, ...] = tuple(GAITS)
 
     @staticmethod
     def fits(model: TdbnModel) -> bool:
-        """Whether a model is such a net."""
+        """Whether a model can be steered."""
         return model.labels == LABELS and model.contract.representation == "root_sixd"
 
     @property
     def fps(self) -> float:
-        """Ticks a second."""
+        """Ticks per second."""
         return self.model.fps
 
     @property
     def speeds(self) -> dict[str, tuple[float, float]]:
-        """The slowest and the fastest that each gait is asked for, m/s."""
+        """The slowest and the fastest speed of each gait, m/s."""
         return GAITS
 
     def start(self, start: str | None = None, *, characters: int = 1, hold_feet: bool = True) -> "DrivenSession":
-        """A session of figures that stand, whatever the gait. hold_feet: with the foot lock."""
+        """A session of standing figures; ``start`` is ignored. hold_feet: with the foot lock."""
         return DrivenSession(self.model, characters, hold_feet)
 
 
 class DrivenSession:
-    """Figures that are told what :class:`motet.steering.session.SteerSession` is told."""
+    """Figures with the commands of :class:`motet.steering.session.SteerSession`."""
 
     def __init__(self, model: TdbnModel, characters: int, hold_feet: bool) -> None:
-        self.session, self.fps = model.start(characters=characters), model.fps
+        self.session = model.start(characters=characters)
+        self.fps = model.fps
         self.ground = np.zeros((characters, 3))
-        self.told = np.zeros((3, characters))
+        self.speed = np.zeros(characters)
+        self.direction = np.zeros(characters)
+        self.facing = np.zeros(characters)
         self.lock = FootLock(characters, 1 / self.fps) if hold_feet else None
 
     def control(
@@ -164,45 +177,54 @@ class DrivenSession:
         direction: ArrayLike | None = None,
         facing: ArrayLike | None = None,
     ) -> None:
-        """As a steered figure is told; the gait says nothing to the net."""
+        """Set the commands of a steered figure, angles in degrees; the gait is ignored."""
         if speed is not None:
-            self.told[0] = speed
-        for row, angles in ((1, direction), (2, direction if facing is None else facing)):
-            if angles is not None:
-                self.told[row] = np.radians(angles)
+            self.speed[:] = speed
+        if direction is not None:
+            self.direction[:] = np.radians(direction)
+        facing = direction if facing is None else facing
+        if facing is not None:
+            self.facing[:] = np.radians(facing)
 
     @property
     def target(self) -> Array:
-        """What the figures were told (B, 3): velocity along x and z, m/s, and facing, radians."""
-        speed, direction, facing = self.told
-        return np.stack([speed * np.sin(direction), speed * np.cos(direction), facing], axis=1)
+        """The commanded velocity along x and z in m/s, and facing in radians, (B, 3)."""
+        x = self.speed * np.sin(self.direction)
+        z = self.speed * np.cos(self.direction)
+        return np.stack([x, z, self.facing], axis=1)
 
     def tick(self) -> Pose:
         """The next pose of all figures."""
-        speed, direction, facing = self.told
-        aside, off = direction - self.ground[:, 2], wrapped(facing - self.ground[:, 2])
-        # it is told to turn by 3 rad/s for each radian that its facing is off
-        velocities = np.stack([speed * np.cos(aside), speed * np.sin(aside), 3.0 * off], axis=-1)
+        # the velocity relative to the figure
+        heading = self.ground[:, 2]
+        angle = self.direction - heading
+        forward = self.speed * np.cos(angle)
+        left = self.speed * np.sin(angle)
+        # a turn of 3 rad/s for each radian of error in the facing
+        turn = 3.0 * wrapped(self.facing - heading)
+        velocities = np.stack([forward, left, turn], axis=-1)
         self.session.set_control(controls_of(velocities))
         pose = self.pose(self.session.step())
         return pose if self.lock is None else self.lock.held(pose)
 
     def pose(self, frames: Floats) -> Pose:
-        """The pose of frames (B, D), one tick after the last."""
+        """The pose of frames (B, D), one tick after the last pose."""
         values = frames.astype(np.float64)
+        # the root moves by its velocities
         self.ground = moved(self.ground, values[:, : len(ROOT_SIXD) - 1] / self.fps)
         quats = rotmat_to_quat(sixd_to_rotmat(values[:, len(ROOT_SIXD) :].reshape(len(values), -1, 6)))
         unknown = np.zeros((len(values), 2), dtype=np.float32)
         pose = Pose(self.ground, quats.astype(np.float32), frames[:, len(ROOT_SIXD) - 1], unknown)
-        turned, places = (part.astype(np.float64) for part in pose.global_transforms())
-        heights = sole_points(quat_to_rotmat(turned), places)[..., 1].reshape(len(pose), 2, 3).min(axis=2)
-        # the net says nothing of contacts: a foot stands, for the foot lock, by the height of its lowest point
+        # the net knows no contacts: for the foot lock, a foot stands if its lowest point is low
+        rotations, places = (part.astype(np.float64) for part in pose.global_transforms())
+        heights = sole_points(quat_to_rotmat(rotations), places)[..., 1].reshape(len(pose), 2, 3).min(axis=2)
         contacts = standing(heights, None, ContactSettings(heights=(0.03, 0.03))).astype(np.float32)
         return replace(pose, contacts=contacts)
 
 
 def moved(ground: Array, steps: Array) -> Array:
-    """Places (B, 3), x, z and facing, after steps (B, 3), forward, to the left and turned, as the figures see them."""
+    """Places (B, 3) of x, z and facing after steps (B, 3) forward, left and turning, relative to the figures."""
     forward, left, turn = steps.T
-    sin, cos = np.sin(ground[:, 2]), np.cos(ground[:, 2])
+    sin = np.sin(ground[:, 2])
+    cos = np.cos(ground[:, 2])
     return np.asarray(ground + np.stack([forward * sin + left * cos, forward * cos - left * sin, turn], axis=-1))

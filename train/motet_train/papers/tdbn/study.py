@@ -1,12 +1,13 @@
-"""A control model under study: runs from any state, with all their codes, beside the training motions.
+"""A control model under study: runs from any state, with all their codes, compared with the training motions.
 
-A frame is compared in z units: each channel over its standard deviation in all training frames, channels that are
-constant there left out. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
+Frames are compared in z units: each channel relative to its standard deviation in all training frames, without channels
+that are constant there. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -22,52 +23,58 @@ from motet_train.papers.tdbn.clips import period
 Codes = NDArray[np.floating[Any]]
 
 ARRIVED = 0.25
-"""z: a pose nearer to a loop than this is on it. As near as the frames of one recorded cycle of 39_14 are to another of
-its cycles (median .25; 09_07 .30), and a fifth of the distance between the loops of walking and running."""
+"""Largest distance in z of a pose on a loop: that of the frames of one recorded cycle of 39_14 from another (median
+.25; 09_07 .30), and a fifth of the distance between the loops of walking and running."""
 
 
 def upsample(frames: Array) -> Array:
-    """Frames (T, D) with three linear ones between each two."""
+    """Frames (T, D) with three linearly interpolated ones between each two."""
     return lines(frames, np.arange((len(frames) - 1) * 4 + 1) / 4)
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The training motions that a run is measured against.
+    """The training motions with which a run is compared.
 
-    motions: label -> sequences (T, D) at the model's frame rate.
-    legs: indices of the leg channels.
+    motions: label -> sequences (T, D) at the model's frame rate. legs: indices of the leg channels.
     """
 
     motions: Mapping[str, Sequence[Array]]
     legs: NDArray[np.intp]
 
+    @property
+    def clips(self) -> list[Array]:
+        """The sequences of all labels."""
+        return list(chain.from_iterable(self.motions.values()))
+
     @cached_property
     def std(self) -> Array:
-        """Standard deviation (D,) over all training frames, infinite where a channel is constant."""
-        std = np.concatenate([clip for clips in self.motions.values() for clip in clips]).std(axis=0)
+        """Standard deviation (D,) over all training frames, infinite for constant channels."""
+        std = np.concatenate(self.clips).std(axis=0)
         return np.where(std < LIVING_STD["deg"], np.inf, std)
 
     def z(self, frames: Array) -> Array:
-        """Frames (..., D) in z units, without a mean, of the channels that move."""
+        """The moving channels of frames (..., D) in z units; the mean is not subtracted."""
         moving = np.isfinite(self.std)
         return np.asarray(frames, dtype=np.float64)[..., moving] / self.std[moving]
 
     def leg_angles(self, frames: Array) -> Array:
-        """The leg channels that move, of frames (..., D)."""
+        """The moving leg channels of frames (..., D)."""
         legs = np.intersect1d(self.legs, np.flatnonzero(np.isfinite(self.std)))
         return np.asarray(frames, dtype=np.float64)[..., legs]
 
     def distance(self, frames: Array, points: Array) -> Array:
         """RMS z (...) from frames (..., D) to the nearest of points (N, D); infinite for frames that are not finite."""
-        from sklearn.metrics import pairwise_distances_argmin  # for this alone, so that other trainings do not load it
+        from sklearn.metrics import pairwise_distances_argmin  # here, so that other trainings do not load scikit-learn
 
         z = self.z(frames)
         flat = z.reshape(-1, z.shape[-1])
-        finite = np.isfinite(flat).all(axis=1)
         distance = np.full(len(flat), np.inf)
-        near = self.z(points)[pairwise_distances_argmin(flat[finite], self.z(points))] if finite.any() else flat[finite]
-        distance[finite] = np.linalg.norm(flat[finite] - near, axis=1) / np.sqrt(flat.shape[1])
+        finite = np.isfinite(flat).all(axis=1)
+        if finite.any():
+            targets = self.z(points)
+            nearest = targets[pairwise_distances_argmin(flat[finite], targets)]
+            distance[finite] = np.linalg.norm(flat[finite] - nearest, axis=1) / np.sqrt(flat.shape[1])
         return distance.reshape(z.shape[:-1])
 
     def jumps(self, frames: Array) -> Array:
@@ -77,18 +84,19 @@ class Reference:
     @cached_property
     def largest_jump(self) -> float:
         """The largest change from frame to frame in the training motions."""
-        return max(float(self.jumps(clip).max()) for clips in self.motions.values() for clip in clips)
+        return max(float(self.jumps(clip).max()) for clip in self.clips)
 
     def period(self, label: str) -> float:
         """The period of a training motion in frames, the mean over its sequences."""
         return float(np.mean([period(self.leg_angles(clip)) for clip in self.motions[label]]))
 
     def energy_ratio(self, frames: Array, label: str) -> float:
-        """Leg energy of frames (T, D) over that of a training motion: mean squared change of the leg angles."""
-        own, *data = (
-            float((np.diff(self.leg_angles(one), axis=0) ** 2).mean()) for one in (frames, *self.motions[label])
-        )
-        return own / float(np.mean(data))
+        """Leg energy of frames (T, D) relative to a training motion: the mean squared change of the leg angles."""
+        training = [self._leg_energy(clip) for clip in self.motions[label]]
+        return self._leg_energy(frames) / float(np.mean(training))
+
+    def _leg_energy(self, frames: Array) -> float:
+        return float((np.diff(self.leg_angles(frames), axis=0) ** 2).mean())
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +107,7 @@ class Recording:
     codes: Codes
 
     def histories(self, times: ArrayLike, taps: int, row: int = 0) -> Codes:
-        """The histories (N, K, H) just after given frames of one character."""
+        """The histories (N, K, H) just after some frames of one character."""
         return np.stack([self.codes[time - taps + 1 : time + 1, row] for time in np.asarray(times, dtype=int)])
 
 
@@ -113,10 +121,10 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class ControlStudy:
-    """A control model beside its training motions, with the loops that several experiments need.
+    """A control model with its training motions, and the loops that several experiments need.
 
-    walk, run: the labels of two periodic motions, run None where there is one; bend: of one that ends, or None.
-    legs: the left and the right one, where the skeleton has legs.
+    walk, run: the labels of two periodic motions; run is None if there is only one. bend: the label of a motion that
+    ends, or None. legs: the left and the right one, if the skeleton has legs.
     """
 
     model: TdbnModel
@@ -151,7 +159,8 @@ class ControlStudy:
 
     def play(self, session: TdbnSession, track: Array, force: Callable[[int, Codes], None] | None = None) -> Recording:
         """Run a control track (T, L) or (T, B, L); ``force(t, codes)`` may overwrite a tick's codes (B, H) in place."""
-        frames, codes = [], []
+        frames = []
+        codes = []
         for time, control in enumerate(track):
             session.set_control(control)
             frames.append(session.step())
@@ -173,9 +182,10 @@ class ControlStudy:
         return self.model.encode(clip[frame : frame + self.model.taps])[None]
 
     def loop(self, role: str) -> Recording:
-        """A noiseless run on a gait's loop: after 10 s a free run is on it, and 3 s are a few cycles."""
+        """A noiseless run of 3 s, a few cycles, on a gait's loop, which a free run has reached after 10 s."""
         if role not in self._loops:
-            whole, start = self.hold(self.training_history(role), role, 13.0), self.frames(10.0)
+            whole = self.hold(self.training_history(role), role, 13.0)
+            start = self.frames(10.0)
             self._loops[role] = Recording(whole.frames[start:], whole.codes[start:])
         return self._loops[role]
 
@@ -188,13 +198,14 @@ class ControlStudy:
         return upsample(self.loop(role).frames[:, 0])
 
     def cycle(self, role: str) -> float:
-        """The period in frames of a gait's loop; one second where it has none, so that experiments still run."""
+        """The period in frames of a gait's loop, or a second if it has none, so that experiments still run."""
         cycle = period(self.reference.z(self.loop(role).frames[:, 0]))
         return cycle if np.isfinite(cycle) else self.fps
 
     def phases(self, role: str, count: int) -> tuple[Codes, Array]:
         """Histories (count, K, H) at equal phases of a gait's loop, and the frames (count, D) they ended with."""
-        taps, loop = self.model.taps, self.loop(role)
+        taps = self.model.taps
+        loop = self.loop(role)
         times = [int(taps + round(i * self.cycle(role) / count)) for i in range(count)]
         return loop.histories(times, taps), loop.frames[times, 0]
 
@@ -203,6 +214,7 @@ class ControlStudy:
         return arrival(self.reference.distance(frames, self.loop_points(role)) < ARRIVED, self.fps)
 
     def nearer_to_run(self, frames: Array) -> NDArray[np.bool_]:
-        """Which of frames (..., D) are nearer to the running loop than to the walking one."""
-        walk, run = (self.reference.distance(frames, self.loop_points(role)) for role in ("walk", "run"))
-        return run < walk
+        """Whether each of frames (..., D) is nearer to the running loop than to the walking one."""
+        to_walk = self.reference.distance(frames, self.loop_points("walk"))
+        to_run = self.reference.distance(frames, self.loop_points("run"))
+        return to_run < to_walk

@@ -37,8 +37,11 @@ from motet_train.papers.tdbn.rbm import (
 
 @dataclass(frozen=True, eq=False)
 class Lessons:
-    """For each group, such as the clips of a label, sequences (T, D), control values (T, L) of their frames, and
-    onsets: see :func:`motet_train.papers.tdbn.rbm.transitions`. Arrays; tensors for the net's stages."""
+    """Training data of a control net, for each group, such as the clips of a label.
+
+    sequences: (T, D). controls: control values (T, L) of their frames. onsets: see
+    :func:`motet_train.papers.tdbn.rbm.transitions`. Arrays, or tensors for the stages of a net.
+    """
 
     sequences: Sequence[Sequence[Any]]
     controls: Sequence[Sequence[Any]]
@@ -46,28 +49,31 @@ class Lessons:
 
 
 class ControlNet(Net):
-    """A CRBM over codes of frames; subclasses say how frames become codes, and codes frames.
+    """A CRBM over codes of frames; subclasses encode and decode frames.
 
-    config: sizes and training, see the subclasses. given: what they are made with beside it, ``labels`` too.
-    noise_units: N.
+    config: sizes and training, see the subclasses. sizes: the other arguments of their constructors, among them
+    ``labels``. noise_units: N.
     """
 
     expansion: Tensor
 
-    def __init__(self, config: Any, crbm: CRBM, width: int, **given: Any) -> None:
+    def __init__(self, config: Any, crbm: CRBM, width: int, **sizes: Any) -> None:
         super().__init__(width)
-        self.config, self.crbm, self.given = config, crbm, given
-        self.noise_units, labels = len(crbm.visible_bias), given["labels"]
+        self.config = config
+        self.crbm = crbm
+        self.sizes = sizes
+        self.noise_units = len(crbm.visible_bias)
+        labels = sizes["labels"]
         # each label has its own control units, which are all 1 or all 0 (thesis 5.4)
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
 
     @property
     def defaults(self) -> dict[str, float]:
-        """How a session runs that is told nothing else."""
+        """The default options of a session."""
         return {"temperature": self.config.temperature}
 
     def normalised(self, frames: Tensor) -> Tensor:
-        """Frames (B, D) as Gaussian units of variance 1 see them: over sigma standard deviations."""
+        """Frames (B, D) in units of sigma standard deviations, for Gaussian units of variance 1."""
         return normalised(frames, self.mean, self.scale, Z_LIMIT / self.config.sigma)
 
     @abstractmethod
@@ -79,25 +85,27 @@ class ControlNet(Net):
         """Codes (B, H) to frames (B, D)."""
 
     def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
-        """Codes (B, H) between their means (variety 0) and samples, here binary (variety 1), by noise (B, N)."""
+        """Codes (B, H) between their means (variety 0) and binary samples (variety 1), by noise (B, N)."""
         return mean + variety * ((noise < mean).to(mean.dtype) - mean)
 
     def to_config(self) -> dict[str, Any]:
-        """Everything that :meth:`from_config` needs, but for tuples ready for JSON."""
-        return {**asdict(self.config), **self.given}
+        """The arguments of :meth:`from_config`; apart from tuples, ready for JSON."""
+        return {**asdict(self.config), **self.sizes}
 
     @classmethod
     def from_config(cls, config: Mapping[str, Any]) -> Self:
         """An untrained net of the sizes that :meth:`to_config` wrote."""
-        own = {key: config[key] for key in config if key in get_type_hints(cls.CONFIG)}
-        return cls(configured(cls.CONFIG, own), **{key: config[key] for key in config if key not in own})
+        names = get_type_hints(cls.CONFIG).keys()
+        settings = {key: value for key, value in config.items() if key in names}
+        sizes = {key: value for key, value in config.items() if key not in names}
+        return cls(configured(cls.CONFIG, settings), **sizes)
 
     @abstractmethod
     def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], Mapping[str, nn.Module]]:
-        """How the net, with its mean and scale, learns layer after layer (thesis 3.3), and what else has a state."""
+        """The training of the net, layer after layer (thesis 3.3), and further parts that have a state."""
 
     def begin_crbm(self, generator: torch.Generator) -> None:
-        """Set the first weights of the CRBM."""
+        """Initialise the weights of the CRBM."""
         for parameter in self.crbm.parameters():
             parameter.zero_()
         for weight in (self.crbm.past_weight, self.crbm.hidden_weight, self.crbm.free_past_weight):
@@ -105,11 +113,15 @@ class ControlNet(Net):
                 weight.normal_(0.0, self.config.initial, generator=generator)
 
     def crbm_layer(self, lessons: Lessons, generator: torch.Generator, past: Past, clamped: bool = True) -> CRBMLayer:
-        """The CRBM as what learns, from sequences encoded as they are now."""
-        codes = [[self.encode(frames) for frames in found] for found in lessons.sequences]
-        units = [[values @ self.expansion for values in found] for found in lessons.controls]
-        data = transitions(codes, units, self.config.taps, lessons.onsets, past.own)
+        """The training of the CRBM on sequences in the present codes."""
+        codes = [list(map(self.encode, group)) for group in lessons.sequences]
+        units = [list(map(self._units, group)) for group in lessons.controls]
+        data = transitions(codes, units, self.config.taps, lessons.onsets, past.unrolled)
         return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
+
+    def _units(self, control: Tensor) -> Tensor:
+        """Control values (..., L) as control units (..., C)."""
+        return control @ self.expansion
 
     def step(
         self,
@@ -120,47 +132,65 @@ class ControlNet(Net):
         temperature: Tensor,
         codes: Tensor | None = None,
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """One Gibbs iteration of the CRBM, and its codes decoded (thesis 4.1, 5.2).
+        """One Gibbs iteration of the CRBM, with its codes decoded (thesis 4.1, 5.2).
 
         history (B, K, H) oldest first, control (B, L), noise (B, N+F) uniform in [0, 1), variety (B, 1), temperature
-        (B, 1), and where there are free units codes (B, H) to infer them from -> codes (B, H), frame (B, D), the
+        (B, 1), and, if there are free units, codes (B, H) to infer them from -> codes (B, H), frame (B, D), and the
         history with the codes at its end (B, K, H).
         """
-        crbm, units, past = self.crbm, self.noise_units, history.flatten(1)
-        drive = crbm.drive(past, control @ self.expansion)
+        crbm = self.crbm
+        units = self.noise_units
+        # drive from the past and the control units
+        past = history.flatten(1)
+        drive = crbm.drive(past, self._units(control))
+        # free units, inferred from the codes of the last iteration
         free = drive[:, :0]
         if codes is not None:
             free = ControlNet.vary(self, crbm.free(codes, past, temperature), noise[:, units:], variety)
-        new = self.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
-        return new, self.decode(new), torch.cat([history[:, 1:], new[:, None]], dim=1)
+        # codes, and the frame that they decode to
+        next_codes = self.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
+        next_history = torch.cat([history[:, 1:], next_codes[:, None]], dim=1)
+        return next_codes, self.decode(next_codes), next_history
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract."""
-        codes, channels, free = (len(self.crbm.visible_bias),), (len(self.mean),), self.crbm.free_units
-        history, control, noise = (self.config.taps, *codes), (len(self.expansion),), (self.noise_units + free,)
-        inputs = {"history": history, "control": control, "noise": noise, "variety": (1,), "temperature": (1,)}
-        outputs = {"next_codes": codes, "frame": channels, "next_history": history}
-
-        def specs(sizes: Mapping[str, tuple[int, ...]]) -> tuple[TensorSpec, ...]:
-            return tuple(TensorSpec(name, ("batch", *size)) for name, size in sizes.items())
-
-        given = specs({**inputs, "codes": codes} if free else inputs)
-        step = GraphSpec(given, specs(outputs), {"history": "next_history"})
-        encoder = GraphSpec(specs({"frames": channels}), specs({"codes": codes}))
+        codes = len(self.crbm.visible_bias)
+        channels = len(self.mean)
+        free = self.crbm.free_units
+        inputs = [
+            _spec("history", self.config.taps, codes),
+            _spec("control", len(self.expansion)),
+            _spec("noise", self.noise_units + free),
+            _spec("variety", 1),
+            _spec("temperature", 1),
+        ]
+        if free:
+            inputs.append(_spec("codes", codes))
+        outputs = (
+            _spec("next_codes", codes),
+            _spec("frame", channels),
+            _spec("next_history", self.config.taps, codes),
+        )
+        step = GraphSpec(tuple(inputs), outputs, {"history": "next_history"})
+        encoder = GraphSpec((_spec("frames", channels),), (_spec("codes", codes),))
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+
+
+def _spec(name: str, *sizes: int) -> TensorSpec:
+    return TensorSpec(name, ("batch", *sizes))
 
 
 @dataclass(frozen=True)
 class TDBNConfig:
-    """Sizes of the net and how it is trained; the defaults are the recipe of the shipped bundle.
+    """Sizes and training of the net; the defaults are the recipe of the shipped bundle.
 
-    root_rotation: whether it is among the channels: 59 of CMU's skeleton, else the thesis' 56. control_units: for each
-    label. clamped: whether they keep their values in the reconstruction. sigma: standard deviation of a visible unit,
-    in units of its channel's own: smaller codes say more. past_noise, own: see :class:`Past`. onset: how many times as
-    often the first window of a motion that ends is drawn as its last. temperature: of the codes and of generation;
-    learning anneals from 1 to it. initial: standard deviation of the first weights. restarts: RBMs that learn side by
-    side: which features they find decides how the net moves. tries: CRBMs learned on each of them at the most, while
-    none satisfies.
+    root_rotation: whether it is among the channels: 59 of CMU's skeleton, otherwise the thesis' 56. control_units: for
+    each label. clamped: whether they keep their values in the reconstruction. sigma: standard deviation of a visible
+    unit relative to its channel's: with a smaller one, codes are more precise. past_noise, own: noise and unrolled of
+    :class:`Past`. onset: how many times as often the first window of a motion that ends is drawn as its last.
+    temperature: of the codes and of generation; learning anneals from 1 to it. initial: standard deviation of the first
+    weights. restarts: RBMs that learn side by side; their features decide how the net moves. tries: most CRBMs trained
+    on each of them until a net reaches its goals.
     """
 
     fps: float = 40.0
@@ -184,7 +214,8 @@ class TDBNConfig:
     @staticmethod
     def thesis() -> "TDBNConfig":
         """The thesis' text: 56 angles, control units unclamped in the reconstruction, no annealing (5.2 to 5.4)."""
-        rbm, crbm = (Learning(epochs, temperature=(1.0, 1.0)) for epochs in (1000, 100))
+        rbm = Learning(1000, temperature=(1.0, 1.0))
+        crbm = Learning(100, temperature=(1.0, 1.0))
         net = TDBNConfig(root_rotation=False, control_units=7, rbm=rbm, crbm=crbm)
         return replace(net.unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
 
@@ -194,9 +225,9 @@ class TDBNConfig:
 
 
 class TDBN(ControlNet):
-    """The net with its normalisation: degrees in, codes as state, degrees out.
+    """The temporal deep belief net with its normalisation: degrees in, codes as state, degrees out (thesis 4).
 
-    parts: the body part of each channel (D). labels: how many (L).
+    parts: the body part of each channel (D). labels: their number (L).
     """
 
     CONFIG = TDBNConfig
@@ -217,35 +248,44 @@ class TDBN(ControlNet):
         return self.rbm.decode(codes) * self.scale + self.mean
 
     def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], dict[str, RBM]]:
-        """The RBM, then the CRBM again and again with other random numbers: ``tries`` times on each of the
-        ``restarts`` of the RBM, which are what else has a state."""
+        """The RBM, then the CRBM several times with other random numbers.
+
+        There are ``tries`` of these on each of the ``restarts`` of the RBM, which are the parts that have a state.
+        """
         config = self.config
         rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
-        frames = self.normalised(torch.cat([frames for found in lessons.sequences for frames in found]))
-        uniform = balanced([torch.ones(sum(map(len, found))) for found in lessons.sequences]).to(self.mean.device)
-        past = Past(config.past_noise, own=config.own)
+        past = Past(config.past_noise, unrolled=config.own)
 
-        def lower() -> None:
+        def begin_rbm() -> None:
             rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
 
-        def upper(number: int) -> None:
+        def begin_crbm(number: int) -> None:
             self.rbm.take(rbms, number)
             self.begin_crbm(generator)
 
-        rbm = partial(RBMLayer, rbms, frames, uniform, config.rbm, generator)
+        rbm = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
         crbm = partial(self.crbm_layer, lessons, generator, past, config.clamped)
-        numbers = list(range(config.restarts)) * config.tries
-        tries = [Stage(config.crbm.epochs, partial(upper, number), crbm, whole=True) for number in numbers]
-        return [Stage(config.rbm.epochs, lower, rbm, whole=False), *tries], {"rbms": rbms}
+        stages = [Stage(config.rbm.epochs, begin_rbm, rbm, whole=False)]
+        for _ in range(config.tries):
+            for number in range(config.restarts):
+                stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, whole=True))
+        return stages, {"rbms": rbms}
+
+    def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
+        """All frames (N, D), normalised, and their probabilities (N,), the same for each group."""
+        groups = [torch.cat(list(group)) for group in lessons.sequences]
+        frames = self.normalised(torch.cat(groups))
+        return frames, balanced([torch.ones(len(group)) for group in groups]).to(self.mean.device)
 
 
 @dataclass(frozen=True)
 class AngleCRBMConfig:
-    """Sizes of the net and how it is trained, as of :class:`TDBNConfig`.
+    """Sizes and training of the net, as in :class:`TDBNConfig`.
 
-    Several control units act as one whose weights learn that many times as fast. past_rate: the first one of the
-    weights from the past to the visible units. Taylor's rates, 1e-3 and 1e-5 for these, are for gradients summed over a
-    mini-batch; ours are means, so that they are 20 times as large here: 2e-2 and 2e-4. iterations: of Gibbs, a frame.
+    Several control units act as one whose weights learn that many times as fast. past_rate: first learning rate of the
+    weights from the past to the visible units. Taylor's rates, 1e-3, and 1e-5 for these weights, are for gradients
+    summed over a mini-batch of 20; ours are means, so that the same rates are 2e-2 and 2e-4. iterations: Gibbs
+    iterations per frame.
     """
 
     fps: float = 40.0
@@ -266,10 +306,10 @@ class AngleCRBMConfig:
 
 
 class AngleCRBM(ControlNet):
-    """A conditional RBM straight on the joint angles (Taylor 2007), which the thesis builds on, with its normalisation.
+    """A conditional RBM on the joint angles (Taylor 2007), on which the thesis builds, with its normalisation.
 
-    The visible units, and codes, are the z-scored angles, Gaussian with unit variance; there is no RBM below.
-    channels: how many (D). labels: how many (L).
+    The visible units, and codes, are the z-scored angles, Gaussian with unit variance; there is no RBM below. channels:
+    their number (D). labels: their number (L).
     """
 
     CONFIG = AngleCRBMConfig
@@ -288,17 +328,17 @@ class AngleCRBM(ControlNet):
         return codes * self.scale + self.mean
 
     def vary(self, mean: Tensor, noise: Tensor, variety: Tensor) -> Tensor:
-        """Means (variety 0) and normal samples about them (variety 1), by Box and Muller from noise (B, 2 D)."""
+        """Between means (variety 0) and normal samples (variety 1), by Box-Muller from noise (B, 2 D)."""
         first, second = noise.chunk(2, dim=1)
         return mean + variety * torch.sqrt(-2 * torch.log(1 - first)) * torch.cos(2 * math.pi * second)
 
     @property
     def defaults(self) -> dict[str, float]:
-        """Also the Gibbs iterations."""
+        """The default options of a session, with the Gibbs iterations."""
         return {**super().defaults, "iterations": self.config.iterations}
 
     def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], dict[str, nn.Module]]:
-        """The CRBM learns; nothing else has a state."""
+        """The training of the CRBM; no further part has a state."""
         config = self.config
         past = Past(config.past_noise, config.past_rate / config.crbm.rate)
         layer = partial(self.crbm_layer, lessons, generator, past)
