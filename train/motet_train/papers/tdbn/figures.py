@@ -73,7 +73,7 @@ def synchronisation(study: ControlStudy) -> Figure:
 def _thigh(study: ControlStudy, leg: Leg, spread: Array) -> int:
     """The channel of a leg's topmost joint with the largest standard deviation (D,)."""
     joints = [channel.rpartition(".")[0] for channel in study.model.contract.channels]
-    channels = [channel for channel in leg.channels.tolist() if joints[channel] == joints[leg.channels[0]]]
+    channels: list[int] = [channel for channel in leg.channels.tolist() if joints[channel] == joints[leg.channels[0]]]
     return max(channels, key=lambda channel: float(spread[channel]))
 
 
