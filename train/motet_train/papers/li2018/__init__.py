@@ -27,11 +27,11 @@ SYSTEMS: Mapping[str, tuple[type[Any], type[Any], str]] = {
     "srnn": (srnn.SRNN, srnn.Config, "the structural RNN (Jain et al. 2016)"),
     "lstm-ae": (recurrent.LSTMAE, recurrent.LSTMAEConfig, "the LSTMs with a denoising autoencoder (Ghosh et al. 2017)"),
 }
-"""Name of a model -> the system, its configuration, a dataclass, and how help calls it."""
+"""Name of a model -> the system, its configuration (a dataclass), and its name in help texts."""
 
 
 def from_config(name: str, config: Mapping[str, Any]) -> Stepwise:
-    """The net of a configuration as it stands in a manifest."""
+    """The net of a manifest's configuration."""
     kind, sizes, _ = SYSTEMS[name]
     system = kind(configured(sizes, config["system"]))
     return Stepwise(system, config["channels"], config["kept"], config["seed_frames"])

@@ -1,4 +1,4 @@
-"""The convolutional sequence-to-sequence predictor of Li et al. 2018, and the discriminator it is trained against.
+"""The convolutional sequence-to-sequence predictor of Li et al. 2018, and its discriminator.
 
 Letters in shapes: B rows, T frames, D channels, C frames of the short-term encoder's window, U units.
 """
@@ -15,19 +15,19 @@ from motet_train.data.errors import DataError
 from motet_train.papers.li2018.stepwise import State, System, free_run
 
 SLOPE = 0.2
-"""Of the leaky rectifiers."""
+"""Slope of the leaky rectifiers."""
 
 
 @dataclass(frozen=True)
 class Config:
     """Sizes of the net; the defaults are the paper's for CMU, and the switches those of its ablations.
 
-    window: C of the short-term encoder, eq. 2. kernel: frames x channels. padding: none ("valid", CMU) or as much as
-    keeps the borders ("same", Human3.6M); a window of 5 frames and other kernels need it. long_term: which encoder
-    sees the whole seed: the convolutional one, an LSTM, or none. dropout: of convolutions' outputs, in their order;
-    decoder_dropout: of the decoder's hidden units. own: the share of predicted frames in what training feeds back, eta
-    in eq. 10. loss: of predicted frames: the mean of the squared distances, eq. 7, or of the distances, which is what
-    is measured in the end and gives early frames, whose errors are small, more weight.
+    window: C of the short-term encoder, eq. 2. kernel: frames x channels. padding: "valid" (none, CMU) or "same"
+    (Human3.6M), which a window of 5 frames and other kernels need. long_term: the encoder of the whole seed:
+    convolutional, an LSTM, or none. dropout: of each convolution's outputs. decoder_dropout: of the decoder's hidden
+    units. own: share of predicted frames among those fed back in training, eta in eq. 10. loss: "square", the mean
+    squared distance of predicted frames, eq. 7, or "distance", their mean distance, which is the final measure and
+    gives early frames, whose errors are small, more weight.
     """
 
     dimensions: int
@@ -51,10 +51,11 @@ class Convolution(nn.Module):
         super().__init__()
         self.weight = nn.Parameter(torch.empty(outputs, inputs, *kernel))
         nn.init.xavier_uniform_(self.weight)
-        self.kernel, self.padding = kernel, padding
+        self.kernel = kernel
+        self.padding = padding
 
     def size(self, frames: int, channels: int) -> tuple[int, int]:
-        """The size of what comes out for an image of frames x channels."""
+        """The size of the output for an image of frames x channels."""
         if self.padding == "same":
             return -(-frames // 2), -(-channels // 2)
         return (frames - self.kernel[0]) // 2 + 1, (channels - self.kernel[1]) // 2 + 1
@@ -62,11 +63,17 @@ class Convolution(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """(B, inputs, T, D) to (B, outputs, T', D')."""
         if self.padding == "same":
-            (height, width), (frames, channels) = self.kernel, x.shape[2:]
-            tall, wide = self.size(frames, channels)
-            extra = max(0, 2 * (wide - 1) + width - channels), max(0, 2 * (tall - 1) + height - frames)
-            x = pad(x, [part for total in extra for part in (total // 2, total - total // 2)])  # the odd one goes after
+            frames, channels = x.shape[2:]
+            frames_out, channels_out = self.size(frames, channels)
+            extra_frames = max(0, 2 * (frames_out - 1) + self.kernel[0] - frames)
+            extra_channels = max(0, 2 * (channels_out - 1) + self.kernel[1] - channels)
+            # torch pads the last axis first; of an odd number, one more goes after
+            x = pad(x, [*_halves(extra_channels), *_halves(extra_frames)])
         return leaky_relu(conv2d(x, self.weight, stride=2), SLOPE)
+
+
+def _halves(total: int) -> tuple[int, int]:
+    return total // 2, total - total // 2
 
 
 class EncodingModule(nn.Module):
@@ -77,11 +84,14 @@ class EncodingModule(nn.Module):
 
     def __init__(self, frames: int, config: Config, filters: tuple[int, ...]) -> None:
         super().__init__()
-        size, inputs, layers = (frames, config.dimensions), 1, []
+        size = (frames, config.dimensions)
+        inputs = 1
+        layers: list[nn.Module] = []
         for outputs, rate in zip(filters, config.dropout, strict=True):
             layer = Convolution(inputs, outputs, config.kernel, config.padding)
-            size, inputs = layer.size(*size), outputs
             layers += [layer, nn.Dropout(rate)]
+            size = layer.size(*size)
+            inputs = outputs
         if min(size) < 1:
             image = f"{frames} frames of {config.dimensions} channels"
             raise DataError(f"{image} are too few for these convolutions without padding: use padding 'same'")
@@ -95,7 +105,7 @@ class EncodingModule(nn.Module):
 
 
 class RecurrentEncoder(nn.Module):
-    """What the paper compares the long-term encoder with: the last output of an LSTM."""
+    """The paper's alternative to the long-term encoder: the last output of an LSTM."""
 
     def __init__(self, config: Config) -> None:
         super().__init__()
@@ -125,26 +135,27 @@ class ConvSeq2Seq(System):
         self.decoder = nn.Sequential(hidden, nn.LeakyReLU(SLOPE), nn.Dropout(config.decoder_dropout), outward)
 
     def begin(self, seed: Tensor) -> State:
-        """The last C frames, and what the long-term encoder makes of all frames but the last."""
+        """The last C frames, and the long-term encoding of all frames but the last (eqs 1, 2)."""
         state = {"window": seed[:, -self.config.window :]}
         return state if self.long_term is None else {**state, "long_term": self.long_term(seed[:, :-1])}
 
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """Eq. 6: the last frame plus what the decoder says; nothing else changes."""
+        """The last frame plus the output of the decoder (eq. 6); the state stays the same."""
         both = [state[name] for name in self.constant] + [self.short_term(state["window"])]
         return state["window"][:, -1] + self.decoder(torch.cat(both, dim=1)), {}
 
     def push(self, state: State, frame: Tensor) -> State:
-        """The window, one frame further (eq. 5)."""
+        """The window moves by one frame (eq. 5)."""
         return {"window": torch.cat([state["window"][:, 1:], frame[:, None]], dim=1)}
 
     def imagine(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """As everywhere, but that a share of what is fed back may be true frames (eq. 10)."""
-        seed, truth = windows[:, :seed_frames], windows[:, seed_frames:]
+        """A free run that may feed back predicted frames mixed with true ones (eq. 10)."""
+        seed = windows[:, :seed_frames]
+        truth = windows[:, seed_frames:]
         return free_run(self, seed, truth.shape[1], truth if self.config.own < 1 else None, self.config.own)
 
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
-        """Eq. 7, per channel; or the mean distance of frames, over the root of the number of channels."""
+        """The mean squared error (eq. 7), per channel; or the mean distance over the root of the number of channels."""
         if self.config.loss == "square":
             return super().error(predicted, truth)
         mean: Tensor = torch.linalg.vector_norm(predicted - truth, dim=-1).mean() / math.sqrt(truth.shape[-1])
@@ -152,7 +163,7 @@ class ConvSeq2Seq(System):
 
 
 class Discriminator(nn.Module):
-    """Tells true windows from those that end as predicted (eq. 8); of use in training only."""
+    """Distinguishes true windows from those that end in predictions (eq. 8); for training only."""
 
     def __init__(self, config: Config, frames: int) -> None:
         super().__init__()

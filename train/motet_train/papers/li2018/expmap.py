@@ -1,13 +1,15 @@
-"""Exponential-map text files: the CMU and Human3.6M motions that motion prediction is measured on.
+"""Exponential-map text files: the CMU and Human3.6M motions on which motion prediction is measured.
 
-One frame a line, columns separated by commas: the root's translation (3), then an exponential map (3, radians) for
+One frame per line, columns separated by commas: the root's translation (3), then an exponential map (3, radians) for
 each joint, the root first. Letters in shapes: T frames, C columns of a file (117 or 99).
 """
 
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +23,14 @@ from motet_train.data.cmu_trials import CMU_LICENCE
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
 
-STRIDE, SEED_FRAMES, OUTPUT_FRAMES = 2, 50, 25
-"""Of the protocol: every second frame of a file, 50 in, 25 out."""
+STRIDE = 2
+"""The protocol uses every second frame of a file."""
+
+SEED_FRAMES = 50
+"""Frames that a predictor is given."""
+
+OUTPUT_FRAMES = 25
+"""Frames that it predicts."""
 
 PROTOCOL_WINDOW = SEED_FRAMES + OUTPUT_FRAMES
 
@@ -38,10 +46,10 @@ Files = Mapping[str, Mapping[str, Array]]
 
 @dataclass(frozen=True)
 class Layout:
-    """How one corpus lies in its archive or folder: which files there ought to be, and what is in a line.
+    """The files of a corpus in its archive or folder, and the columns of a line.
 
     train, test: group -> names. fps: of the files. pairs: (left, right, width), spans of columns that are mirrored.
-    extra: groups of the training part that are not measured, as their test files are missing; they count half.
+    extra: training groups that are not measured, as their test files are missing; they count half.
     """
 
     name: str
@@ -54,8 +62,8 @@ class Layout:
 
     @property
     def names(self) -> list[str]:
-        """All files."""
-        return [name for groups in (self.train, self.test) for names in groups.values() for name in names]
+        """The names of all files."""
+        return [*chain.from_iterable(self.train.values()), *chain.from_iterable(self.test.values())]
 
 
 # fmt: off
@@ -67,11 +75,22 @@ H36M_ACTIONS = (
     "smoking", "takingphoto", "waiting", "walking", "walkingdog", "walkingtogether",
 )
 # fmt: on
+
+
+def _numbered(stem: str, count: int) -> list[str]:
+    return [f"{stem}_{number}.txt" for number in range(1, count + 1)]
+
+
+def _of_subject(subject: int) -> list[str]:
+    """The files of all actions of a subject of Human3.6M."""
+    return list(chain.from_iterable(_numbered(f"S{subject}/{action}", 2) for action in H36M_ACTIONS))
+
+
 CMU_LAYOUT = Layout(
     "cmu-expmap",
     117,
-    {action: [f"train/{action}/{action}_{n}.txt" for n in range(1, 6)] for action in CMU_ACTIONS},
-    {action: [f"test/{action}/{action}_1.txt"] for action in CMU_ACTIONS},
+    {action: _numbered(f"train/{action}/{action}", 5) for action in CMU_ACTIONS},
+    {action: _numbered(f"test/{action}/{action}", 1) for action in CMU_ACTIONS},
     120.0,
     pairs=((6, 24, 18), (63, 90, 27)),
     extra=("basketball_signal", "directing_traffic"),
@@ -81,16 +100,16 @@ CMU_LAYOUT = Layout(
 H36M_LAYOUT = Layout(
     "h36m-expmap",
     99,
-    {f"S{s}": [f"S{s}/{action}_{n}.txt" for action in H36M_ACTIONS for n in (1, 2)] for s in (1, 6, 7, 8, 9, 11)},
-    {action: [f"S5/{action}_{n}.txt" for n in (1, 2)] for action in H36M_ACTIONS},
+    {f"S{subject}": _of_subject(subject) for subject in (1, 6, 7, 8, 9, 11)},
+    {action: _numbered(f"S5/{action}", 2) for action in H36M_ACTIONS},
     50.0,
 )
-"""Human3.6M as its users cut it: subject 5 is the test, two trials of fifteen actions."""
+"""Human3.6M in its usual division: two trials of fifteen actions, with subject 5 for testing."""
 
 
 @dataclass(frozen=True, eq=False)
 class ExpmapCorpus:
-    """The files that were found, at their own frame rate, and the names of those that were not."""
+    """The existing files, at their own frame rate, and the names of missing ones."""
 
     layout: Layout
     train: Files
@@ -98,20 +117,20 @@ class ExpmapCorpus:
     missing: tuple[str, ...]
 
     def measured(self) -> Files:
-        """The training files of the groups that are measured, or all where none is."""
+        """The training files of the groups that are measured, or all if none is."""
         return {group: files for group, files in self.train.items() if group in self.test} or self.train
 
 
 @dataclass(frozen=True, eq=False)
 class Scaling:
-    """Statistics over all training frames, not sub-sampled (protocol). mean, std (C); kept: columns that vary."""
+    """Statistics over all training frames, not sub-sampled (protocol). mean, std: (C,). kept: columns that vary."""
 
     mean: Array
     std: Array
     kept: tuple[int, ...]
 
     def with_constants(self, frames: Array) -> Array:
-        """Frames (..., C) whose dropped columns are at their mean, as after normalising and undoing it."""
+        """Frames (..., C) with dropped columns at their mean, as after normalising and undoing it."""
         result = np.array(np.broadcast_to(self.mean, frames.shape))
         result[..., list(self.kept)] = frames[..., list(self.kept)]
         return result
@@ -120,36 +139,49 @@ class Scaling:
 def is_expmap(path: Path) -> bool:
     """Whether a folder or zip has a file of one of the layouts."""
     with Archive(path) as archive:
-        return _found(archive) is not None
+        return _detected(archive) is not None
 
 
 def read_expmap(path: Path) -> ExpmapCorpus:
-    """Read what exists of a corpus in a folder or zip; its files tell which of the two it is.
+    """Read the existing files of a corpus in a folder or zip, and detect which of the two corpora it is.
 
-    DataError where there is none of its files; FormatError names file and line of one that does not fit.
+    DataError if none of the files exists; FormatError names file and line of an error.
     """
     with Archive(path) as archive:
-        found = _found(archive)
-        if found is None:
+        detected = _detected(archive)
+        if detected is None:
             raise DataError(f"no exponential-map files in {path}: for example, it has no train/walking/walking_1.txt")
-        layout, files = found
-
-        def read(groups: Mapping[str, Sequence[str]]) -> Files:
-            there = {group: [name for name in names if name in files] for group, names in groups.items()}
-            return {g: {n: _read(archive, files[n], layout) for n in names} for g, names in there.items() if names}
-
+        layout, files = detected
+        train = _read_groups(archive, layout.train, files, layout)
+        test = _read_groups(archive, layout.test, files, layout)
         missing = tuple(name for name in layout.names if name not in files)
-        return ExpmapCorpus(layout, read(layout.train), read(layout.test), missing)
+        return ExpmapCorpus(layout, train, test, missing)
 
 
-def _found(archive: Archive) -> tuple[Layout, dict[str, str]] | None:
-    """The layout of which there are files, and these: name -> file of the archive, in whatever folder."""
+def _detected(archive: Archive) -> tuple[Layout, dict[str, str]] | None:
+    """The layout of the files of an archive, and these: name -> first file of the archive, in any folder."""
     for layout in (CMU_LAYOUT, H36M_LAYOUT):
-        known = ((name, [one for one in archive.names if f"/{one}".endswith(f"/{name}")]) for name in layout.names)
-        files = {name: places[0] for name, places in known if places}
+        files = {}
+        for name in layout.names:
+            matches = (file for file in archive.names if f"/{file}".endswith(f"/{name}"))
+            file = next(matches, None)
+            if file is not None:
+                files[name] = file
         if files:
             return layout, files
     return None
+
+
+def _read_groups(
+    archive: Archive, groups: Mapping[str, Sequence[str]], files: Mapping[str, str], layout: Layout
+) -> Files:
+    """The existing files of groups, without empty groups."""
+    read: dict[str, dict[str, Array]] = {}
+    for group, names in groups.items():
+        for name in names:
+            if name in files:
+                read.setdefault(group, {})[name] = _read(archive, files[name], layout)
+    return read
 
 
 def _read(archive: Archive, file: str, layout: Layout) -> Array:
@@ -161,7 +193,7 @@ def _read(archive: Archive, file: str, layout: Layout) -> Array:
 
 
 def parse(text: str, path: str | Path, columns: int) -> Array:
-    """Text to frames (T, C); FormatError names file and line of what does not fit."""
+    """Text to frames (T, C); FormatError names file and line of an error."""
     if not text.strip():
         raise FormatError(path, "no frames")
     try:
@@ -169,9 +201,12 @@ def parse(text: str, path: str | Path, columns: int) -> Array:
         if frames.shape[1] == columns and np.isfinite(frames).all():
             return frames
     except ValueError:
-        pass  # the slow way finds the line
+        pass  # read line by line to name the one at fault
     rows = []
-    for number, parts in ((n, line.split(",")) for n, line in enumerate(text.splitlines(), start=1) if line.strip()):
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip():
+            continue
+        parts = line.split(",")
         if len(parts) != columns:
             raise FormatError(path, f"{len(parts)} numbers instead of {columns}", number)
         rows.append(numbers(parts, Path(path), number))
@@ -179,8 +214,8 @@ def parse(text: str, path: str | Path, columns: int) -> Array:
 
 
 def scaling_of(train: Files) -> Scaling:
-    """The statistics of the training files; DataError where there is none."""
-    motions = [frames for files in train.values() for frames in files.values()]
+    """The statistics of the training files; DataError if there are none."""
+    motions = _all_frames(train)
     if not motions:
         raise DataError("there are no training files")
     frames = np.concatenate(motions)
@@ -188,58 +223,88 @@ def scaling_of(train: Files) -> Scaling:
     return Scaling(frames.mean(axis=0), std, tuple(np.flatnonzero(std >= CONSTANT_STD).tolist()))
 
 
+def _all_frames(groups: Files) -> list[Array]:
+    return list(chain.from_iterable(files.values() for files in groups.values()))
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ExpmapMaterial(Material):
-    """Sequences of text files, which have no bones, and how their columns lie."""
+    """Sequences of text files, which have no skeleton, and the layout of their columns."""
 
     layout: Layout
 
 
 def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> ExpmapMaterial:
-    """The training files of the protocol: each action as often as another, whatever its length.
+    """The training files of the protocol: all actions are drawn equally often, whatever their length.
 
-    kept_back: names of files, of :func:`validation_files`, that are for validation; they count in the statistics.
+    kept_back: names of files, from :func:`validation_files`, for validation; they count in the statistics.
     """
-    layout, scaling = corpus.layout, scaling_of(corpus.train)
-    count = layout.columns
-    channels = ("root.tx", "root.ty", "root.tz", *(f"joint{n}.e{a}" for n in range((count - 3) // 3) for a in "xyz"))
-    units = ("length",) * 3 + ("rad",) * (count - 3)
-    std = np.where(np.isin(np.arange(count), scaling.kept), scaling.std, 0.0)
-    # of the groups those that are measured, and what resembles them
-    groups = {g: files for g, files in corpus.train.items() if g in corpus.test or g in layout.extra} or corpus.train
-    groups = {group: {n: files[n] for n in files if n not in kept_back} for group, files in groups.items()}
-    sequences = [_sequence(frames) for files in groups.values() for frames in files.values()]
-    chances = [
-        (0.5 if group in layout.extra else 1.0) * len(frames) / sum(map(len, files.values()))
-        for group, files in groups.items()
-        for frames in files.values()
-    ]
+    layout = corpus.layout
+    scaling = scaling_of(corpus.train)
+    groups = _training_groups(corpus, kept_back)
+    sequences = [_sequence(frames) for frames in _all_frames(groups)]
+    validation = []
+    for files in corpus.train.values():
+        validation += [_sequence(files[name]) for name in files if name in kept_back]
     mirrored, signs = _mirrored_columns(layout)
-    about = {"name": layout.name, "files": len(sequences), "missing": list(corpus.missing)}
+    about: dict[str, Any] = {"name": layout.name, "files": len(sequences), "missing": list(corpus.missing)}
+    if kept_back:
+        about["validation"] = list(kept_back)
     return ExpmapMaterial(
-        MotionContract("angles", channels, units, layout.fps / STRIDE, scaling.mean, std, None),
+        _contract(layout, scaling),
         sequences,
-        np.array(chances) / sum(chances),
+        _chances(groups, layout),
         STRIDE,
         scaling.kept,
         held=sum(column < ROOT_COLUMNS for column in scaling.kept),
         mirrored=mirrored,
         signs=signs,
         licence=CMU_LICENCE if layout.name.startswith("cmu") else "Human3.6M, research use only",
-        about={**about, "validation": list(kept_back)} if kept_back else about,
-        validation=[_sequence(files[name]) for files in corpus.train.values() for name in files if name in kept_back],
+        about=about,
+        validation=validation,
         layout=layout,
     )
 
 
+def _training_groups(corpus: ExpmapCorpus, kept_back: Sequence[str]) -> Files:
+    """The groups to train on, without files kept back: those that are measured, and the extra ones."""
+    names = [group for group in corpus.train if group in corpus.test or group in corpus.layout.extra]
+    groups = {}
+    for group in names or corpus.train:
+        files = corpus.train[group]
+        groups[group] = {name: frames for name, frames in files.items() if name not in kept_back}
+    return groups
+
+
+def _chances(groups: Files, layout: Layout) -> Array:
+    """Chances of files: equal for groups, half for extra ones, and by length within a group."""
+    chances: list[float] = []
+    for group, files in groups.items():
+        total = sum(map(len, files.values()))
+        weight = 0.5 if group in layout.extra else 1.0
+        chances += [weight * len(frames) / total for frames in files.values()]
+    return np.array(chances) / sum(chances)
+
+
+def _contract(layout: Layout, scaling: Scaling) -> MotionContract:
+    """The contract of all columns at the protocol's rate, with a deviation of 0 for dropped ones."""
+    count = layout.columns
+    channels = ["root.tx", "root.ty", "root.tz"]
+    for number in range((count - 3) // 3):
+        channels += [f"joint{number}.e{axis}" for axis in "xyz"]
+    units = ("length",) * 3 + ("rad",) * (count - 3)
+    std = np.where(np.isin(np.arange(count), scaling.kept), scaling.std, 0.0)
+    return MotionContract("angles", tuple(channels), units, layout.fps / STRIDE, scaling.mean, std, None)
+
+
 def validation_files(corpus: ExpmapCorpus) -> tuple[str, ...]:
-    """Of each group that is measured the shortest file that is longer than a window; groups of one file keep it."""
-    found = []
+    """For each measured group of several files, the shortest one that is longer than a window."""
+    names = []
     for files in corpus.measured().values():
         long = {name: len(frames) for name, frames in files.items() if len(frames) > STRIDE * (PROTOCOL_WINDOW + 1)}
         if len(files) > 1 and long:
-            found.append(min(long, key=long.__getitem__))
-    return tuple(found)
+            names.append(min(long, key=long.__getitem__))
+    return tuple(names)
 
 
 def _sequence(frames: Array) -> NDArray[np.float32]:
@@ -247,9 +312,10 @@ def _sequence(frames: Array) -> NDArray[np.float32]:
 
 
 def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Left is along x: its translation changes sign, and so do turns about the other two axes."""
+    """Columns and signs that mirror frames: left is along x, so its translation and turns about y and z change sign."""
     if not layout.pairs:
         return (), ()
+    # exchange the columns of both sides
     columns = np.arange(layout.columns)
     for left, right, width in layout.pairs:
         columns[left : left + width] = np.arange(right, right + width)

@@ -1,10 +1,10 @@
-"""Errors over time, and what models predict of a test window as stick figures (Li et al. 2018, figures 3 to 5).
+"""Errors over time, and predictions for a test window as stick figures (Li et al. 2018, figures 3 to 5).
 
 The 38 exponential maps of a line of CMU's text files are those of the joints of an ASF skeleton, depth first, its left
 leg first, tips of bones among them: the order of :attr:`motet.motion.skeleton.Skeleton.joints`. Vectors of joints are
 rows there and are turned by the matrix from the right, so a rotation here is the transposed one. (The .amc of a test
-file, 35_01 of walking/walking_1.txt, gives the same rotations.) Who moved is not in a file; bones are those of the
-trial 39_14.
+file, 35_01 of walking/walking_1.txt, gives the same rotations.) Files do not name the performer; bones are those of
+the trial 39_14.
 """
 
 from collections.abc import Mapping
@@ -25,67 +25,82 @@ from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, SEED_FRA
 from motet_train.papers.li2018.protocol import predictor, windows
 from motet_train.papers.li2018.report import MANY, Results
 
-FRAMES_APART, SEED_POSES = 2, 4
-"""Frames from one stick figure to the next, and stick figures of seed frames."""
+FRAMES_APART = 2
+"""Frames from one stick figure to the next."""
+
+SEED_POSES = 4
+"""Stick figures of seed frames."""
 
 
 def drawings(results: Results) -> Drawings:
-    """Errors over time, and stick figures of CMU's actions: of Human3.6M's figure there are no bones."""
-    corpus, errors = results.corpus, dict[str, dict[str, Array]]()
+    """Errors over time, and stick figures of CMU's actions; bones of Human3.6M's figure are unknown."""
+    corpus = results.corpus
+    errors: dict[str, dict[str, Array]] = {}
     for name, parts in results.grouped().items():
-        for action in (action for kind, action in parts if kind == MANY):
-            errors.setdefault(action, {})[name] = parts[MANY, action]
-    found = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
+        for kind, action in parts:
+            if kind == MANY:
+                errors.setdefault(action, {})[name] = parts[MANY, action]
+    figures = {"predict-error": partial(error_over_time, errors, corpus.layout.fps / STRIDE, "Euler error")}
     if corpus.layout is CMU_LAYOUT:
         skeleton = skeleton_of(read_motion(cmu_trial("39_14")))
-        models = {runs[0]: results.models[runs[0]] for runs in results.groups.values()}  # a mean of poses is none
-        for action in (action for action in ("running", "jumping") if action in corpus.test):
-            found[f"predict-{action}"] = partial(strips_drawing, strips(models, corpus, action, skeleton), skeleton)
-    return found
+        # of several seeds the first: poses have no sensible mean
+        models = {runs[0]: results.models[runs[0]] for runs in results.groups.values()}
+        for action in ("running", "jumping"):
+            if action in corpus.test:
+                poses = strips(models, corpus, action, skeleton)
+                figures[f"predict-{action}"] = partial(strips_drawing, poses, skeleton)
+    return figures
 
 
 def places(frames: Array, skeleton: Skeleton) -> Array:
     """Places (..., J, 3) of joints of frames (..., 3 + 3 J), in the skeleton's unit.
 
-    The root is at the origin, leans as it does and faces along z. MotionError for a skeleton of another number of
+    The root is at the origin and faces along z; its lean is kept. MotionError if the skeleton has another number of
     joints.
     """
     count = len(skeleton.joints)
     if frames.shape[-1] != 3 + 3 * count:
         raise MotionError(f"frames of {frames.shape[-1]} columns do not fit a skeleton of {count} joints")
     vectors = frames[..., 3:].reshape(*frames.shape[:-1], count, 3)
-    turns = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
-    root = turns[..., 0, :, :]
-    turns[..., 0, :, :] = axis_to_rotmat("y", -np.arctan2(root[..., 0, 2], root[..., 2, 2])) @ root
+    rotations = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
+    # take out the root's heading
+    root = rotations[..., 0, :, :]
+    heading = np.arctan2(root[..., 0, 2], root[..., 2, 2])
+    rotations[..., 0, :, :] = axis_to_rotmat("y", -heading) @ root
+    # forward kinematics, parents first
     points = np.zeros(vectors.shape)
     for i, joint in enumerate(skeleton.joints[1:], start=1):
-        parent = turns[..., joint.parent, :, :]
+        parent = rotations[..., joint.parent, :, :]
         points[..., i, :] = points[..., joint.parent, :] + parent @ np.array(joint.offset)
-        turns[..., i, :, :] = parent @ turns[..., i, :, :]
+        rotations[..., i, :, :] = parent @ rotations[..., i, :, :]
     return points
 
 
 def strips(
     models: Mapping[str, PredictModel], corpus: ExpmapCorpus, action: str, skeleton: Skeleton
 ) -> dict[str, Array]:
-    """The first test window of an action: the truth, and each prediction; places (K, J, 3) of every second frame.
+    """The truth and each prediction of an action's first test window: places (K, J, 3) of every second frame.
 
     The first :data:`SEED_POSES` poses are seed frames. The root's rotation is drawn as predicted, though not measured.
     """
     window = windows(next(iter(corpus.test[action].values())), 1)
     seed = window[:, :SEED_FRAMES]
-    found = {"truth": window}
-    found |= {name: np.concatenate([seed, predictor(name, m, corpus)(seed)], axis=1) for name, m in models.items()}
+    frames = {"truth": window}
+    for name, model in models.items():
+        predicted = predictor(name, model, corpus)(seed)
+        frames[name] = np.concatenate([seed, predicted], axis=1)
     shown = slice(SEED_FRAMES - SEED_POSES * FRAMES_APART, SEED_FRAMES + OUTPUT_FRAMES, FRAMES_APART)
-    return {name: places(frames[0, shown], skeleton) for name, frames in found.items()}
+    return {name: places(rows[0, shown], skeleton) for name, rows in frames.items()}
 
 
 def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton) -> Figure:
-    """Places of joints (K, J, 3) in profile, a strip below the other; seed frames are blue.
+    """Places of joints (K, J, 3) in profile, one strip below the other; seed frames are blue.
 
-    The first strip is the truth, which is drawn in grey behind the others too.
+    The first strip is the truth, which is also drawn in grey behind the others.
     """
-    truth, bones, width = next(iter(strips.values())), bones_of(skeleton), 13
+    truth = next(iter(strips.values()))
+    bones = bones_of(skeleton)
+    width = 13
     height = 0.4 + 1.1 * width / (SPACING * (len(truth) + 1))
     figure, axes = panels(len(strips), 1, (width, height * len(strips)))
     for axis, (title, points) in zip(axes, strips.items(), strict=True):

@@ -35,23 +35,22 @@ from motet_train.papers.li2018.expmap import (
 )
 
 Continuation = Callable[[Array], Array]
-"""Seed frames (W, 50, C) in a file's own columns to predicted ones (W, 25, C)."""
+"""Seed frames (W, 50, C) in the columns of the files to predicted ones (W, 25, C)."""
 
 Predictions = Mapping[str, tuple[Array, Array]]
-"""Action -> predicted frames (W, 25, C) and whole true windows (W, 75, C), of all its motions."""
+"""Action -> predicted frames (W, 25, C) and whole true windows (W, 75, C) of all its motions."""
 
 
 def true_times(fps: float) -> tuple[float, ...]:
-    """The milliseconds after the last seed frame at which the reported frames lie, for files of ``fps``."""
+    """The times of the reported frames in milliseconds after the last seed frame, for files of ``fps``."""
     return tuple((frame + 1) * STRIDE / fps * 1000 for frame in REPORTED)
 
 
 def rotmat_to_protocol_euler(matrix: Array) -> Array:
     """Matrices (..., 3, 3) to the protocol's Euler angles (..., 3): Slabaugh's formula on the transposed matrix.
 
-    They are the angles of order "xyz" of :func:`motet.motion.rotations.rotmat_to_euler` with the sign changed. At
-    gimbal lock, where the last one is 0 and the first should be what the matrix says, it is 0 or pi as in the papers'
-    code.
+    They are the negative angles of order "xyz" of :func:`motet.motion.rotations.rotmat_to_euler`. At gimbal lock, where
+    the last angle is 0 and the first follows from the matrix, the first is 0 or pi, as in the papers' code.
     """
     sin = np.clip(matrix[..., 0, 2], -1.0, 1.0)
     locked = np.abs(sin) >= 1.0
@@ -64,8 +63,9 @@ def rotmat_to_protocol_euler(matrix: Array) -> Array:
 
 def euler_frames(frames: Array) -> Array:
     """Frames (..., C) of exponential maps to frames (..., C) of Euler angles; the root's six columns become 0."""
+    angles = rotmat_to_protocol_euler(_rotations(frames)).reshape(*frames.shape[:-1], -1)
     result = np.zeros(frames.shape)
-    result[..., ROOT_COLUMNS:] = rotmat_to_protocol_euler(_rotations(frames)).reshape(*frames.shape[:-1], -1)[..., 3:]
+    result[..., ROOT_COLUMNS:] = angles[..., 3:]
     return result
 
 
@@ -97,62 +97,69 @@ def window_errors(predicted: Array, truth: Array) -> Array:
 
 
 def _euler_errors(predicted: Array, angles: Array) -> Array:
+    # angles that are constant in a window do not count
     counted = angles.std(axis=1, keepdims=True) > CONSTANT_STD
     difference = np.where(counted, euler_frames(predicted) - angles[:, SEED_FRAMES:], 0.0)
     return np.asarray(np.linalg.norm(difference, axis=-1))
 
 
 def rotation_errors(predicted: Array, truth: Array) -> Array:
-    """Degrees (W, 25) between predicted rotations and true ones: the mean over the joints that move in a window.
+    """Angles in degrees (W, 25) between predicted and true rotations: the mean over the joints that move in a window.
 
-    Not of the protocol: Euler errors leap where a joint passes gimbal lock, these do not. Arguments as in
+    Not part of the protocol, but without the leaps of Euler errors where a joint passes gimbal lock. Arguments as in
     :func:`window_errors`.
     """
-    vectors, said = (frames[..., ROOT_COLUMNS:].reshape(*frames.shape[:-1], -1, 3) for frames in (truth, predicted))
-    moving = (vectors.std(axis=1, keepdims=True) > CONSTANT_STD).any(axis=-1)
-    apart = rotvec_to_rotmat(said) - rotvec_to_rotmat(vectors[:, SEED_FRAMES:])
-    half_sin = np.linalg.norm(apart, axis=(-2, -1)) / np.sqrt(8)
+    true_vectors = _joint_vectors(truth)
+    moving = (true_vectors.std(axis=1, keepdims=True) > CONSTANT_STD).any(axis=-1)
+    # the Frobenius norm of the difference of two matrices is sqrt(8) sin(angle / 2)
+    difference = rotvec_to_rotmat(_joint_vectors(predicted)) - rotvec_to_rotmat(true_vectors[:, SEED_FRAMES:])
+    half_sin = np.linalg.norm(difference, axis=(-2, -1)) / np.sqrt(8)
     angles = 2 * np.degrees(np.arcsin(np.minimum(half_sin, 1.0)))
     return np.asarray((angles * moving).sum(axis=-1) / np.maximum(moving.sum(axis=-1), 1))
+
+
+def _joint_vectors(frames: Array) -> Array:
+    """The exponential maps (..., J, 3) of frames (..., C), without the root's."""
+    return frames[..., ROOT_COLUMNS:].reshape(*frames.shape[:-1], -1, 3)
 
 
 def predictions(
     system: Continuation, test: Mapping[str, Sequence[Array]], scaling: Scaling, count: int = 8
 ) -> Predictions:
-    """What is predicted of ``count`` windows of each motion (T, C) of each action."""
-    found = {}
+    """The predictions for ``count`` windows of each motion (T, C) of each action."""
+    by_action = {}
     for action, motions in test.items():
         truth = scaling.with_constants(np.concatenate([windows(motion, count) for motion in motions]))
-        found[action] = system(truth[:, :SEED_FRAMES]), truth
-    return found
+        by_action[action] = system(truth[:, :SEED_FRAMES]), truth
+    return by_action
 
 
-def errors(found: Predictions, measure: Callable[[Array, Array], Array] = window_errors) -> dict[str, Array]:
-    """Error (25,) of each action: mean over windows."""
-    return {action: measure(predicted, truth).mean(axis=0) for action, (predicted, truth) in found.items()}
+def errors(by_action: Predictions, measure: Callable[[Array, Array], Array] = window_errors) -> dict[str, Array]:
+    """Error (25,) of each action: the mean over windows."""
+    return {action: measure(predicted, truth).mean(axis=0) for action, (predicted, truth) in by_action.items()}
 
 
 def predictor(name: str, model: PredictModel, corpus: ExpmapCorpus) -> Continuation:
-    """A model's predictions for windows of a corpus; DataError where it is not one of that corpus."""
+    """A model's predictions for windows of a corpus; DataError if it is a model of other data."""
     if len(model.contract.channels) != corpus.layout.columns or model.contract.skeleton is not None:
         raise DataError(f"{name} is not a model of these files: it has {len(model.contract.channels)} channels")
     return lambda seed: model.next_frames(seed[:, -model.seed_frames :], OUTPUT_FRAMES).astype(np.float64)
 
 
 def text_floors(corpus: ExpmapCorpus) -> dict[str, Continuation]:
-    """Zero, constant and damped velocity; the decays of the last are chosen on the corpus's training files."""
+    """Zero, constant and damped velocity; the decays of the last are chosen on the training files."""
     return {ZERO: zero_velocity, CONSTANT: velocity(1.0), DAMPED: velocity(chosen_decays(corpus))}
 
 
 def zero_velocity(seed: Array) -> Array:
-    """The last seed frame, held (W, 25, C): the floor that papers have."""
+    """The last seed frame, held (W, 25, C): the papers' floor."""
     return np.repeat(seed[:, -1:], OUTPUT_FRAMES, axis=1)
 
 
 def velocity(decays: Array | float) -> Continuation:
-    """Seed frames (W, L, C) to the frames (W, 25, C) in which their last step goes on; decays: one, or (25,).
+    """Continue the last step of seed frames (W, L, C) as frames (W, 25, C); decays: one, or (25,).
 
-    Exact on rotations: each joint's last turn is repeated about its own axis.
+    Exact for rotations: each joint's last turn is repeated about its own axis.
     """
     steps = reach(decays, OUTPUT_FRAMES)
 
@@ -165,22 +172,34 @@ def velocity(decays: Array | float) -> Continuation:
 
 
 def chosen_decays(corpus: ExpmapCorpus) -> Array:
-    """The decays (25,) with the smallest Euler error on windows of training files, each action as much as another."""
-    pairs = [(truth[:, :SEED_FRAMES], euler_frames(truth)) for truth in training_windows(corpus)]
-    if not pairs:
+    """The decays (25,) with the smallest Euler error on windows of training files, all actions weighted equally."""
+    truths = training_windows(corpus)
+    if not truths:
         raise DataError(
             f"no training file has a window of {PROTOCOL_WINDOW} frames, by which damped velocity is chosen"
         )
-    tried = map(velocity, DECAYS)
-    return best([np.mean([_euler_errors(run(seed), a).mean(axis=0) for seed, a in pairs], axis=0) for run in tried])
+    angles = [euler_frames(truth) for truth in truths]
+    mean_errors = []
+    for decay in DECAYS:
+        run = velocity(decay)
+        by_group = []
+        for truth, truth_angles in zip(truths, angles, strict=True):
+            by_group.append(_euler_errors(run(truth[:, :SEED_FRAMES]), truth_angles).mean(axis=0))
+        mean_errors.append(np.mean(by_group, axis=0))
+    return best(mean_errors)
 
 
 def training_windows(corpus: ExpmapCorpus) -> list[Array]:
-    """Of each group windows (W, 75, C), eight of each training file that is long enough, evenly spaced."""
-    scaling, found = scaling_of(corpus.train), []
+    """For each group windows (W, 75, C), eight evenly spaced ones of each training file that is long enough."""
+    scaling = scaling_of(corpus.train)
+    by_group = []
     for files in corpus.measured().values():
-        # a file's first frame can be a T-pose that was added
-        long = [cut for frames in files.values() if len(cut := frames[1::STRIDE]) >= PROTOCOL_WINDOW]
-        each = [_cut(frames, np.linspace(0, len(frames) - PROTOCOL_WINDOW, 8).astype(int)) for frames in long]
-        found += [scaling.with_constants(np.concatenate(each))] if long else []
-    return found
+        group_windows = []
+        for motion in files.values():
+            frames = motion[1::STRIDE]  # a file's first frame can be a T-pose that was added
+            if len(frames) >= PROTOCOL_WINDOW:
+                starts = np.linspace(0, len(frames) - PROTOCOL_WINDOW, 8).astype(int)
+                group_windows.append(_cut(frames, starts))
+        if group_windows:
+            by_group.append(scaling.with_constants(np.concatenate(group_windows)))
+    return by_group

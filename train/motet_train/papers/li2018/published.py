@@ -1,6 +1,7 @@
-"""What papers report by the protocol: errors at output frames 1, 3, 7, 9 and 24, on eight windows of each action.
+"""Published errors by the protocol: at output frames 1, 3, 7, 9 and 24, on eight windows of each action.
 
-Li et al. 2018, tables 1 to 4, who measured RRNN themselves on CMU; of LTD the averages of Mao et al. 2019.
+They are those of Li et al. 2018, tables 1 to 4, with their own measurement of RRNN on CMU; for LTD, the averages of
+Mao et al. 2019.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,8 +16,12 @@ Rows = Mapping[str, tuple[float, ...]]
 
 Actions = Mapping[str, Rows]
 
-ERD, LSTM_3LR, SRNN = "ERD (Fragkiadaki 2015)", "LSTM-3LR (Fragkiadaki 2015)", "SRNN (Jain 2016)"
-RRNN, LSTM_AE, CONV = "RRNN (Martinez 2017)", "LSTM-AE (Ghosh 2017)", "ConvSeq2Seq (Li 2018)"
+ERD = "ERD (Fragkiadaki 2015)"
+LSTM_3LR = "LSTM-3LR (Fragkiadaki 2015)"
+SRNN = "SRNN (Jain 2016)"
+RRNN = "RRNN (Martinez 2017)"
+LSTM_AE = "LSTM-AE (Ghosh 2017)"
+CONV = "ConvSeq2Seq (Li 2018)"
 
 CMU_ERRORS: Actions = {
     "basketball": {RRNN: (0.50, 0.80, 1.27, 1.45, 1.78), CONV: (0.37, 0.62, 1.07, 1.18, 1.95)},
@@ -65,7 +70,7 @@ H36M_ERRORS: Actions = {
     "walkingtogether": {RRNN: (0.29, 0.59, 0.86, 0.92, 1.42), CONV: (0.27, 0.52, 0.71, 0.74, 1.28)},
 }
 # fmt: on
-"""Tables 1 and 2; NaN where none is given."""
+"""Tables 1 and 2; NaN where they state none."""
 
 BY_ACTION = {"cmu-expmap": CMU_ERRORS, "h36m-expmap": H36M_ERRORS}
 """Name of a layout -> the published rows of each action."""
@@ -82,16 +87,20 @@ AVERAGES: Mapping[str, Rows] = {
         "LTD (Mao 2019)": (0.27, 0.51, 0.83, 0.95, nan),
     },
 }
-"""Name of a layout -> over all its actions: tables 4 and 2, and Mao et al."""
+"""Name of a layout -> averages over all its actions: tables 4 and 2, and Mao et al."""
 
 PREDICTOR_GOALS: Mapping[str, Rows] = {
     "cmu-expmap": {"windows_8": (0.26, 0.39, 0.67, 0.78, 1.20), "windows_256": (0.25, 0.39, 0.64, 0.74, 1.10)}
 }
-"""What the small predictor is to reach on the complete actions, by the windows measured."""
+"""Goals of the small predictor on the complete actions, by the number of windows."""
 
 
 def mean_over(table: Actions, actions: Iterable[str]) -> Rows:
-    """The mean over these actions of each system that has a row for all of them; NaN where one of them has none."""
+    """The mean over actions of each system that has a row for all of them; NaN where one of them has none."""
     rows = [table.get(action, {}) for action in actions]
-    names = [name for name in rows[0] if all(name in row for row in rows)] if rows else []
-    return {name: tuple(float(n) for n in np.mean([row[name] for row in rows], axis=0)) for name in names}
+    means = {}
+    for name in rows[0] if rows else ():
+        if all(name in row for row in rows):
+            mean = np.mean([row[name] for row in rows], axis=0)
+            means[name] = tuple(mean.tolist())
+    return means
