@@ -27,9 +27,9 @@ class RRNNConfig:
 class RRNN(System):
     """Martinez et al. 2017: the next frame is the last one plus a linear map of a GRU's state.
 
-    The GRU, of Cho et al. 2014, is encoder and decoder. The published net may also see which action it is; this one
-    does not, as in Li et al. 2018, where it is trained on all actions at once. The initial values are those of the
-    authors' code and of the library it used.
+    One GRU (Cho et al. 2014) is encoder and decoder. The published net may also see the action; this one does not, as
+    in Li et al. 2018, where it is trained on all actions at once. Initial values are those of the authors' code and the
+    library that it used.
     """
 
     def __init__(self, config: RRNNConfig) -> None:
@@ -51,7 +51,7 @@ class RRNN(System):
         return {"hidden": states[:, -1], "last": seed[:, -1]}
 
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """The last frame plus what the GRU's state says; nothing else changes."""
+        """The last frame plus a linear map of the GRU's state; the state stays the same."""
         return state["last"] + self.outward(state["hidden"]).float(), {}
 
     def push(self, state: State, frame: Tensor) -> State:
@@ -59,24 +59,26 @@ class RRNN(System):
         return {"hidden": self._cell(state["hidden"], frame), "last": frame}
 
     def imagine(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """A free run: the net is trained on its own samples, as it will be used."""
+        """A free run: the net is trained on its own predictions, as it is used."""
         with one_gradient(self):
             return super().imagine(windows, seed_frames)
 
     def _cell(self, hidden: Tensor, frame: Tensor) -> Tensor:
         """The next state (B, U) from this one and a frame (B, D); the reset gate acts before the product."""
-        given = self.inward(frame) + self.bias
-        update, reset = torch.sigmoid(given[:, : 2 * self.units] + self.gates(hidden)).chunk(2, dim=-1)
-        new = torch.tanh(given[:, 2 * self.units :] + self.candidate(reset * hidden))
-        return new + update * (hidden - new)
+        # Cho et al. 2014, eqs 5 to 8
+        from_frame = self.inward(frame) + self.bias
+        gates = torch.sigmoid(from_frame[:, : 2 * self.units] + self.gates(hidden))
+        update, reset = gates.chunk(2, dim=-1)
+        candidate = torch.tanh(from_frame[:, 2 * self.units :] + self.candidate(reset * hidden))
+        return candidate + update * (hidden - candidate)
 
 
 @dataclass(frozen=True)
 class LSTM3LRConfig:
     """Sizes of LSTM-3LR.
 
-    encoder, decoder: units of the fully connected layers before and after the LSTMs; a linear one to the D channels
-    comes last. rectified: whether they have rectifiers. layers: how many LSTMs. units: of each.
+    encoder, decoder: units of the fully connected layers before and after the LSTMs; a linear layer to the D channels
+    comes last. rectified: whether these layers have rectifiers. layers: number of LSTMs. units: of each LSTM.
     """
 
     dimensions: int
@@ -98,7 +100,7 @@ class ERDConfig(LSTM3LRConfig):
 
 
 class LSTM(nn.Module):
-    """One layer with one bias for each gate: 4 U (I + U + 1) parameters."""
+    """One LSTM layer with a single bias for each gate: 4 U (I + U + 1) parameters."""
 
     def __init__(self, inputs: int, units: int) -> None:
         super().__init__()
@@ -106,17 +108,18 @@ class LSTM(nn.Module):
         self.recurrence = Reused(units, 4 * units)
 
     def forward(self, x: Tensor, state: Tensor) -> Tensor:
-        """(B, T, I) and the state before (B, 2 U), outputs and cells, to the states after each frame (B, T, 2 U)."""
-        given = self.inward(x).float()
+        """Inputs (B, T, I) after a state (B, 2 U), outputs and cells, to the states after each frame (B, T, 2 U)."""
+        from_frames = self.inward(x).float()
         if x.shape[1] == 1:
-            return self._step(state, [given[:, 0]])[:, None]
-        return recur(self._step, state, [given])
+            return self._step(state, [from_frames[:, 0]])[:, None]
+        return recur(self._step, state, [from_frames])
 
-    def _step(self, state: Tensor, given: list[Tensor]) -> Tensor:
+    def _step(self, state: Tensor, from_frame: list[Tensor]) -> Tensor:
         output, cell = state.chunk(2, dim=-1)
-        enter, forget, leave, new = (given[0] + self.recurrence(output)).chunk(4, dim=-1)
-        cell = torch.sigmoid(forget) * cell + torch.sigmoid(enter) * torch.tanh(new)
-        return torch.cat([torch.sigmoid(leave) * torch.tanh(cell), cell], dim=-1)
+        gates = from_frame[0] + self.recurrence(output)
+        input_gate, forget_gate, output_gate, candidate = gates.chunk(4, dim=-1)
+        cell = torch.sigmoid(forget_gate) * cell + torch.sigmoid(input_gate) * torch.tanh(candidate)
+        return torch.cat([torch.sigmoid(output_gate) * torch.tanh(cell), cell], dim=-1)
 
 
 class EncoderRecurrentDecoder(Taught):
@@ -140,7 +143,7 @@ class EncoderRecurrentDecoder(Taught):
         return self._read(seed)[1]
 
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """What the decoder makes of the last LSTM's output; nothing else changes."""
+        """The decoder's output for the last LSTM's output; the state stays the same."""
         return self.decoder(state["states"][:, -1].chunk(2, dim=-1)[0]).float(), {}
 
     def push(self, state: State, frame: Tensor) -> State:
@@ -148,33 +151,39 @@ class EncoderRecurrentDecoder(Taught):
         return self._read(frame[:, None], state["states"])[1]
 
     def follow(self, frames: Tensor) -> tuple[Tensor, State]:
-        """As of all that are taught."""
+        """As in any :class:`Taught` system."""
         with one_gradient(self):
             outputs, state = self._read(frames)
         return self.decoder(outputs).float(), state
 
     def _read(self, frames: Tensor, states: Tensor | None = None) -> tuple[Tensor, State]:
-        """Frames (B, T, D), after states (B, S, 2 U) or the first ones, to the last LSTM's outputs (B, T, U)."""
+        """Frames (B, T, D) after states (B, S, 2 U), by default 0, to the last LSTM's outputs (B, T, U) and states."""
         if states is None:
             states = frames.new_zeros(frames.shape[0], *self.carried["states"])
-        x, after = self.encoder(frames), []
+        x = self.encoder(frames)
+        last_states = []
         for n, layer in enumerate(self.recurrent):
-            found = layer(x, states[:, n].contiguous())  # an exported scan begins with nothing else
-            after.append(found[:, -1])
-            x = found.chunk(2, dim=-1)[0]
-        return x, {"states": torch.stack(after, dim=1)}
+            layer_states = layer(x, states[:, n].contiguous())  # an exported scan needs a contiguous first state
+            last_states.append(layer_states[:, -1])
+            x = layer_states.chunk(2, dim=-1)[0]
+        return x, {"states": torch.stack(last_states, dim=1)}
 
 
 def _connected(sizes: tuple[int, ...], rectified: bool) -> nn.Sequential:
-    layers = ((nn.Linear(*pair), nn.ReLU()) if rectified else (nn.Linear(*pair),) for pair in pairwise(sizes))
-    return nn.Sequential(*(part for layer in layers for part in layer))
+    """Fully connected layers, each followed by a rectifier if ``rectified``."""
+    layers: list[nn.Module] = []
+    for inputs, outputs in pairwise(sizes):
+        layers.append(nn.Linear(inputs, outputs))
+        if rectified:
+            layers.append(nn.ReLU())
+    return nn.Sequential(*layers)
 
 
 @dataclass(frozen=True)
 class LSTMAEConfig(LSTM3LRConfig):
     """Sizes of LSTM-AE, those of LSTM-3LR first.
 
-    autoencoder: units of its rectified layers; a linear one to the D channels comes last. dropout: of its inputs.
+    autoencoder: units of its rectified layers; a linear layer to the D channels comes last. dropout: of its inputs.
     """
 
     autoencoder: tuple[int, ...] = (1000, 500, 1000)
@@ -182,12 +191,12 @@ class LSTMAEConfig(LSTM3LRConfig):
 
 
 class LSTMAE(EncoderRecurrentDecoder):
-    """Ghosh et al. 2017: LSTM-3LR, and an autoencoder of single frames that filters each frame it predicts.
+    """Ghosh et al. 2017: LSTM-3LR, and an autoencoder of single frames that filters each predicted frame.
 
-    Theirs: the autoencoder learns to restore frames of which a part was dropped out, so that it knows what a body can
-    do; predicted frames pass through it before they are shown and fed back, so that errors do not build up. Ours: its
-    sizes and the rate; that single channels are dropped, where theirs drops whole joints, of which this net knows
-    nothing; and that both parts learn side by side but apart, without the authors' tuning of the whole at the end.
+    As in the paper, the autoencoder learns to restore frames after dropout, and so learns possible poses; predicted
+    frames pass through it before they are returned and fed back, so that errors do not accumulate. Unlike in the paper,
+    dropout acts on single channels rather than on joints, which this net does not know; the sizes and the rate are
+    ours; and both parts are trained side by side, without a final joint training.
     """
 
     def __init__(self, config: LSTMAEConfig) -> None:
@@ -197,21 +206,21 @@ class LSTMAE(EncoderRecurrentDecoder):
         self.filter = nn.Sequential(nn.Dropout(config.dropout), hidden, outward)
 
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """What the autoencoder makes of the LSTMs' frame; nothing else changes."""
+        """The frame of the LSTMs, filtered by the autoencoder; the state stays the same."""
         return self.restored(super().predict(state)[0]), {}
 
     def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """The LSTMs' error on the next frame, unfiltered, plus the autoencoder's on true frames: no weight has both."""
+        """The LSTMs' error on unfiltered next frames plus the autoencoder's on true frames; they share no weights."""
         return super().loss(windows, seed_frames) + self.error(self.restored(windows), windows)
 
     def restored(self, frames: Tensor) -> Tensor:
-        """Frames (..., D) as the autoencoder gives them back; in training, of what dropout leaves of them."""
-        found: Tensor = self.filter(frames).float()
-        return found
+        """Frames (..., D) restored by the autoencoder, in training after dropout."""
+        restored: Tensor = self.filter(frames).float()
+        return restored
 
 
 class Reused(nn.Module):
-    """A matrix (I, O) by which a recurrent net multiplies at every frame; Glorot uniform at first."""
+    """A matrix (I, O) by which a recurrent net multiplies at every frame, initially Glorot uniform."""
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
@@ -222,16 +231,16 @@ class Reused(nn.Module):
         """(B, I) to (B, O), float32."""
         if self.gathered is None:
             return (x @ self.weight).float()
-        found: Tensor = _Product.apply(x, *self.gathered)  # type: ignore[no-untyped-call]
-        return found
+        product: Tensor = _Product.apply(x, *self.gathered)  # type: ignore[no-untyped-call]
+        return product
 
 
 @contextmanager
 def one_gradient(net: nn.Module) -> Iterator[None]:
-    """Products made within, by each :class:`Reused` of ``net``, get their gradient by one product in the backward pass.
+    """Compute the gradient of each :class:`Reused` of ``net`` by one product in the backward pass of this context.
 
-    Otherwise each adds a matrix of the weights' size to the gradient. Measured: a training step on 16 windows in
-    float32 on one thread takes RRNN 1.35 times as long without it, and LSTM-3LR 1.23 times; in bfloat16 1.04 and 1.24.
+    Otherwise each product adds a matrix of the weights' size to the gradient. Without it, a training step on 16 windows
+    in float32 on one thread takes RRNN 1.35 times as long, and LSTM-3LR 1.23 times; in bfloat16 1.04 and 1.24 times.
     """
     parts = [part for part in net.modules() if isinstance(part, Reused)] if torch.is_grad_enabled() else []
     for part in parts:
@@ -245,22 +254,23 @@ def one_gradient(net: nn.Module) -> Iterator[None]:
 
 
 class _Gathered:
-    """What the products of one training step by one matrix share. pairs: their factors x and their gradients."""
+    """Shared by the products of one training step with a matrix. pairs: their factors x and their gradients."""
 
     def __init__(self, weight: Tensor) -> None:
         kind = weight.device.type
         half = torch.is_autocast_enabled(kind)
         self.weight = weight.detach().to(torch.get_autocast_dtype(kind) if half else weight.dtype)
-        self.turned = self.weight.T.contiguous()  # a CPU is faster where the matrix comes first and lies in order
+        self.turned = self.weight.T.contiguous()  # a CPU is faster if the matrix comes first and is contiguous
         self.pairs: list[tuple[Tensor, Tensor]] = []
 
 
 class _Gradient(torch.autograd.Function):
-    """The place of a matrix in autograd's graph: its backward pass runs once, after those of all its products."""
+    """A matrix in autograd's graph: its backward pass runs once, after those of all its products."""
 
     @staticmethod
     def forward(ctx: Any, weight: Tensor, gathered: _Gathered) -> Tensor:
-        ctx.gathered, ctx.dtype = gathered, weight.dtype
+        ctx.gathered = gathered
+        ctx.dtype = weight.dtype
         return weight.new_zeros(())
 
     @staticmethod
@@ -271,17 +281,19 @@ class _Gradient(torch.autograd.Function):
 
 
 class _Product(torch.autograd.Function):
-    """One product: its backward pass leaves to :class:`_Gradient` what the matrix is due."""
+    """One product; its backward pass leaves the gradient of the matrix to :class:`_Gradient`."""
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, token: Tensor, gathered: _Gathered) -> Tensor:
-        ctx.gathered, ctx.dtype = gathered, x.dtype
+        ctx.gathered = gathered
+        ctx.dtype = x.dtype
         ctx.save_for_backward(x.to(gathered.weight.dtype))
-        found: Tensor = (gathered.turned @ ctx.to_save[0].T).T.float()
-        return found
+        product: Tensor = (gathered.turned @ ctx.to_save[0].T).T.float()
+        return product
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, None]:
-        gathered, gradient = ctx.gathered, gradient.to(ctx.gathered.weight.dtype)
+        gathered = ctx.gathered
+        gradient = gradient.to(gathered.weight.dtype)
         gathered.pairs.append((ctx.saved_tensors[0].detach(), gradient))
         return (gathered.weight @ gradient.T).T.to(ctx.dtype), torch.zeros((), device=gradient.device), None

@@ -1,6 +1,6 @@
-"""What predictors reach by the protocol, action by action, beside floors and the rows that papers publish.
+"""Errors of predictors by the protocol, action by action, with floors and published rows.
 
-Runs that differ in nothing but their seed are measured as one: a row of a table.
+Runs that differ only in their seed share a row of a table.
 """
 
 import json
@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -27,17 +28,20 @@ KINDS = {
     "windows_256": "256 windows of each action",
     "rotation": "256 windows, mean angle between predicted and true rotations of the joints that move, degrees",
 }
-"""As many windows of each action as papers take; enough for a figure without much noise; and of those, not the Euler
-error but :func:`motet_train.papers.li2018.protocol.rotation_errors`."""
+"""Kinds of figures: as many windows of each action as in papers; enough for a figure with little noise; and, of these,
+:func:`motet_train.papers.li2018.protocol.rotation_errors` in place of Euler errors."""
 
 FEW, MANY, ANGLE_ERRORS = KINDS
 
-MEAN, EVERY = "mean", "every"
-"""In place of an action: the mean of those with all their files, and that of all, which only papers measured."""
+MEAN = "mean"
+"""In place of an action: the mean of the actions with all their files."""
+
+EVERY = "every"
+"""In place of an action: the mean of all actions, which only papers measured."""
 
 Models = Mapping[str, PredictModel]
 Groups = Mapping[str, Sequence[str]]
-"""Title of a group of runs that differ in their seed alone -> the names they were given by."""
+"""Title of a group of runs that differ only in their seed -> their names."""
 
 Errors = Mapping[str, Mapping[tuple[str, str], Array]]
 """System -> FEW, MANY or ANGLE_ERRORS, and an action or MEAN -> error (25,)."""
@@ -45,46 +49,54 @@ Errors = Mapping[str, Mapping[tuple[str, str], Array]]
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """Errors of models and floors in a corpus, and how the models fall into groups that differ in their seed alone."""
+    """Errors of models and floors on a corpus, and the groups of models that differ only in their seed."""
 
     models: Models
     corpus: ExpmapCorpus
     groups: Groups
     errors: Errors
 
-    def grouped(self, how: Callable[..., Array] = np.mean) -> Errors:
-        """Groups, by their titles, in place of runs; what is not a run stays first. how: mean, or np.ptp of seeds."""
-        found = {name: dict(parts) for name, parts in self.errors.items() if name not in self.models}
+    def grouped(self, combine: Callable[..., Array] = np.mean) -> Errors:
+        """Groups, by their titles, in place of runs, after the floors. combine: np.mean, or np.ptp of the seeds."""
+        grouped = {name: dict(parts) for name, parts in self.errors.items() if name not in self.models}
         for title, runs in self.groups.items():
-            parts = self.errors[runs[0]]
-            found[title] = {part: how([self.errors[name][part] for name in runs], axis=0) for part in parts}
-        return found
+            grouped[title] = {}
+            for part in self.errors[runs[0]]:
+                grouped[title][part] = combine([self.errors[name][part] for name in runs], axis=0)
+        return grouped
 
     def spreads(self) -> Errors:
         """The largest minus the smallest error of each group of several runs."""
-        found = self.grouped(np.ptp)
-        return {title: found[title] for title, runs in self.groups.items() if len(runs) > 1}
+        ranges = self.grouped(np.ptp)
+        return {title: ranges[title] for title, runs in self.groups.items() if len(runs) > 1}
 
     def text(self) -> str:
         """The tables: errors, training, costs."""
-        tables = harness_table(self.models, self.groups), cost_table(self.models, self.groups)
-        return "\n\n".join((protocol_table(self.grouped(), self.corpus, self.spreads()), *tables))
+        tables = [
+            protocol_table(self.grouped(), self.corpus, self.spreads()),
+            harness_table(self.models, self.groups),
+            cost_table(self.models, self.groups),
+        ]
+        return "\n\n".join(tables)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
         """The figures of each run and, under "zero_velocity", "constant_velocity" and so on, of the floors.
 
-        Each: "windows_8" and so on -> action, or "mean" -> "frame_1" and so on. Of several models also "grouped": title
-        of each group of several runs -> their names as "runs", the figures of their mean, and of "spread".
+        Each is "windows_8" and so on -> action, or "mean" -> "frame_1" and so on. For several models also "grouped":
+        title of each group of several runs -> their names as "runs", and the figures of their mean and of "spread".
         """
-        beside = {key(name): _nested(parts) for name, parts in self.errors.items() if name in FLOORS}
-        found: dict[str, dict[str, Any]] = {name: {**_nested(self.errors[name]), **beside} for name in self.models}
+        floors = {key(name): _nested(parts) for name, parts in self.errors.items() if name in FLOORS}
+        figures: dict[str, dict[str, Any]] = {}
+        for name in self.models:
+            figures[name] = {**_nested(self.errors[name]), **floors}
         if len(self.models) > 1:
             means = self.grouped()
-            found["grouped"] = {
-                title: {"runs": list(self.groups[title]), **_nested(means[title]), "spread": _nested(spread)}
-                for title, spread in self.spreads().items()
-            }
-        return found
+            grouped = {}
+            for title, spread in self.spreads().items():
+                runs = list(self.groups[title])
+                grouped[title] = {"runs": runs, **_nested(means[title]), "spread": _nested(spread)}
+            figures["grouped"] = grouped
+        return figures
 
 
 def _nested(parts: Mapping[tuple[str, str], Array]) -> dict[str, Any]:
@@ -95,132 +107,191 @@ def _nested(parts: Mapping[tuple[str, str], Array]) -> dict[str, Any]:
 
 
 def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
-    """Measure all systems, floors first; DataError without a test file, or for a model that is not of this corpus."""
+    """Measure all systems, floors first; DataError without a test file, or for a model of other data."""
     if not corpus.test:
         raise DataError("none of the test files was found")
     systems = text_floors(corpus) | {name: predictor(name, model, corpus) for name, model in models.items()}
-    scaling, measured = scaling_of(corpus.train), dict[str, Mapping[tuple[str, str], Array]]()
+    scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
+    measured: dict[str, Mapping[tuple[str, str], Array]] = {}
     with tqdm(systems.items(), unit=" systems", disable=None, leave=False) as bar:
         for name, system in bar:
-            few, many = (predictions(system, test, scaling, count) for count in (8, 256))
-            found = {FEW: errors(few), MANY: errors(many), ANGLE_ERRORS: errors(many, rotation_errors)}
-            for parts in found.values():
-                parts[MEAN] = np.mean([parts[action] for action in complete(corpus)], axis=0)
-            measured[name] = {(kind, action): parts[action] for kind, parts in found.items() for action in parts}
+            few = predictions(system, test, scaling, 8)
+            many = predictions(system, test, scaling, 256)
+            by_kind = {FEW: errors(few), MANY: errors(many), ANGLE_ERRORS: errors(many, rotation_errors)}
+            measured[name] = _with_means(by_kind, complete(corpus))
     return Results(models, corpus, seed_groups(models), measured)
 
 
+def _with_means(by_kind: Mapping[str, Mapping[str, Array]], actions: Sequence[str]) -> dict[tuple[str, str], Array]:
+    """The errors of each kind and action, and of each kind the mean over some actions."""
+    parts = {}
+    for kind, by_action in by_kind.items():
+        for action, error in by_action.items():
+            parts[kind, action] = error
+        parts[kind, MEAN] = np.mean([by_action[action] for action in actions], axis=0)
+    return parts
+
+
 def complete(corpus: ExpmapCorpus) -> list[str]:
-    """The actions with all of their training and test files; where no action has them, all that are tested."""
+    """The actions with all of their training and test files, or, if there are none, all that are tested."""
     gaps = {name.split("/")[1] for name in corpus.missing if name.count("/") == 2}
     return [action for action in corpus.test if action not in gaps] or list(corpus.test)
 
 
 def seed_groups(models: Models) -> Groups:
-    """The groups of some models by name, in their order.
+    """The groups of models, in their order, by title.
 
-    Runs of equal model, config, recipe and data are one group; another one with the same seed is a group of its own.
+    Runs of equal model, config, recipe and data form a group; further ones with a seed that it has form another.
     """
     groups: dict[tuple[str, int], list[str]] = {}
     seen: Counter[tuple[str, Any]] = Counter()
     for name, model in models.items():
-        manifest, training = model.manifest, model.manifest.training
-        parts = manifest.model, manifest.config, training.get("recipe"), training.get("data")
-        system = json.dumps(parts, sort_keys=True) if "seed" in training else name
-        groups.setdefault((system, seen[system, training.get("seed")]), []).append(name)
-        seen[system, training.get("seed")] += 1
-    short, titles = dict(zip(models, short_names(list(models)), strict=True)), []
-    for runs in groups.values():
-        names = [short[name] for name in runs]
-        stems = {re.sub(r"[-_. ]?(seed)?\d+$", "", name) for name in names}  # without the seed
-        titles.append(((stems.pop() if len(stems) == 1 < len(runs) else "") or names[0], names[0]))
-    found = [title for title, _ in titles]  # of different systems they can be the same
-    unique = [first if found.count(title) > 1 else title for title, first in titles]
-    counts = ["" if len(runs) == 1 else f" ({len(runs)} seeds)" for runs in groups.values()]
-    return {title + count: runs for title, count, runs in zip(unique, counts, groups.values(), strict=True)}
+        system = _system(name, model)
+        seed = model.manifest.training.get("seed")
+        groups.setdefault((system, seen[system, seed]), []).append(name)
+        seen[system, seed] += 1
+    return _titled(list(groups.values()), dict(zip(models, short_names(list(models)), strict=True)))
 
 
-def protocol_table(found: Errors, corpus: ExpmapCorpus, spreads: Errors | None = None) -> str:
-    """As text: frames and true times, then the systems in each action, and under them what papers report.
+def _titled(groups: Sequence[list[str]], short: Mapping[str, str]) -> Groups:
+    """Groups of runs by their titles, made of the runs' short names."""
+    stems = [_stem(list(map(short.__getitem__, runs))) for runs in groups]
+    titled: dict[str, list[str]] = {}
+    for runs, stem in zip(groups, stems, strict=True):
+        # different systems can have the same stem
+        title = short[runs[0]] if stems.count(stem) > 1 else stem
+        titled[title if len(runs) == 1 else f"{title} ({len(runs)} seeds)"] = runs
+    return titled
 
-    spreads: of the systems that are means of several seeds; they stand in brackets behind the mean.
+
+def _system(name: str, model: PredictModel) -> str:
+    """A text that is equal for runs that differ only in their seed; the name of a model without a seed."""
+    manifest = model.manifest
+    training = manifest.training
+    if "seed" not in training:
+        return name
+    return json.dumps([manifest.model, manifest.config, training.get("recipe"), training.get("data")], sort_keys=True)
+
+
+def _stem(names: Sequence[str]) -> str:
+    """The common name of several runs without their seeds, or else the first name."""
+    stems = {re.sub(r"[-_. ]?(seed)?\d+$", "", name) for name in names}
+    return (stems.pop() if len(stems) == 1 < len(names) else "") or names[0]
+
+
+def protocol_table(systems: Errors, corpus: ExpmapCorpus, spreads: Errors | None = None) -> str:
+    """A text table: frames and true times, then for each action the systems, and below them the published rows.
+
+    spreads: of systems that are means of several seeds, shown in brackets behind the mean.
     """
-    beside = spreads or {}
-    room = 6 if beside else 0
-
-    def head(name: str, cells: Sequence[str]) -> tuple[str, ...]:
-        return (name, *(cell + " " * room for cell in cells))
-
-    def row(name: str, error: Array, spread: Array | None) -> tuple[str, ...]:
-        more = ["" if spread is None else f"[{spread[f]:.2f}]".replace("[0.", "[.") for f in REPORTED]
-        known = [f"{error[f]:.2f}{end:>{room}}" for f, end in zip(REPORTED, more, strict=True)]
-        return (f"  {name}", *(cell if np.isfinite(error[f]) else "" for f, cell in zip(REPORTED, known, strict=True)))
-
-    rows = [
-        head("output frame", [str(frame) for frame in REPORTED]),
-        head("milliseconds, true", [f"{time:.0f}" for time in true_times(corpus.layout.fps)]),
-        head("milliseconds, as papers label them", ["80", "160", "320", "400", "560", "1000"]),
-        *([("in brackets: the largest seed's minus the smallest's",)] if beside else []),
-    ]
+    spreads = spreads or {}
+    room = 6 if spreads else 0
+    rows = _head(corpus, room)
+    if spreads:
+        rows.append(("in brackets: the largest seed's minus the smallest's",))
     titles = {MEAN: f"mean of {', '.join(complete(corpus))}"}
     titles[EVERY] = f"average of all {len(corpus.layout.test)} actions, 8 windows"
-    systems, first = [*found.items(), *published(corpus).items()], next(iter(corpus.test))
-    for kind, action in dict.fromkeys(part for _, parts in systems for part in parts):
-        above = [("",), (KINDS[kind],)] if action == first else [("",)] if action == EVERY else []
-        rows += [*above, (titles.get(action, action),)]
-        for name, parts in systems:
+    every = [*systems.items(), *published(corpus).items()]
+    first = next(iter(corpus.test))
+    for kind, action in dict.fromkeys(chain.from_iterable(parts for _, parts in every)):
+        # a kind begins with its title
+        if action == first:
+            rows += [("",), (KINDS[kind],)]
+        elif action == EVERY:
+            rows.append(("",))
+        rows.append((titles.get(action, action),))
+        for name, parts in every:
             if (kind, action) in parts:
-                rows.append(row(name, parts[kind, action], beside.get(name, {}).get((kind, action))))
+                spread = spreads.get(name, {}).get((kind, action))
+                rows.append((f"  {name}", *_cells(parts[kind, action], spread, room)))
     return aligned(rows)
+
+
+def _head(corpus: ExpmapCorpus, room: int) -> list[tuple[str, ...]]:
+    """The rows of frames and times, with room for spreads at the end of each cell."""
+    times = true_times(corpus.layout.fps)
+    rows = [
+        ["output frame", *map(str, REPORTED)],
+        ["milliseconds, true", *(f"{time:.0f}" for time in times)],
+        ["milliseconds, as papers label them", "80", "160", "320", "400", "560", "1000"],
+    ]
+    head = []
+    for name, *cells in rows:
+        head.append((name, *(cell + " " * room for cell in cells)))
+    return head
+
+
+def _cells(error: Array, spread: Array | None, room: int) -> list[str]:
+    """The errors (25,) at the reported frames, with their spread if there is one."""
+    cells = []
+    for frame in REPORTED:
+        bracket = "" if spread is None else f"[{spread[frame]:.2f}]".replace("[0.", "[.")
+        cells.append(f"{error[frame]:.2f}{bracket:>{room}}" if np.isfinite(error[frame]) else "")
+    return cells
 
 
 def published(corpus: ExpmapCorpus) -> Errors:
-    """What papers report of a corpus, on eight windows, and the goals of the small predictor."""
-
-    def at_frames(values: Sequence[float]) -> Array:
-        error = np.full(max(PUBLISHED_FRAMES) + 1, np.nan)
-        error[list(PUBLISHED_FRAMES)] = values
-        return error
-
-    name, found = corpus.layout.name, dict[str, dict[tuple[str, str], Array]]()
-    parts: dict[str, Rows] = {action: BY_ACTION[name].get(action, {}) for action in corpus.test}
-    parts |= {MEAN: mean_over(BY_ACTION[name], complete(corpus)), EVERY: AVERAGES[name]}
-    for action in sorted(parts, key=lambda action: -len(parts[action])):  # so that systems keep the papers' order
-        for system, values in parts[action].items():
-            found.setdefault(f"published: {system}", {})[FEW, action] = at_frames(values)
+    """The published errors on a corpus, on eight windows, and the goals of the small predictor."""
+    name = corpus.layout.name
+    by_action: dict[str, Rows] = {action: BY_ACTION[name].get(action, {}) for action in corpus.test}
+    by_action[MEAN] = mean_over(BY_ACTION[name], complete(corpus))
+    by_action[EVERY] = AVERAGES[name]
+    systems: dict[str, dict[tuple[str, str], Array]] = {}
+    # actions with most systems first, so that these keep the papers' order
+    for action in sorted(by_action, key=lambda action: -len(by_action[action])):
+        for system, values in by_action[action].items():
+            systems.setdefault(f"published: {system}", {})[FEW, action] = _at_frames(values)
     goals = PREDICTOR_GOALS.get(name, {})
-    return {**found, "goal": {(kind, MEAN): at_frames(values) for kind, values in goals.items()}}
+    return {**systems, "goal": {(kind, MEAN): _at_frames(values) for kind, values in goals.items()}}
+
+
+def _at_frames(values: Sequence[float]) -> Array:
+    """Errors (25,) from those at the published frames, NaN elsewhere."""
+    error = np.full(max(PUBLISHED_FRAMES) + 1, np.nan)
+    error[list(PUBLISHED_FRAMES)] = values
+    return error
 
 
 def harness_table(models: Models, groups: Groups) -> str:
-    """As text, a line for each group: its seeds, training files and files held out, augmentation, rate and steps.
+    """A text table with a line for each group: seeds, training files, files held out, augmentation, rate and steps.
 
-    What a manifest does not say is left out. "kept": the step whose weights are kept, from the earliest of the seeds
-    to the latest, and by what: the best by the validation error, or the last.
+    Entries that a manifest lacks are empty. "kept": the step of the kept weights, from the earliest to the latest of
+    the seeds, and the criterion: the best validation error, or the last step.
     """
-    shown = ("warp", "reverse", "mirror", "average", "learning_rate")  # the fourth is the running mean of the weights
-    rows = [("", "seeds", "files", "held out", *shown[:4], "rate", "steps", "kept", "by")]
+    settings = ("warp", "reverse", "mirror", "average", "learning_rate")  # average: the running mean of the weights
+    rows = [("", "seeds", "files", "held out", *settings[:4], "rate", "steps", "kept", "by")]
     for title, runs in groups.items():
         trainings = [models[name].manifest.training for name in runs]
-        recipe, data = trainings[0].get("recipe", {}), trainings[0].get("data", {})
-        found = ({one[key] for one in trainings if key in one} for key in ("seed", "steps", "kept_step"))
-        seeds, steps, kept = ("-".join(map(str, sorted({min(one), max(one)}))) if one else "" for one in found)
-        cells = ["" if value is None else f"{value:g}" for value in (data.get("files"), *map(recipe.get, shown))]
-        held = str(len(data.get("validation", ()))) if "files" in data else ""
-        rows.append((f"  {title}", seeds, cells[0], held, *cells[1:], steps, kept, recipe.get("keep", "")))
+        recipe = trainings[0].get("recipe", {})
+        data = trainings[0].get("data", {})
+        cells = ["" if recipe.get(key) is None else f"{recipe[key]:g}" for key in settings]
+        files = "" if data.get("files") is None else f"{data['files']:g}"
+        held_out = str(len(data.get("validation", ()))) if "files" in data else ""
+        seeds, steps, kept = (_range(trainings, key) for key in ("seed", "steps", "kept_step"))
+        rows.append((f"  {title}", seeds, files, held_out, *cells, steps, kept, recipe.get("keep", "")))
     return aligned(rows)
 
 
+def _range(trainings: Sequence[Mapping[str, Any]], key: str) -> str:
+    """The least and the largest value of an entry, or the only one."""
+    values = {training[key] for training in trainings if key in training}
+    return "-".join(map(str, sorted({min(values), max(values)}))) if values else ""
+
+
 def cost_table(models: Models, groups: Groups) -> str:
-    """As text, a line for each group: parameters, the mean seconds of its runs' training, and where that was."""
+    """A text table with a line for each group: parameters, mean training time in seconds, and the machines."""
     rows = [("", "parameters", "training, s", "on")]
     for title, runs in groups.items():
         trainings = [models[name].manifest.training for name in runs]
         seconds = [training["seconds"] for training in trainings if "seconds" in training]
         parameters = f"{trainings[0]['parameters']:,}" if "parameters" in trainings[0] else ""
-        threads = [f", threads: {one['threads']}" if one.get("threads") is not None else "" for one in trainings]
-        places = {one.get("machine", "") + more for one, more in zip(trainings, threads, strict=True)}
         mean = f"{np.mean(seconds):.0f}" if seconds else ""
-        rows.append((f"  {title}", parameters, mean, "; ".join(sorted(places))))
+        rows.append((f"  {title}", parameters, mean, "; ".join(sorted(set(map(_machine, trainings))))))
     return aligned(rows, left=(0, 3))
+
+
+def _machine(training: Mapping[str, Any]) -> str:
+    threads = training.get("threads")
+    machine: str = training.get("machine", "")
+    return machine if threads is None else f"{machine}, threads: {threads}"

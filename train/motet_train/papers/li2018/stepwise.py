@@ -1,4 +1,4 @@
-"""Systems that predict frame by frame: what all of them have in common, and their encoder and step graphs.
+"""Systems that predict frame by frame: their common interface, and their encoder and step graphs.
 
 Letters in shapes: B rows, L seed frames, N predicted frames, T frames, C channels of the contract, D of them that vary.
 """
@@ -15,15 +15,16 @@ from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.net import Net, Part, normalised
 
 State = dict[str, Tensor]
-"""What a system knows, by name; each (B, ...)."""
+"""The state of a system by name, each part (B, ...)."""
 
 Shapes = Mapping[str, tuple[int, ...]]
 
 
 class System(nn.Module, ABC):
-    """What a published system computes, on normalised frames of D channels.
+    """A published system, on normalised frames of D channels.
 
-    carried, constant: name in the state -> shape of a row; of what changes with every frame, and what the seed decides.
+    carried, constant: name in the state -> shape of a row, of parts that change with every frame, and parts that depend
+    on the seed alone.
     """
 
     carried: Shapes
@@ -35,87 +36,89 @@ class System(nn.Module, ABC):
 
     @abstractmethod
     def predict(self, state: State) -> tuple[Tensor, State]:
-        """The next frame (B, D), and what changes in the state before that frame is pushed."""
+        """The next frame (B, D), and changes of the state before that frame is pushed."""
 
     @abstractmethod
     def push(self, state: State, frame: Tensor) -> State:
-        """What is carried over after a frame (B, D), a predicted or a true one."""
+        """The carried state after a frame (B, D), predicted or true."""
 
     def progress(self, share: float) -> None:
-        """Told before each step of training which share of it is done; for what changes on the way."""
+        """Called before each training step with the share of the training that is done, for settings that change."""
 
     def imagine(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """The frames (B, N, D) that training predicts for whole windows (B, L + N, D): here those of a free run."""
+        """The frames (B, N, D) predicted in training for whole windows (B, L + N, D): by default those of a free run."""
         return free_run(self, windows[:, :seed_frames], windows.shape[1] - seed_frames)
 
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
-        """How far predicted frames (B, N, D) are from true ones, in training: here the mean square."""
+        """The training error of predicted frames (B, N, D): by default the mean square."""
         return (predicted - truth).square().mean()
 
     def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """What training makes small, of whole windows (B, L + N, D): here the :meth:`error` of :meth:`imagine`."""
+        """The training loss of whole windows (B, L + N, D): by default the :meth:`error` of :meth:`imagine`."""
         return self.error(self.imagine(windows, seed_frames), windows[:, seed_frames:])
 
 
 class Taught(System):
-    """A system that learns the frame after each true one, those of the seed too.
+    """A system trained by teacher forcing: it learns the frame after each true one, also within the seed.
 
-    noise: std, in normalised units, of what is added to the true frames in training (Jain et al. 2016, section 4.1), so
-    that the net learns to return from its own errors.
+    noise: std, in normalised units, of noise on the true frames in training (Jain et al. 2016, section 4.1), so that
+    the net learns to recover from its own errors.
     """
 
     noise = 0.0
 
     @abstractmethod
     def follow(self, frames: Tensor) -> tuple[Tensor, State]:
-        """For true frames (B, T, D) what is predicted after each (B, T, D), and what is carried over after all."""
+        """The predictions (B, T, D) after each of true frames (B, T, D), and the carried state after all of them."""
 
     def progress(self, share: float) -> None:
         """The noise grows over the training."""
         self.noise = noise_at(share)
 
     def loss(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """The mean squared error of the frame after each of the true ones, which are noisy in training."""
+        """The mean squared error of the predictions after each true frame; these are noisy in training."""
         seen = noisy(windows[:, :-1], self.noise if self.training else 0.0)
         return self.error(self.follow(seen)[0], windows[:, 1:])
 
 
 def noise_at(share: float) -> float:
-    """The std at this share of the training, 0 to 1, by the settings that Jain et al. 2016 published with their code.
+    """The std of the noise at a share of the training, 0 to 1, from the code of Jain et al. 2016.
 
-    (iteration from which it holds, std), of 4,000 iterations, which the paper does not say; so the last fifth has most.
+    Their schedule is for 4,000 iterations, a number that the paper does not state.
     """
+    # first iteration, and std from then on
     schedule = ((3300, 0.7), (2500, 0.5), (2000, 0.3), (1300, 0.2), (1000, 0.1), (500, 0.05), (250, 0.01))
     return next((std for iteration, std in schedule if share * 4000 >= iteration), 0.0)
 
 
 def noisy(frames: Tensor, std: float) -> Tensor:
-    """Frames (..., D), half of them, drawn afresh at each call, with Gaussian noise; as they are where ``std`` is 0."""
+    """Frames (..., D) with Gaussian noise on a random half of them; unchanged if ``std`` is 0."""
     if std == 0:
         return frames
-    chosen = torch.rand_like(frames[..., :1]) < 0.5  # as in the authors' code; the paper does not say
+    chosen = torch.rand_like(frames[..., :1]) < 0.5  # as in the authors' code; not stated in the paper
     return frames + std * chosen * torch.randn_like(frames)
 
 
-def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = None, own: float = 1.0) -> Tensor:
+def free_run(system: System, seed: Tensor, count: int, truth: Tensor | None = None, share: float = 1.0) -> Tensor:
     """The ``count`` frames (B, N, D) that follow the seed frames (B, L, D).
 
-    truth: the true frames (B, N, D), mixed into those that are fed back, of which ``own`` is the share that was
-        predicted (Li et al. 2018, eq. 10).
+    truth: true frames (B, N, D) to mix into those fed back, in which ``share`` is that of the predicted frame, eta in
+    Li et al. 2018, eq. 10.
     """
-    state, frames = system.begin(seed), []
+    state = system.begin(seed)
+    frames = []
     for n in range(count):
         frame, carried = system.predict(state)
         frames.append(frame)
-        pushed = frame if truth is None else own * frame + (1 - own) * truth[:, n]
+        pushed = frame if truth is None else share * frame + (1 - share) * truth[:, n]
         state = {**state, **system.push({**state, **carried}, pushed)}
     return torch.stack(frames, dim=1)
 
 
 class Stepwise(Net):
-    """A system with its units: frames of all channels, in those of the contract.
+    """A system with its normalisation: frames of all channels, in the contract's units.
 
-    kept: the channels that vary; others stay as they are in the last seed frame. mean, scale: (D,) of the kept ones.
+    kept: the channels that vary; others stay as in the last seed frame. mean, scale: (D,) of the kept ones.
     """
 
     kept: Tensor
@@ -123,7 +126,9 @@ class Stepwise(Net):
 
     def __init__(self, system: System, channels: int, kept: Sequence[int], seed_frames: int) -> None:
         super().__init__(len(kept))
-        self.system, self.channels, self.seed_frames = system, channels, seed_frames
+        self.system = system
+        self.channels = channels
+        self.seed_frames = seed_frames
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("placing", torch.eye(channels)[list(kept)], persistent=False)
 
@@ -132,43 +137,47 @@ class Stepwise(Net):
         return normalised(frames[..., self.kept], self.mean, self.scale)
 
     def _whole(self, normal: Tensor, still: Tensor) -> Tensor:
-        """Normalised frames (..., D) and channels that do not vary (..., C), the others 0 there, to frames (..., C)."""
+        """Frames (..., C) from normalised ones (..., D), and constant channels (..., C) in which the others are 0."""
         return still + (normal * self.scale + self.mean) @ self.placing
 
     def _still(self, frames: Tensor) -> Tensor:
-        """The channels of the last of the frames (B, L, C) that do not vary, and 0 for the others: (B, C)."""
+        """The constant channels of the last of frames (B, L, C), and 0 for the others: (B, C)."""
         return frames[:, -1] * (1 - self.placing.sum(0))
 
     def forward(self, frames: Tensor, count: int) -> Tensor:
         """Seed frames (B, L, C) to the next ``count`` ones (B, N, C), both in the contract's units."""
-        return self._whole(free_run(self.system, self.normalised(frames), count), self._still(frames)[:, None])
+        predicted = free_run(self.system, self.normalised(frames), count)
+        return self._whole(predicted, self._still(frames)[:, None])
 
     def encode(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """Seed frames (B, L, C) to all that the step takes, context and state."""
+        """Seed frames (B, L, C) to the inputs of the step, context and state."""
         state = self.system.begin(self.normalised(frames))
         context = torch.cat([self._still(frames), *_rows(state, self.system.constant)], dim=1)
         return context, torch.cat(_rows(state, self.system.carried), dim=1)
 
     def step(self, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Context and state to the next frame (B, C) and the next state."""
-        system, channels = self.system, self.channels
-        known = {**_parts(state, system.carried), **_parts(context[:, channels:], system.constant)}
+        system = self.system
+        still = context[:, : self.channels]
+        known = _parts(state, system.carried) | _parts(context[:, self.channels :], system.constant)
         frame, carried = system.predict(known)
         after = system.push({**known, **carried}, frame)
-        return self._whole(frame, context[:, :channels]), torch.cat(_rows(after, system.carried), dim=1)
+        return self._whole(frame, still), torch.cat(_rows(after, system.carried), dim=1)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract.
 
-        What carries over is one tensor, ``state``; what the seed alone decides another, ``context``, which begins with
-        the channels that do not vary.
+        The carried parts of the state are one tensor, ``state``; those that depend on the seed alone are another,
+        ``context``, which begins with the constant channels.
         """
-        carried, constant = (sum(map(math.prod, s.values())) for s in (self.system.carried, self.system.constant))
+        carried = sum(map(math.prod, self.system.carried.values()))
+        constant = sum(map(math.prod, self.system.constant.values()))
         frames = TensorSpec("frames", ("batch", self.seed_frames, self.channels))
         frame = TensorSpec("frame", ("batch", self.channels))
         context = TensorSpec("context", ("batch", self.channels + constant))
-        state, following = (TensorSpec(name, ("batch", carried)) for name in ("state", "next_state"))
-        step = GraphSpec((context, state), (frame, following), {state.name: following.name})
+        state = TensorSpec("state", ("batch", carried))
+        next_state = TensorSpec("next_state", ("batch", carried))
+        step = GraphSpec((context, state), (frame, next_state), {"state": "next_state"})
         encoder = GraphSpec((frames,), (context, state))
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
 

@@ -22,40 +22,40 @@ from motet_train.trainer import LOG
 
 
 def describe_drawings(model: DescribeModel, corpus: SplitStore, run: Path | None) -> Drawings:
-    """Figures 5, 6, 9a and 10. run: the folder with the log of the training, if any."""
+    """Figures 5, 6, 9a and 10. run: the folder with the training log, if there is one."""
     records = corpus.described(range(len(corpus.store.records)))
     sentences = corpus.references(records)
     contexts = Contexts(model.embed(corpus.motions(records)))
-    found: dict[str, Callable[[], Figure]] = {
+    figures: dict[str, Callable[[], Figure]] = {
         "figure-9a-contexts-of-motions": lambda: contexts.draw(ACTIONS, sentences, "Contexts of motions"),
         "figure-10-walking": lambda: contexts.draw(DIRECTIONS, sentences, "Contexts of walking", "walk"),
     }
     if run is not None:
-        found["figure-5-loss"] = lambda: losses(run)
+        figures["figure-5-loss"] = lambda: losses(run)
     if moves(corpus.motion(records[0])):
-        found["figure-6-descriptions"] = lambda: descriptions(model, corpus)
-    return found
+        figures["figure-6-descriptions"] = lambda: descriptions(model, corpus)
+    return figures
 
 
 def generate_drawings(model: GenerateModel, corpus: SplitStore, run: Path | None) -> Drawings:
-    """Figures 7, 8 and 9b. run: as of :func:`describe_drawings`."""
-    asked = known_sentences(model, corpus, corpus.described(range(len(corpus.store.records))))
+    """Figures 7, 8 and 9b. run: as in :func:`describe_drawings`."""
+    known = known_sentences(model, corpus, corpus.described(range(len(corpus.store.records))))
     with unknown_words_allowed():
-        contexts = Contexts(model.embed([sentence for _, sentence in asked]))
-    sentences = [(sentence,) for _, sentence in asked]
-    found: dict[str, Callable[[], Figure]] = {
+        contexts = Contexts(model.embed([sentence for _, sentence in known]))
+    sentences = [(sentence,) for _, sentence in known]
+    figures: dict[str, Callable[[], Figure]] = {
         "figure-9b-contexts-of-sentences": lambda: contexts.draw(ACTIONS, sentences, "Contexts of sentences")
     }
     if run is not None:
-        found["figure-7-loss"] = lambda: losses(run)
+        figures["figure-7-loss"] = lambda: losses(run)
     texts = [sentence for sentence, *_ in ASKED.values() if knows(model, sentence, every_word=True)]
-    if texts and moves(corpus.motion(asked[0][0])):
-        found["figure-8-generated"] = lambda: generated(model, texts)
-    return found
+    if texts and moves(corpus.motion(known[0][0])):
+        figures["figure-8-generated"] = lambda: generated(model, texts)
+    return figures
 
 
 def losses(run: Path) -> Figure:
-    """Figures 5 and 7: the loss over training epochs; DataError where the run has no log."""
+    """Figures 5 and 7: the loss over training epochs; DataError if the run has no log."""
     try:
         lines = [json.loads(line) for line in (run / LOG).read_text().splitlines()]
     except (OSError, ValueError) as error:
@@ -78,18 +78,11 @@ class Contexts:
     def draw(
         self, colours: Patterns, sentences: Sequence[Sequence[str]], title: str, only: str | None = None
     ) -> Figure:
-        """Each vector in the colour of what half of its sentences say; only: an action that they have to say."""
-        kinds: list[str | None] = []
-        for row in sentences:
-            actions = common([mentioned(ACTIONS, sentence) for sentence in row])
-            attributes = common([mentioned(colours, sentence) for sentence in row])
-            if only is not None and only not in actions:
-                kinds.append(None)
-            else:
-                kinds.append(next(iter(attributes)) if len(attributes) == 1 else "other")
+        """Each vector in the colour of the attribute that half of its sentences name; only: show those of an action."""
+        kinds = [_kind(row, colours, only) for row in sentences]
         picture, (axes,) = panels(1, 1, (7, 6), title)
         for number, kind in enumerate([*colours, "other"]):
-            chosen = self.places[[found == kind for found in kinds]]
+            chosen = self.places[[other == kind for other in kinds]]
             colour = "lightgrey" if kind == "other" else f"C{number}"
             if len(chosen):
                 axes.scatter(chosen[:, 0], chosen[:, 1], s=12, color=colour, label=f"{kind} ({len(chosen)})")
@@ -98,18 +91,28 @@ class Contexts:
         return picture
 
 
+def _kind(sentences: Sequence[str], colours: Patterns, only: str | None) -> str | None:
+    """The only common attribute of some sentences, or "other"; None if they lack the action ``only``."""
+    actions = common([mentioned(ACTIONS, sentence) for sentence in sentences])
+    if only is not None and only not in actions:
+        return None
+    attributes = common([mentioned(colours, sentence) for sentence in sentences])
+    return next(iter(attributes)) if len(attributes) == 1 else "other"
+
+
 def descriptions(model: DescribeModel, corpus: SplitStore) -> Figure:
     """Figure 6: test motions with the three best descriptions and their log-probabilities."""
     test = corpus.described(corpus.parts.test, 6)
     motions = corpus.motions(test)
-    rows = [
-        "\n".join(f"{found.text}   {found.log_probability:.2f}" for found in row[:3]) for row in model.describe(motions)
-    ]
+    rows = []
+    for candidates in model.describe(motions):
+        best = [f"{candidate.text}   {candidate.log_probability:.2f}" for candidate in candidates[:3]]
+        rows.append("\n".join(best))
     return strips([from_root_block(motion) for motion in motions], rows, "Test motions, their descriptions and log P")
 
 
 def generated(model: GenerateModel, texts: Sequence[str]) -> Figure:
-    """Figure 8: the likeliest motion for each of a few sentences."""
+    """Figure 8: the most likely motion for each of a few sentences."""
     rows = model.generate(texts)
     scores = ["" if row[0].log_likelihood is None else f"   {row[0].log_likelihood:.1f}" for row in rows]
     titles = [text + score for text, score in zip(texts, scores, strict=True)]

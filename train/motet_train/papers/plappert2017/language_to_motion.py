@@ -1,8 +1,8 @@
 """A motion for a sentence: layer-norm GRUs and a mixture of Gaussians for each frame (Plappert et al. 2017, 4.3, 5.2).
 
 Letters in shapes: B rows, T frames, D channels, W words, C units of the context, K components, G directions, N units;
-"..." is any number of leading axes. A frame of D + 1 numbers is normalised and has the active flag at its end: 1 on
-every frame of a motion and 0 on the one that ends it.
+"..." is any number of leading axes. A frame of D + 1 numbers is normalised and ends in the active flag, which is 1 for
+the frames of a motion and 0 for the one after its end.
 """
 
 import math
@@ -21,29 +21,31 @@ from motet_train.models.recurrent import GATES, GRU, Decoder, Encoder, WordEmbed
 
 
 class LayerNormGRU(GRU):
-    """One layer; the reset gate acts after the recurrent product: candidate tanh(LN(W x + b) + r * LN(U h)).
+    """One layer whose reset gate acts after the recurrent product: candidate tanh(LN(W x + b) + r * LN(U h)).
 
-    Four normalisations, each with gain and bias, 12 N parameters for each direction: of the inputs of both gates
-    jointly, of the input of the candidate, and of the recurrent products of the same two.
+    There are four normalisations with gain and bias, 12 N parameters for each direction: of the input of both gates
+    together, of the input of the candidate, and of the recurrent products of the same two.
     """
 
     def __init__(self, inputs: int, units: int, directions: int, gates: str, dropout: float) -> None:
         super().__init__(inputs, units, directions, gates, dropout)
-        self.input_gate_norm, self.gate_norm = (Norm(directions, 2 * units) for _ in range(2))
-        self.input_candidate_norm, self.candidate_norm = (Norm(directions, units) for _ in range(2))
+        self.input_gate_norm = Norm(directions, 2 * units)
+        self.gate_norm = Norm(directions, 2 * units)
+        self.input_candidate_norm = Norm(directions, units)
+        self.candidate_norm = Norm(directions, units)
 
     def project(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """As of the plain unit, normalised."""
+        """The projections of the plain unit, normalised."""
         gates, candidate = super().project(x)
         return self.input_gate_norm(gates), self.input_candidate_norm(candidate)
 
     def cell(self, state: Tensor, gates: Tensor, candidate: Tensor, keep: Tensor | None) -> Tensor:
         """The next state (G, B, N); see :meth:`GRU.cell`."""
-        seen = state if keep is None else state * keep
-        squashed = GATES[self.gates](gates + self.gate_norm(seen @ self.gate_recurrence))
-        update, reset = squashed.chunk(2, dim=-1)
-        new = torch.tanh(candidate + reset * self.candidate_norm(seen @ self.candidate_recurrence))
-        return new + update * (state - new)
+        dropped = state if keep is None else state * keep
+        gates = GATES[self.gates](gates + self.gate_norm(dropped @ self.gate_recurrence))
+        update, reset = gates.chunk(2, dim=-1)
+        candidate = torch.tanh(candidate + reset * self.candidate_norm(dropped @ self.candidate_recurrence))
+        return candidate + update * (state - candidate)
 
 
 class Norm(nn.Module):
@@ -62,9 +64,9 @@ class Norm(nn.Module):
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """The distribution of one frame: log_weights (..., K), means and variances (..., K, D), active (...) a logit.
+    """The distribution of one frame: log_weights (..., K), means and variances (..., K, D), active (...), a logit.
 
-    A channel whose variance is 0 is dead: it is always at its mean, and no part of the density.
+    A channel of variance 0 is dead: it is always at its mean, and not part of the density.
     """
 
     log_weights: Tensor
@@ -73,32 +75,32 @@ class Mixture:
     active: Tensor
 
     def log_density(self, frames: Tensor) -> Tensor:
-        """Logarithm of the mixture's density of frames (..., D), by log-sum-exp: eq. 8 without the flag."""
+        """Log-density of frames (..., D) by log-sum-exp: eq. 8 without the flag."""
         return torch.logsumexp(self.log_weights + self._log_densities(frames).sum(dim=-1), dim=-1)
 
     def surrogate(self, frames: Tensor) -> Tensor:
         """The weighted mean of the components' log-densities of frames (..., D): eq. 12 without the flag.
 
-        No product of densities is formed, and none lies below 1e-8 (the authors' code), so that none underflows.
+        Without products of densities, and with each at least 1e-8 (the authors' code), nothing underflows.
         """
         floored = torch.log(self._log_densities(frames).exp() + 1e-8).sum(dim=-1)
         return (self.log_weights.exp() * floored).sum(dim=-1)
 
     def log_flag(self, flags: Tensor) -> Tensor:
-        """Logarithm of the probability of the flags (...), 1 or 0 (eq. 10)."""
-        # not logsigmoid, which would be exported as the logarithm of a sigmoid that underflows
+        """Log-probability of flags (...), 1 or 0 (eq. 10)."""
+        # logsigmoid would be exported as the logarithm of a sigmoid, which underflows
         return -functional.softplus(torch.where(flags > 0, -self.active, self.active))
 
     def log_likelihood(self, frames: Tensor, flags: Tensor) -> Tensor:
-        """Of frames (..., D) with flags (...): eq. 8, and the flag's part alone where the flag is 0."""
+        """Log-likelihood of frames (..., D) with flags (...): eq. 8, or only the flag's part where it is 0."""
         return torch.where(flags > 0, self.log_density(frames), 0.0) + self.log_flag(flags)
 
     def surrogate_loss(self, frames: Tensor, flags: Tensor) -> Tensor:
-        """The terms of eq. 12, to be averaged, for frames (..., D) with flags (...)."""
+        """The terms of eq. 12, before the mean, for frames (..., D) with flags (...)."""
         return -torch.where(flags > 0, self.surrogate(frames), 0.0) - self.log_flag(flags)
 
     def _log_densities(self, frames: Tensor) -> Tensor:
-        """Of each channel under each component (..., K, D)."""
+        """Log-densities (..., K, D) of each channel under each component."""
         living = self.variances > 0
         variances = torch.where(living, self.variances, 1.0)
         square = (frames[..., None, :] - self.means) ** 2 / variances
@@ -106,16 +108,18 @@ class Mixture:
 
 
 class MixtureHead(nn.Module):
-    """The output layer: from the decoder's outputs to the mixture (section 4.3.1), with dropout before it.
+    """The output layer: from the decoder's outputs to the mixture (section 4.3.1), after dropout.
 
-    2 K D + K + 1 outputs. floor: least variance; the paper has none, but without one the likelihood of a channel
-    that never moves has no bound.
+    It has 2 K D + K + 1 outputs. floor: least variance; the paper has none, but without it the likelihood of a channel
+    that never moves is unbounded.
     """
 
     def __init__(self, inputs: int, channels: int, components: int, floor: float, dropout: float) -> None:
         super().__init__()
         self.sizes = [components * channels, components * channels, components, 1]
-        self.components, self.floor, self.dropout = components, floor, dropout
+        self.components = components
+        self.floor = floor
+        self.dropout = dropout
         self.linear = nn.Linear(inputs, sum(self.sizes))
         nn.init.zeros_(self.linear.bias)
         for part in torch.split_with_sizes(self.linear.weight.detach(), self.sizes):
@@ -135,19 +139,24 @@ class MixtureHead(nn.Module):
         )
 
 
-LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": lambda *given: -Mixture.log_likelihood(*given)}
-"""Eq. 12, on which the paper's net was trained, and eq. 11, the true likelihood."""
+def negative_log_likelihood(mixture: Mixture, frames: Tensor, flags: Tensor) -> Tensor:
+    """The terms of eq. 11, before the mean, for frames (..., D) with flags (...)."""
+    return -mixture.log_likelihood(frames, flags)
+
+
+LOSSES = {"surrogate": Mixture.surrogate_loss, "likelihood": negative_log_likelihood}
+"""Eq. 12, the paper's training loss, and eq. 11, the true likelihood."""
 
 
 @dataclass(frozen=True)
 class LanguageToMotionConfig:
     """Sizes; the defaults are the paper's (table 1). channels: D, without the flag. words: V, with special words.
 
-    variance_floor: in normalised units, as the standard deviation feed_noise of what training adds to the frames that
-    are fed back: a free run feeds back frames that are a little off, and must find its way back. frame_dropout: mean
-    share of these frames that training feeds back as zeros, from none to twice as many in a sequence: what the frame
-    before does not tell, the context must. summary: weight of the training-only loss of
-    :class:`motet_train.models.motion_to_language.SummaryHead`; 0 leaves its head out.
+    variance_floor: in normalised units. feed_noise: standard deviation, in normalised units, of noise on the frames fed
+    back in training, so that the net learns to recover from the errors of a free run. frame_dropout: mean share of
+    these frames that are zeroed, between none and twice the share in each sequence, so that the net relies on the
+    context. summary: weight of the training-only loss of
+    :class:`motet_train.models.motion_to_language.SummaryHead`; 0 leaves out its head.
     """
 
     channels: int
@@ -173,7 +182,8 @@ class LanguageToMotion(LanguageNet):
     def __init__(self, config: LanguageToMotionConfig) -> None:
         super().__init__(config.channels)
         self.config = config
-        context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
+        context = 2 * config.encoder_units[-1]
+        shared = (config.gates, config.dropout)
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.encoder = Encoder(LayerNormGRU, config.embedding, config.encoder_units, *shared)
         self.decoder = Decoder(LayerNormGRU, config.channels + 1, context, config.decoder_units, True, *shared)
@@ -188,19 +198,22 @@ class LanguageToMotion(LanguageNet):
 
     def outputs(self, frames: Tensor, context: Tensor) -> Tensor:
         """Outputs of the decoder (B, T, S) from which each of the frames (B, T, D + 1) is predicted."""
-        given = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1).clamp(-Z_LIMIT, Z_LIMIT)
-        return self.decoder(given, context)  # type: ignore[no-any-return]
+        # each frame is predicted from the one before it; the first from a frame of ones
+        inputs = torch.cat([torch.ones_like(frames[:, :1]), frames[:, :-1]], dim=1).clamp(-Z_LIMIT, Z_LIMIT)
+        return self.decoder(inputs, context)  # type: ignore[no-any-return]
 
     def mixture(self, outputs: Tensor) -> Mixture:
         """The distributions of frames from outputs (..., S) of the decoder; dead channels stay at 0."""
-        found: Mixture = self.head(outputs)
+        mixture: Mixture = self.head(outputs)
         living = self.scale > 0
-        means, variances = (torch.where(living, values, 0.0) for values in (found.means, found.variances))
-        return replace(found, means=means, variances=variances)
+        means = torch.where(living, mixture.means, 0.0)
+        variances = torch.where(living, mixture.variances, 0.0)
+        return replace(mixture, means=means, variances=variances)
 
     def terms(self, batch: Batch) -> tuple[Tensor, Tensor | None]:
-        """The loss of every frame and of the one after it where a motion ends (N,), eq. 12 or 11; and the summary's."""
+        """The losses (N,) of all frames, and of the one after a motion's end, eq. 12 or 11; and that of the summary."""
         context = self.encode(batch.words, (batch.words != 0).sum(dim=1))
+        # one frame more than the motions have, in which the flag is 0
         normal = functional.pad(normalised(batch.frames, self.mean, self.scale), (0, 0, 0, 1))
         flags = before(batch.lengths, normal.shape[1]).to(normal.dtype)
         active = before(batch.lengths + (1 if batch.ended is None else batch.ended), normal.shape[1])
@@ -211,7 +224,7 @@ class LanguageToMotion(LanguageNet):
         return loss, self.summary_loss(batch, context)
 
     def _blurred(self, normal: Tensor) -> Tensor:
-        """Frames (B, T, D) as training feeds them back: with noise, and some of them left out."""
+        """Frames (B, T, D) as they are fed back in training: with noise, and some of them zeroed."""
         config = self.config
         if config.feed_noise:
             normal = normal + config.feed_noise * torch.randn_like(normal)
@@ -225,23 +238,28 @@ class LanguageToMotion(LanguageNet):
 
         log_weights (B, K), means and standard deviations (B, K, D) in normalised units, probability of the flag (B,).
         """
-        following = self.decoder.step(frame.clamp(-Z_LIMIT, Z_LIMIT), context, state)
-        mixture = self.mixture(following)
+        next_state = self.decoder.step(frame.clamp(-Z_LIMIT, Z_LIMIT), context, state)
+        mixture = self.mixture(next_state)
         stds = mixture.variances.sqrt()
-        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), following
+        return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), next_state
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract."""
-        channels, components = self.config.channels, self.config.components
-        context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
-        words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
-        state, following = (TensorSpec(n, ("batch", sum(self.config.decoder_units))) for n in ("state", "next_state"))
-        mixture = (
-            TensorSpec("log_weights", ("batch", components)),
-            *(TensorSpec(name, ("batch", components, channels)) for name in ("means", "stds")),
+        config = self.config
+        units = sum(config.decoder_units)
+        moments = ("batch", config.components, config.channels)
+        words = TensorSpec("words", ("batch", "words"), "int64")
+        lengths = TensorSpec("lengths", ("batch",), "int64")
+        context = TensorSpec("context", ("batch", 2 * config.encoder_units[-1]))
+        frame = TensorSpec("frame", ("batch", config.channels + 1))
+        state = TensorSpec("state", ("batch", units))
+        outputs = (
+            TensorSpec("log_weights", ("batch", config.components)),
+            TensorSpec("means", moments),
+            TensorSpec("stds", moments),
             TensorSpec("active", ("batch",)),
+            TensorSpec("next_state", ("batch", units)),
         )
-        frame = TensorSpec("frame", ("batch", channels + 1))
-        step = GraphSpec((frame, context, state), (*mixture, following), {"state": "next_state"})
+        step = GraphSpec((frame, context, state), outputs, {"state": "next_state"})
         encoder = GraphSpec((words, lengths), (context,))
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
