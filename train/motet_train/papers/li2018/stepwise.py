@@ -46,7 +46,7 @@ class System(nn.Module, ABC):
         """Called before each training step with the share of the training that is done, for settings that change."""
 
     def imagine(self, windows: Tensor, seed_frames: int) -> Tensor:
-        """The frames (B, N, D) predicted in training for whole windows (B, L + N, D): by default those of a free run."""
+        """The frames (B, N, D) predicted in training for windows (B, L + N, D): by default those of a free run."""
         return free_run(self, windows[:, :seed_frames], windows.shape[1] - seed_frames)
 
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
