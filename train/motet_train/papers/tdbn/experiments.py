@@ -86,17 +86,24 @@ def late_left_leg(study: ControlStudy, starts: int) -> tuple[Array, Array]:
     cycle = study.cycle("walk")
     half = round(cycle / 2)
     times = [int(taps + cycle + round(start * cycle / starts)) for start in range(starts)]
-
-    def force(time: int, codes: Codes) -> None:
-        for row, start in enumerate(times):
-            codes[row, left.codes] = recorded.codes[start + time + 1 - half, 0, left.codes]
-
-    walk = np.repeat(study.control(walk=1.0)[None], study.frames(4.0), axis=0)
-    run = study.play(study.start(recorded.histories(times, taps)), walk, force)
+    run = _forced(study, recorded, times, half, left.codes)
     # the right leg's phase, and the phase at which it would be in step
     phase = _leg_phase(study.reference, run.frames, recorded.frames[:, 0], right.channels, cycle)
     in_step = (np.array(times) - half + 1 + np.arange(len(phase))[:, None]) / cycle
     return run.frames, np.abs((phase - in_step + 0.5) % 1 - 0.5)
+
+
+def _forced(
+    study: ControlStudy, recorded: Recording, times: list[int], delay: int, leg_codes: NDArray[np.intp]
+) -> Recording:
+    """Walk on from times of a recorded walk, a leg's codes replaced by the recorded ones ``delay`` frames earlier."""
+
+    def force(time: int, codes: Codes) -> None:
+        for row, start in enumerate(times):
+            codes[row, leg_codes] = recorded.codes[start + time + 1 - delay, 0, leg_codes]
+
+    walk = np.repeat(study.control(walk=1.0)[None], study.frames(4.0), axis=0)
+    return study.play(study.start(recorded.histories(times, study.model.taps)), walk, force)
 
 
 def _leg_phase(reference: Reference, frames: Array, loop: Array, leg: NDArray[np.intp], cycle: float) -> Array:

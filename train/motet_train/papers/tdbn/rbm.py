@@ -7,6 +7,7 @@ the codes of an RBM: it has H visible units, K taps, C control units and F free 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import NamedTuple
 
 import torch
@@ -316,19 +317,17 @@ def transitions(
     start. extra: number of additional frames, and controls, before these, see :class:`Past`.
     """
     reach = taps + extra
-    windows = []
-    units = []
-    weights = []
-    for onset, sequences, tracks in zip(onsets, codes, controls, strict=True):
-        group_weights = []
-        for sequence, track in zip(sequences, tracks, strict=True):
-            windows.append(sequence.unfold(0, reach + 1, 1))
-            units.append(track[taps:].unfold(0, extra + 1, 1))
-            group_weights.append(onset ** torch.linspace(1, 0, len(sequence) - reach))
-        weights.append(torch.cat(group_weights))
+    windows = [sequence.unfold(0, reach + 1, 1) for sequence in chain.from_iterable(codes)]
+    units = [track[taps:].unfold(0, extra + 1, 1) for track in chain.from_iterable(controls)]
     every = torch.cat(windows).transpose(1, 2)
     control = torch.cat(units).transpose(1, 2).flatten(1)
+    weights = [_window_weights(group, reach, onset) for group, onset in zip(codes, onsets, strict=True)]
     return Transitions(every[:, :reach].flatten(1), every[:, reach], control, balanced(weights))
+
+
+def _window_weights(sequences: Sequence[Tensor], reach: int, onset: float) -> Tensor:
+    """Weights of the windows of a group, falling geometrically along each sequence from ``onset`` to 1."""
+    return torch.cat([onset ** torch.linspace(1, 0, len(sequence) - reach) for sequence in sequences])
 
 
 @dataclass(frozen=True)
@@ -384,16 +383,20 @@ class CRBMLayer(Layer):
         end, end_free = self._reconstructed(past, control, free, epoch.temperature)
         end_control = control if self.clamped else crbm.control(end, epoch.temperature)
         # step along the difference of their statistics
-        hidden = torch.cat([control, free], 1)
-        end_hidden = torch.cat([end_control, end_free], 1)
         past_epoch = replace(epoch, rate=epoch.rate * recall.rate)
         self.ascents["past_weight"].outer(past, visible - end, past_epoch)
         if crbm.free_past_weight is not None:
             self.ascents["free_past_weight"].outer(past, free - end_free, epoch)
+        hidden = torch.cat([control, free], 1)
+        end_hidden = torch.cat([end_control, end_free], 1)
+        self._climb(visible, hidden, end, end_hidden, epoch)
+        return visible - end
+
+    def _climb(self, visible: Tensor, hidden: Tensor, end: Tensor, end_hidden: Tensor, epoch: Epoch) -> None:
+        """Step the weights between the visible units and the second hidden layer, and the biases of both."""
         self.ascents["hidden_weight"].contrast((hidden, visible), (end_hidden, end), epoch)
         self.ascents["hidden_bias"].mean(hidden - end_hidden, epoch)
         self.ascents["visible_bias"].mean(visible - end, epoch)
-        return visible - end
 
     def _reconstructed(self, past: Tensor, control: Tensor, free: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
         """Means of the visible units (B, H) and of the free units (B, F) after k Gibbs steps from free units."""

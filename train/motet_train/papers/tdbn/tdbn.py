@@ -149,8 +149,8 @@ class ControlNet(Net):
             free = ControlNet.vary(self, crbm.free(codes, past, temperature), noise[:, units:], variety)
         # codes, and the frame that they decode to
         next_codes = self.vary(crbm.visible(drive, free, temperature), noise[:, :units], variety)
-        next_history = torch.cat([history[:, 1:], next_codes[:, None]], dim=1)
-        return next_codes, self.decode(next_codes), next_history
+        frame = self.decode(next_codes)
+        return next_codes, frame, torch.cat([history[:, 1:], next_codes[:, None]], dim=1)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract."""
