@@ -63,10 +63,7 @@ def places(frames: Array, skeleton: Skeleton) -> Array:
         raise MotionError(f"frames of {frames.shape[-1]} columns do not fit a skeleton of {count} joints")
     vectors = frames[..., 3:].reshape(*frames.shape[:-1], count, 3)
     rotations = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
-    # take out the root's heading
-    root = rotations[..., 0, :, :]
-    heading = np.arctan2(root[..., 0, 2], root[..., 2, 2])
-    rotations[..., 0, :, :] = axis_to_rotmat("y", -heading) @ root
+    rotations[..., 0, :, :] = _without_heading(rotations[..., 0, :, :])
     # forward kinematics, parents first
     points = np.zeros(vectors.shape)
     for i, joint in enumerate(skeleton.joints[1:], start=1):
@@ -74,6 +71,12 @@ def places(frames: Array, skeleton: Skeleton) -> Array:
         points[..., i, :] = points[..., joint.parent, :] + parent @ np.array(joint.offset)
         rotations[..., i, :, :] = parent @ rotations[..., i, :, :]
     return points
+
+
+def _without_heading(root: Array) -> Array:
+    heading = np.arctan2(root[..., 0, 2], root[..., 2, 2])
+    level: Array = axis_to_rotmat("y", -heading) @ root
+    return level
 
 
 def strips(

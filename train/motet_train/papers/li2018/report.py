@@ -195,11 +195,10 @@ def protocol_table(systems: Errors, corpus: ExpmapCorpus, spreads: Errors | None
     every = [*systems.items(), *published(corpus).items()]
     first = next(iter(corpus.test))
     for kind, action in dict.fromkeys(chain.from_iterable(parts for _, parts in every)):
-        # a kind begins with its title
-        if action == first:
-            rows += [("",), (KINDS[kind],)]
-        elif action == EVERY:
+        if action in (first, EVERY):
             rows.append(("",))
+        if action == first:
+            rows.append((KINDS[kind],))
         rows.append((titles.get(action, action),))
         for name, parts in every:
             if (kind, action) in parts:

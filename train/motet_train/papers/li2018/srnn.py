@@ -117,6 +117,12 @@ def _along(lstm: nn.LSTM, x: Tensor, state: Halves) -> tuple[Tensor, Halves]:
     return out.reshape(steps, rows, members, -1), after
 
 
+def _edge_width(name: str, widths: dict[str, int]) -> int:
+    """The features of an edge: those of both its ends, two nodes of a frame, or a node in two frames."""
+    start, _, end = name.partition("_")
+    return widths[start] + widths[end or start]
+
+
 class SRNN(Taught):
     """Seven edge RNNs and three node RNNs, which predict the frame itself rather than its change (section 4.1).
 
@@ -130,12 +136,7 @@ class SRNN(Taught):
         spine, *limbs = config.parts
         channels = {"spine": [spine], "arm": limbs[:2], "leg": limbs[2:]}
         widths = {name: len(parts[0]) for name, parts in channels.items()}
-        # an edge sees both of its ends: two nodes of a frame, or a node in two frames
-        features = {}
-        for name in EDGES:
-            start, _, end = name.partition("_")
-            features[name] = widths[start] + widths[end or start]
-        self.edges = nn.ModuleDict({name: Edge(features[name], config) for name in EDGES})
+        self.edges = nn.ModuleDict({name: Edge(_edge_width(name, widths), config) for name in EDGES})
         self.nodes = nn.ModuleDict({name: Node(widths[name], config) for name in NODES})
         self.carried = {
             "previous": (config.dimensions,),

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from motet.motion.rotations import Array
 from motet_train.evaluate.figures import SPACING, Drawings, bodies, panels
 from motet_train.papers.tdbn.experiments import gait_control, interrupted, late_left_leg, ramp
-from motet_train.papers.tdbn.study import ControlStudy, Leg
+from motet_train.papers.tdbn.study import ControlStudy, Leg, Recording
 
 WALK_COLOUR = "#2f6fdb"
 RUN_COLOUR = "#d2452f"
@@ -99,47 +99,56 @@ def hysteresis(study: ControlStudy) -> Figure:
     loops = np.concatenate([study.loop(role).frames[:, 0] for role in ("walk", "run")])
     line = _plane(study, loops)(frames)[:, 0]
     half = len(gait) // 2
-    sweep = study.frames(5.0)
     figure, axes = panels(1, 3, (13, 3.8), "A gait parameter from 0 (walk) to 1 (run) and back in 5 s")
+    # over time on the way up and down
     for panel, part in zip(axes, (slice(0, half), slice(half, None)), strict=False):
         panel.plot(np.arange(half) / study.fps, line[part], color=WALK_COLOUR)
         panel.twinx().plot(np.arange(half) / study.fps, gait[part], color="grey", linestyle=":")
         panel.set(xlabel="seconds", ylabel="first component")
-    axes[2].plot(gait[:sweep], line[:sweep], color=WALK_COLOUR, label="up")
-    axes[2].plot(gait[half : half + sweep], line[half : half + sweep], color=RUN_COLOUR, label="down")
-    axes[2].set(xlabel="gait parameter", ylabel="first component")
-    axes[2].legend()
+    _sweeps(axes[2], gait, line, study.frames(5.0))
     return figure
+
+
+def _sweeps(axes: Axes, gait: Array, line: Array, sweep: int) -> None:
+    """A line over the gait parameter on the way up and down, ``sweep`` frames each."""
+    half = len(gait) // 2
+    axes.plot(gait[:sweep], line[:sweep], color=WALK_COLOUR, label="up")
+    axes.plot(gait[half : half + sweep], line[half : half + sweep], color=RUN_COLOUR, label="down")
+    axes.set(xlabel="gait parameter", ylabel="first component")
+    axes.legend()
 
 
 def bifurcation(study: ControlStudy) -> Figure:
     """Figure 5.7: between the loops, by a sudden switch, a slow ramp, and four times sampled."""
     loops = [study.loop(role).frames[:, 0] for role in ("walk", "run")]
-    start = study.phases("walk", 1)[0]
-    gait = ramp(study)[: study.frames(6.0)]
-    runs = {
-        "sudden": study.hold(start, "run", 2.0),
-        "5 s ramp": study.play(study.start(start), gait_control(study, gait)),
-        "sampled, four runs": study.hold(start.repeat(4, axis=0), "run", 2.0, variety=1.0),
-    }
+    runs = _ways_to_run(study)
     figure, axes = panels(1, 3, (13, 4.3), "From the walking loop (blue) to the running loop (red)")
     plane = _plane(study, np.concatenate(loops), *axes)
     for panel, (name, run) in zip(axes, runs.items(), strict=True):
         for loop, colour in zip(loops, (WALK_COLOUR, RUN_COLOUR), strict=True):
             panel.plot(*plane(loop).T, color=colour, linewidth=2.5, alpha=0.5)
+        # one line for each run
         for path in np.moveaxis(run.frames, 1, 0):
             panel.plot(*plane(path).T, ".-", color="black", linewidth=0.7, markersize=2.5)
         panel.set_title(name)
     return figure
 
 
+def _ways_to_run(study: ControlStudy) -> dict[str, Recording]:
+    """Runs from the walking to the running loop."""
+    start = study.phases("walk", 1)[0]
+    gait = ramp(study)[: study.frames(6.0)]
+    return {
+        "sudden": study.hold(start, "run", 2.0),
+        "5 s ramp": study.play(study.start(start), gait_control(study, gait)),
+        "sampled, four runs": study.hold(start.repeat(4, axis=0), "run", 2.0, variety=1.0),
+    }
+
+
 def interruption(study: ControlStudy) -> Figure:
     """Figure 5.10: walk, bend, run; the bend completed, and interrupted late, in the middle and early."""
     training = [study.reference.motions[label][0] for label in (study.walk, study.bend, study.run) if label]
-    both = np.stack([study.control(bend=1.0), study.control(run=1.0)])
-    whole = np.repeat(both, [study.frames(5.0), study.frames(2.0)], axis=0)
-    runs = {"completed": study.play(study.start(study.phases("walk", 1)[0]), whole)}
-    runs |= reversed(interrupted(study, 1).items())
+    runs = {"completed": _bend_and_run(study), **dict(reversed(interrupted(study, 1).items()))}
     figure, axes = panels(1, len(runs), (15, 4.2), "Training motions (dots) and the path of a run (line)")
     plane = _plane(study, np.concatenate(training), *axes)
     for panel, (name, run) in zip(axes, runs.items(), strict=True):
@@ -148,6 +157,13 @@ def interruption(study: ControlStudy) -> Figure:
         panel.plot(*plane(run.frames[:, 0]).T, color="black", linewidth=0.8)
         panel.set_title(name)
     return figure
+
+
+def _bend_and_run(study: ControlStudy) -> Recording:
+    """Bend from a walk, and run after the bend is completed."""
+    both = np.stack([study.control(bend=1.0), study.control(run=1.0)])
+    track = np.repeat(both, [study.frames(5.0), study.frames(2.0)], axis=0)
+    return study.play(study.start(study.phases("walk", 1)[0]), track)
 
 
 def _plane(study: ControlStudy, frames: Array, *shown: Axes) -> Callable[[Array], Array]:

@@ -371,19 +371,14 @@ class CRBMLayer(Layer):
     def _update(self, past: Tensor, visible: Tensor, control: Tensor, epoch: Epoch) -> Tensor:
         """Learn from one mini-batch by CD-k; the error of the reconstruction (B, H)."""
         crbm = self.crbm
-        recall = self.recall
-        # a past as in use: noisy, or made by the net itself
-        if recall.noise:
-            past = past + recall.noise * torch.randn(past.shape, generator=self.generator, device=past.device)
-        if recall.unrolled:
-            past, control = self._unroll(past, control, epoch.temperature)
+        past, control = self._as_in_use(past, control, epoch.temperature)
         # positive phase: free units sampled from the data
         free = self._sampled(visible, past, epoch.temperature)
         # negative phase: the reconstruction after k Gibbs steps, the past held fixed
         end, end_free = self._reconstructed(past, control, free, epoch.temperature)
         end_control = control if self.clamped else crbm.control(end, epoch.temperature)
         # step along the difference of their statistics
-        past_epoch = replace(epoch, rate=epoch.rate * recall.rate)
+        past_epoch = replace(epoch, rate=epoch.rate * self.recall.rate)
         self.ascents["past_weight"].outer(past, visible - end, past_epoch)
         if crbm.free_past_weight is not None:
             self.ascents["free_past_weight"].outer(past, free - end_free, epoch)
@@ -398,6 +393,13 @@ class CRBMLayer(Layer):
         self.ascents["hidden_bias"].mean(hidden - end_hidden, epoch)
         self.ascents["visible_bias"].mean(visible - end, epoch)
 
+    def _as_in_use(self, past: Tensor, control: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
+        """A past as it is when the net runs, noisy or made by the net, and the control of the frame after it."""
+        noise = self.recall.noise
+        if noise:
+            past = past + noise * torch.randn(past.shape, generator=self.generator, device=past.device)
+        return self._unroll(past, control, temperature) if self.recall.unrolled else (past, control)
+
     def _reconstructed(self, past: Tensor, control: Tensor, free: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
         """Means of the visible units (B, H) and of the free units (B, F) after k Gibbs steps from free units."""
         crbm = self.crbm
@@ -410,19 +412,22 @@ class CRBMLayer(Layer):
 
     def _unroll(self, past: Tensor, control: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
         """A past (B, K H) that ends with frames made by the net, and the control (B, C) of the frame after it."""
-        crbm = self.crbm
         unrolled = self.recall.unrolled
         controls = control.view(len(control), unrolled + 1, -1).unbind(1)
-        frames = past.view(len(past), -1, len(crbm.visible_bias))
+        frames = past.view(len(past), -1, len(self.crbm.visible_bias))
         # a random number of recorded frames come first
         start = int(torch.randint(unrolled + 1, (1,), generator=self.generator, device=self.generator.device))
         history = frames[:, start : start + frames.shape[1] - unrolled]
         for units in controls[start:-1]:
-            before = history.flatten(1)
-            free = crbm.free(history[:, -1], before, temperature)
-            codes = crbm.visible(crbm.drive(before, units), free, temperature)
+            codes = self._next_codes(history, units, temperature)
             history = torch.cat([history[:, 1:], codes[:, None]], dim=1)
         return history.flatten(1), controls[-1]
+
+    def _next_codes(self, history: Tensor, units: Tensor, temperature: float) -> Tensor:
+        """The means (B, H) that follow a history (B, K, H) under control units (B, C)."""
+        past = history.flatten(1)
+        free = self.crbm.free(history[:, -1], past, temperature)
+        return self.crbm.visible(self.crbm.drive(past, units), free, temperature)
 
     def _sampled(self, visible: Tensor, past: Tensor, temperature: float) -> Tensor:
         """Samples of the free units (B, F)."""

@@ -65,9 +65,12 @@ def _legs(parts: BodyParts, codes: int) -> tuple[Leg, Leg] | None:
     return left, right
 
 
-def experiments_of(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[str, float]]]]:
+Experiment = Callable[[ControlStudy], Mapping[str, float]]
+
+
+def experiments_of(study: ControlStudy) -> dict[str, list[Experiment]]:
     """The experiments of each group of figures; roles are named by CMU's labels."""
-    groups: dict[str, list[Callable[..., Mapping[str, float]]]] = {
+    groups: dict[str, list[Experiment]] = {
         "cycle": [experiments.limit_cycle, experiments.convergence],
         "sync": [experiments.synchronisation],
         "feet": [experiments.standing_feet],
@@ -80,10 +83,7 @@ def experiments_of(study: ControlStudy) -> dict[str, list[Callable[[], Mapping[s
         groups["variety"] = [experiments.sampled_runs]
         if study.bend is not None:
             groups["bend"] = [experiments.bends, experiments.interruptions]
-    bound: dict[str, list[Callable[[], Mapping[str, float]]]] = {}
-    for name, group in groups.items():
-        bound[name] = [partial(experiment, study) for experiment in group]
-    return bound
+    return groups
 
 
 def missed_goals(study: ControlStudy, enough: int) -> list[str]:
@@ -91,8 +91,8 @@ def missed_goals(study: ControlStudy, enough: int) -> list[str]:
     missed: list[str] = []
     groups = experiments_of(study)
     for group in ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis"):
-        for run in groups.get(group, []):
-            figures = {f"{group}.{key}": value for key, value in run().items()}
+        for experiment in groups.get(group, []):
+            figures = {f"{group}.{key}": value for key, value in experiment(study).items()}
             wrong = [name for name in figures if name in GOALS and not reached(GOALS, name, figures[name])]
             missed += [by_label(study, name) for name in wrong]
             if len(missed) >= enough:
@@ -111,11 +111,11 @@ def control_report(study: ControlStudy) -> Report:
     return report | gathered(parts, study.model.manifest.name)
 
 
-def _figures(study: ControlStudy, name: str, group: Iterable[Callable[[], Mapping[str, float]]]) -> Report:
+def _figures(study: ControlStudy, name: str, group: Iterable[Experiment]) -> Report:
     """The figures of a group of experiments, by the labels of the clips."""
     figures = {}
     for experiment in group:
-        for key, value in experiment().items():
+        for key, value in experiment(study).items():
             figures[by_label(study, key)] = value
     return {by_label(study, name): figures}
 

@@ -266,9 +266,8 @@ class TDBN(ControlNet):
         rbm = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
         crbm = partial(self.crbm_layer, lessons, generator, past, config.clamped)
         stages = [Stage(config.rbm.epochs, begin_rbm, rbm, whole=False)]
-        for _ in range(config.tries):
-            for number in range(config.restarts):
-                stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, whole=True))
+        for number in [*range(config.restarts)] * config.tries:
+            stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, whole=True))
         return stages, {"rbms": rbms}
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
