@@ -65,7 +65,7 @@ def places(frames: Array, skeleton: Skeleton) -> Array:
     rotations = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
     rotations[..., 0, :, :] = _without_heading(rotations[..., 0, :, :])
     # forward kinematics, parents first
-    points = np.zeros(vectors.shape)
+    points = np.zeros_like(vectors)
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         parent = rotations[..., joint.parent, :, :]
         points[..., i, :] = points[..., joint.parent, :] + parent @ np.array(joint.offset)

@@ -101,9 +101,10 @@ def hysteresis(study: ControlStudy) -> Figure:
     half = len(gait) // 2
     figure, axes = panels(1, 3, (13, 3.8), "A gait parameter from 0 (walk) to 1 (run) and back in 5 s")
     # over time on the way up and down
+    seconds = np.arange(half) / study.fps
     for panel, part in zip(axes, (slice(0, half), slice(half, None)), strict=False):
-        panel.plot(np.arange(half) / study.fps, line[part], color=WALK_COLOUR)
-        panel.twinx().plot(np.arange(half) / study.fps, gait[part], color="grey", linestyle=":")
+        panel.plot(seconds, line[part], color=WALK_COLOUR)
+        panel.twinx().plot(seconds, gait[part], color="grey", linestyle=":")
         panel.set(xlabel="seconds", ylabel="first component")
     _sweeps(axes[2], gait, line, study.frames(5.0))
     return figure

@@ -254,7 +254,6 @@ class TDBN(ControlNet):
         """
         config = self.config
         rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
-        past = Past(config.past_noise, unrolled=config.own)
 
         def begin_rbm() -> None:
             rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
@@ -264,10 +263,11 @@ class TDBN(ControlNet):
             self.begin_crbm(generator)
 
         rbm = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
+        past = Past(config.past_noise, unrolled=config.own)
         crbm = partial(self.crbm_layer, lessons, generator, past, config.clamped)
-        stages = [Stage(config.rbm.epochs, begin_rbm, rbm, whole=False)]
+        stages = [Stage(config.rbm.epochs, begin_rbm, rbm, False)]
         for number in [*range(config.restarts)] * config.tries:
-            stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, whole=True))
+            stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, True))
         return stages, {"rbms": rbms}
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
