@@ -19,7 +19,7 @@ from motet.formats import read_motion
 from motet.motion.kinematics import heading, local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.predict.model import PredictModel
-from motet_train.cli.suites import Given, suite_of
+from motet_train.cli.suites import Inputs, suite_of
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import looks_of, save
 from motet_train.evaluate.predict.floors import CONSTANT, DAMPED, ZERO
@@ -276,7 +276,7 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     runs = [saved(tmp_path / f"conv-{n}", data, n) for n in range(2)]
     runs.append(saved(tmp_path / "none-0", data, 0, long_term="none"))
     models = {str(run): loaded(run) for run in runs}
-    results = suite_of(models).measure(models, Given(dict.fromkeys(models, data)))
+    results = suite_of(models).measure(models, Inputs(dict.fromkeys(models, data)))
     found, text = results.figures, results.text
     assert results.drawings is not None
     files = save(results.drawings()[""], tmp_path / "plots")

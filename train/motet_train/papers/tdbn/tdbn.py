@@ -265,9 +265,9 @@ class TDBN(ControlNet):
         rbm = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
         past = Past(config.past_noise, unrolled=config.own)
         crbm = partial(self.crbm_layer, lessons, generator, past, config.clamped)
-        stages = [Stage(config.rbm.epochs, begin_rbm, rbm, False)]
+        stages = [Stage(config.rbm.epochs, begin_rbm, rbm, whole=False)]
         for number in [*range(config.restarts)] * config.tries:
-            stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, True))
+            stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, whole=True))
         return stages, {"rbms": rbms}
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
