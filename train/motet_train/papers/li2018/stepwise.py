@@ -158,11 +158,11 @@ class Stepwise(Net):
     def step(self, context: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """Context and state to the next frame (B, C) and the next state."""
         system = self.system
-        still = context[:, : self.channels]
         known = _parts(state, system.carried) | _parts(context[:, self.channels :], system.constant)
         frame, carried = system.predict(known)
         after = system.push({**known, **carried}, frame)
-        return self._whole(frame, still), torch.cat(_rows(after, system.carried), dim=1)
+        whole = self._whole(frame, context[:, : self.channels])
+        return whole, torch.cat(_rows(after, system.carried), dim=1)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract.
