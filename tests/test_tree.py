@@ -13,9 +13,9 @@ LARGE_FUNCTION = 250
 MOST_LARGE_FUNCTIONS = 277
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 811
-MOST_TUPLE_ASSIGNMENTS = 247
-MOST_NESTED_COMPREHENSIONS = 213
+MOST_BANNED_NAMES = 726
+MOST_TUPLE_ASSIGNMENTS = 177
+MOST_NESTED_COMPREHENSIONS = 161
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
