@@ -66,8 +66,8 @@ class Format:
     def write(self) -> Callable[[File, Motion], None]:
         """The function that writes it."""
         module, _, name = self.writer.rpartition(".")
-        found: Callable[[File, Motion], None] = getattr(import_module(f"motet.{module}"), name)
-        return found
+        function: Callable[[File, Motion], None] = getattr(import_module(f"motet.{module}"), name)
+        return function
 
 
 _CHARACTER = "a skeleton and its animations, each a clip, or its rest pose"
@@ -169,11 +169,9 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     path = place_of(file)
     clip = named_clip if clip is None else clip
     figure = named_figure if figure is None else figure
-    given = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "figure": figure, "rest": rest}
-    options = {name: value for name, value in given.items() if value is not None}
-    for name in options.keys() - set(kind.options):
-        takers = " ".join(known.extension for known in FORMATS if name in known.options)
-        raise FormatError(path, f"{name!r} is an option for {takers} files only")
+    settings = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "figure": figure, "rest": rest}
+    options = {name: value for name, value in settings.items() if value is not None}
+    _check_options(path, kind, options)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
             motion: Motion = kind.module().read(file, **options)
@@ -181,6 +179,13 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
         return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
     except MotionError as error:
         raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
+
+
+def _check_options(path: Path, kind: Format, options: Mapping[str, Any]) -> None:
+    """FormatError for an option that the format does not take."""
+    for name in options.keys() - set(kind.options):
+        takers = " ".join(known.extension for known in FORMATS if name in known.options)
+        raise FormatError(path, f"{name!r} is an option for {takers} files only")
 
 
 def split_part(file: File, format: str | None = None) -> tuple[File, str | None, str | None]:
@@ -198,13 +203,16 @@ def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
     """The motion with the length unit that its file leaves out or, if ``loose``, states only by convention."""
     if motion.skeleton is None:
         raise FormatError(path, "a file without a skeleton has no length unit")
-    said = motion.skeleton.metres_per_unit
+    stated_unit = motion.skeleton.metres_per_unit
     height = motion.skeleton.height
-    # human figures, sole to crown or hand to hand, are .5 to 3 m high
-    if said is None or (loose and (0.5 <= height * unit <= 3.0 or not 0.5 <= height * said <= 3.0)):
+    if stated_unit is None:
         return motion.with_unit(unit)
-    if not math.isclose(said, unit, rel_tol=1e-6):
-        log.info("%s: the file states a length unit of %.6g m, so the given %.6g m is ignored", path, said, unit)
+    # human figures, sole to crown or hand to hand, are .5 to 3 m high
+    if loose and (0.5 <= height * unit <= 3.0 or not 0.5 <= height * stated_unit <= 3.0):
+        return motion.with_unit(unit)
+    if not math.isclose(stated_unit, unit, rel_tol=1e-6):
+        message = "%s: the file states a length unit of %.6g m, so the given %.6g m is ignored"
+        log.info(message, path, stated_unit, unit)
     return motion
 
 
@@ -276,12 +284,13 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     """
     if motion.skeleton and _same_figure(motion.skeleton, character.rest.skeleton):
         return motion
-    found = on_humanoid(motion)
+    humanoid_motion = on_humanoid(motion)
     joint_map = character.joint_map
     has_nodes = character.nodes is not None
     try:
-        found = grounded(found) if has_nodes else found
-        put = from_humanoid(found, character.rest, joint_map, skin=character.skin, ahead=has_nodes)
+        if has_nodes:
+            humanoid_motion = grounded(humanoid_motion)
+        put = from_humanoid(humanoid_motion, character.rest, joint_map, skin=character.skin, ahead=has_nodes)
     except MotionError as error:
         raise MotionError(f"the character cannot take a motion: {error}") from error
     return travel_on_root(put, joint_map)

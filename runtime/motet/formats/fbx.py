@@ -97,6 +97,6 @@ def as_gltf(file: File, take: int | None = None) -> BytesIO:
     if done.returncode:
         reason = done.stderr.decode(errors="replace")[:200] if done.returncode == 1 else "ufbx crashes on it"
         raise FormatError(path, f"broken FBX file: {reason}")
-    found = BytesIO(done.stdout)
-    found.name = str(path)
-    return found
+    document = BytesIO(done.stdout)
+    document.name = str(path)
+    return document

@@ -52,8 +52,11 @@ def each(things: Iterable[Thing]) -> list[Thing]:
 def product(a: Matrix, b: Matrix) -> Matrix:
     """First ``b``, then ``a``."""
     x, y, z, origin = a
-    axes = [[x[i] * u + y[i] * v + z[i] * w for i in range(3)] for u, v, w in b]
-    return [*axes[:3], [axes[3][i] + origin[i] for i in range(3)]]
+    columns = []
+    for u, v, w in b:
+        columns.append([x[i] * u + y[i] * v + z[i] * w for i in range(3)])
+    columns[3] = [columns[3][i] + origin[i] for i in range(3)]
+    return columns
 
 
 def inverse(matrix: Matrix) -> Matrix:
@@ -66,8 +69,9 @@ def inverse(matrix: Matrix) -> Matrix:
     volume = sum(a * b for a, b in zip(x, rows[0], strict=True))
     if not volume:
         raise ValueError("a bone's parent has a singular bind pose")
-    axes = [[row[i] / volume for row in rows] for i in range(3)]
-    return product([*axes, [0.0, 0.0, 0.0]], [*ufbx.identity_matrix[:3], [-number for number in origin]])
+    x_column, y_column, z_column = ([row[i] / volume for row in rows] for i in range(3))
+    back = [*ufbx.identity_matrix[:3], [-number for number in origin]]
+    return product([x_column, y_column, z_column, [0.0, 0.0, 0.0]], back)
 
 
 def matrix_of(transform: Any) -> Matrix:
@@ -78,8 +82,10 @@ def matrix_of(transform: Any) -> Matrix:
         (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)),
         (2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)),
     )
-    axes = [[size * number for number in axis] for axis, size in zip(turn, transform.scale, strict=True)]
-    return [*axes, transform.translation]
+    columns = []
+    for axis, size in zip(turn, transform.scale, strict=True):
+        columns.append([size * number for number in axis])
+    return [*columns, transform.translation]
 
 
 class Scene:
@@ -156,16 +162,21 @@ class Take:
 
 def takes(scene: Scene) -> list[Take]:
     """The takes that move a bone or its ancestor; in a file without bones any node."""
-    found = []
+    moving = []
     for stack in each(scene.scene.anim_stacks):
         take = Take(stack, [], set())
-        for animated in (prop for layer in each(stack.layers) for prop in layer.anim_props):
-            node = keep(animated.element)
-            if isinstance(node, ufbx.Node) and node.typed_id in scene.at and animated.prop_name.startswith("Lcl "):
-                take.moved.add(scene.at[node.typed_id])
-                take.curves.extend(curve for curve in keep(keep(animated.anim_value).curves) if curve is not None)
-        found.append(take)
-    return [take for take in found if take.moved & scene.near]
+        for layer in each(stack.layers):
+            for animated in layer.anim_props:
+                node = keep(animated.element)
+                if not (isinstance(node, ufbx.Node) and node.typed_id in scene.at):
+                    continue
+                if animated.prop_name.startswith("Lcl "):
+                    take.moved.add(scene.at[node.typed_id])
+                    curves = keep(keep(animated.anim_value).curves)
+                    take.curves.extend(curve for curve in curves if curve is not None)
+        if take.moved & scene.near:
+            moving.append(take)
+    return moving
 
 
 def frame_times(scene: Scene, take: Take) -> list[float]:

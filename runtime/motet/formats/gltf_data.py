@@ -64,8 +64,8 @@ class Gltf:
 
     def objects(self, name: str) -> list[dict[str, Any]]:
         """One of the file's lists of objects, empty if absent."""
-        found: list[dict[str, Any]] = self.document.get(name, [])
-        return found
+        objects: list[dict[str, Any]] = self.document.get(name, [])
+        return objects
 
     @cached_property
     def parents(self) -> tuple[int, ...]:
@@ -98,10 +98,10 @@ class Gltf:
         if "VRM" in extensions:
             old = extensions["VRM"].get("humanoid", {}).get("humanBones", [])
             return {bone["bone"]: bone["node"] for bone in old if bone["node"] != -1}  # UniVRM's bones that are not set
-        found: dict[str, Any] = next(
+        vrm: dict[str, Any] = next(
             (extensions[name] for name in ("VRMC_vrm", "VRMC_vrm_animation") if name in extensions), {}
         )
-        return {bone: value["node"] for bone, value in found.get("humanoid", {}).get("humanBones", {}).items()}
+        return {bone: value["node"] for bone, value in vrm.get("humanoid", {}).get("humanBones", {}).items()}
 
     def name(self, node: int) -> str:
         """A node's name, or one made from its number; FormatError if it is not text."""
@@ -112,14 +112,14 @@ class Gltf:
 
     def local(self, node: int) -> dict[str, Array]:
         """A node's translation (3), rotation as a quaternion (4), scalar last, and scale (3) at rest, each by name."""
-        found = self.objects("nodes")[node]
-        if "matrix" in found:
-            matrix = np.array(found["matrix"], np.float64).reshape(4, 4).T
+        properties = self.objects("nodes")[node]
+        if "matrix" in properties:
+            matrix = np.array(properties["matrix"], np.float64).reshape(4, 4).T
             scale = np.linalg.norm(matrix[:3, :3], axis=0)
             turn = rotmat_to_quat(matrix[:3, :3] / np.where(scale > 0, scale, 1.0))
             return {"translation": matrix[:3, 3], "rotation": turn, "scale": scale}
         rest = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
-        return {name: np.array(found.get(name, values), np.float64) for name, values in rest.items()}
+        return {name: np.array(properties.get(name, values), np.float64) for name, values in rest.items()}
 
     def world(
         self, nodes: Iterable[int] | None = None, tracks: Mapping[tuple[int, str], Array] | None = None
