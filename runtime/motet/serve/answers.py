@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial, wraps
+from itertools import islice
 from pathlib import PurePath
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -26,7 +27,7 @@ from motet.serve.batches import Batcher
 from motet.serve.content import MEDIA, Order, as_json, content_of, figure_of, frames_of
 from motet.serve.limits import Limits
 from motet.serve.readers import Readers
-from motet.serve.request import Asked
+from motet.serve.request import RequestData
 from motet.serve.uploads import Bounds, RequestError
 from motet.text.clauses import Passage, Shown
 
@@ -82,25 +83,25 @@ class Answers:
 
     # ---- generate
 
-    async def generate(self, asked: Asked, form: str) -> Answer:
+    async def generate(self, data: RequestData, form: str) -> Answer:
         """The motion of a sentence, or of several as a story, in a format out of MEDIA."""
-        texts, settings = await _in(self._threads, self._told, asked, asked.settings.get("story", False))
-        character = await _in(self._threads, rig_of, asked, form, self.limits)
-        if asked.settings.get("story") or {"stand", "after"} & {*asked.settings, *asked.files}:
-            settings |= await self._after(asked)
+        texts, settings = await _in(self._threads, self._texts_and_settings, data, data.settings.get("story", False))
+        character = await _in(self._threads, rig_of, data, form, self.limits)
+        if data.settings.get("story") or {"stand", "after"} & {*data.settings, *data.files}:
+            settings |= await self._after(data)
             result: Generated = await _in(self._models, partial(self._writer.story, texts, **settings))
         else:
             seed = settings.pop("seed", 0)
             result = await self._generated(frozenset(settings.items()), (texts[0], seed))
-        motion, order = await _in(self._models, self._shown, result, texts, asked, form)
-        return await self._answer(motion, order, asked, character)
+        motion, order = await _in(self._models, self._shown, result, texts, data, form)
+        return await self._answer(motion, order, data, character)
 
-    async def stream(self, asked: Asked) -> AsyncIterator[bytes]:
+    async def stream(self, data: RequestData) -> AsyncIterator[bytes]:
         """Lines of JSON: the figure, then frames as they are drawn; errors before the first."""
-        texts, settings = await _in(self._threads, self._told, asked, True)
-        settings |= await self._after(asked)
+        texts, settings = await _in(self._threads, self._texts_and_settings, data, True)
+        settings |= await self._after(data)
         pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
-        parts = [part for text in texts for part in self._parts(text, asked)]
+        parts = [part for text in texts for part in self._parts(text, data)]
         understood = await _in(self._models, lambda: [self._read_as(part) for part in parts])
         piece = await _in(self._models, next, pieces, None)
 
@@ -114,10 +115,10 @@ class Answers:
 
         return lines()
 
-    def _told(self, asked: Asked, story: bool) -> tuple[list[str], dict[str, Any]]:
+    def _texts_and_settings(self, data: RequestData, story: bool) -> tuple[list[str], dict[str, Any]]:
         """The sentences and the settings of the model; RequestError where there is none, or too much."""
-        texts: list[str] = asked.settings.get("text", [])
-        settings = asked.some(*MODEL, "seconds", "stand")
+        texts: list[str] = data.settings.get("text", [])
+        settings = data.some(*MODEL, "seconds", "stand")
         if not texts:
             raise RequestError("text: is missing: expected a sentence, such as 'a person walks'")
         if len(texts) > 1 and not story:
@@ -129,8 +130,11 @@ class Answers:
         if len(each) != len(texts):
             raise RequestError(f"seconds: expected a number, or one for each of {len(texts)} texts, not {len(each)}")
         most = settings.get("max_seconds", self._writer.defaults["max_seconds"])
-        parts = [len(self._parts(text, asked)) for text in texts]
-        self._check_length(sum(count * most if one is None else one for count, one in zip(parts, each, strict=True)))
+        parts = [len(self._parts(text, data)) for text in texts]
+        longest = 0.0
+        for count, length in zip(parts, each, strict=True):
+            longest += count * most if length is None else length
+        self._check_length(longest)
         return texts, {**settings, "seconds": each[0] if len(texts) == 1 else seconds}
 
     def _check_length(self, seconds: float) -> None:
@@ -138,17 +142,17 @@ class Answers:
             most = f"this server gives at most {self.limits.motion_seconds:g} s"
             raise RequestError(f"seconds, max_seconds: up to {seconds:g} s of motion are asked for: {most}")
 
-    async def _after(self, asked: Asked) -> dict[str, Motion]:
-        after = asked.files.get("after")
+    async def _after(self, data: RequestData) -> dict[str, Motion]:
+        after = data.files.get("after")
         return {} if after is None else {"after": await self._readers.motion(after, self._bounds, {})}
 
-    def _generate(self, key: Key, asked: list[tuple[str, int]]) -> list[Generated]:
-        texts, seeds = zip(*asked, strict=True)
+    def _generate(self, key: Key, requests: list[tuple[str, int]]) -> list[Generated]:
+        texts, seeds = zip(*requests, strict=True)
         return [row[0] for row in self._writer.generate(list(texts), seed=list(seeds), **cast(Any, dict(key)))]
 
-    def _parts(self, text: str, asked: Asked) -> list[str]:
+    def _parts(self, text: str, data: RequestData) -> list[str]:
         """What a text asks for one after another."""
-        return [text] if asked.settings.get("whole") else self._writer.parts(text)
+        return [text] if data.settings.get("whole") else self._writer.parts(text)
 
     def _read_as(self, text: str, shown: Shown | Generated | Passage | None = None) -> dict[str, Any]:
         """How a sentence was understood: as what it is shown, or will likely be."""
@@ -156,91 +160,99 @@ class Answers:
         known = asdict(self._writer.understood(text))
         return {"text": text, **known, "action": shown.action, "lacking": list(shown.lacking)}
 
-    def _shown(self, result: Generated, texts: list[str], asked: Asked, form: str) -> tuple[Motion, Order]:
+    def _shown(self, result: Generated, texts: list[str], data: RequestData, form: str) -> tuple[Motion, Order]:
         """What was drawn, and how it is to be given, like ``motet generate`` writes it."""
-        motion = result.playable(asked.settings.get("fps", PLAYED), not asked.settings.get("no_plant", False))
-        motion = looped(motion) if asked.settings.get("loop") else motion
+        motion = result.playable(data.settings.get("fps", PLAYED), not data.settings.get("no_plant", False))
+        motion = looped(motion) if data.settings.get("loop") else motion
         shown = result.passages if isinstance(result, Story) else ()
-        passages = [asdict(one) for one in shown]
-        captions = [(one.start, one.text) for one in shown] or None
-        understood = [self._read_as(one.text, one) for one in shown] or [self._read_as(texts[0], result)]
-        said = {"understood": understood, "unknown": result.unknown, "passages": passages}
-        return motion, order_of(asked, form, " / ".join(texts), captions, said)
+        passages = [asdict(passage) for passage in shown]
+        captions = [(passage.start, passage.text) for passage in shown] or None
+        understood = [self._read_as(passage.text, passage) for passage in shown] or [self._read_as(texts[0], result)]
+        details = {"understood": understood, "unknown": result.unknown, "passages": passages}
+        return motion, order_of(data, form, " / ".join(texts), captions, details)
 
-    async def _answer(self, motion: Motion, order: Order, asked: Asked, character: Character | None) -> Answer:
+    async def _answer(self, motion: Motion, order: Order, data: RequestData, character: Character | None) -> Answer:
         """A motion as it is ordered, on the character of a file in a process of its own."""
-        file = asked.files.get("onto") or asked.files.get("like")
+        file = data.files.get("onto") or data.files.get("like")
         if file is None:
             content = await _in(self._models, content_of, motion, order, character)
         else:
             content = await self._readers.content(motion, order, file)
-        return Answer(content, MEDIA[order.form], order.said.get("understood"))
+        return Answer(content, MEDIA[order.form], order.details.get("understood"))
 
     # ---- describe
 
-    async def describe(self, asked: Asked) -> Answer:
+    async def describe(self, data: RequestData) -> Answer:
         """What ``motet describe --json`` says of a file."""
-        motion = await self._given(asked)
-        said = {"input": asked.files["file"].name, "in_place": await _in(self._threads, is_in_place, motion)}
-        if asked.settings.get("timeline"):
-            if asked.some("beams", "draws"):
+        motion = await self._uploaded_motion(data)
+        about = {"input": data.files["file"].name, "in_place": await _in(self._threads, is_in_place, motion)}
+        if data.settings.get("timeline"):
+            if data.some("beams", "draws"):
                 raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
             parts = await _in(self._models, self._describer.timeline, motion)
-            return _said([{**said, **part.to_json()} for part in parts])
+            return _json_answer([{**about, **part.to_json()} for part in parts])
         windows = await _in(self._threads, self._describer.windows, motion)
-        settings = asked.some("beams", "draws", "seed")
+        settings = data.some("beams", "draws", "seed")
         if settings.get("draws") == 0:  # none drawn: beam search
             settings = {**settings, "draws": None, "decoding": "beam"}
-        found = await self._described(frozenset(settings.items()), [window for _, window in windows])
+        descriptions = await self._described(frozenset(settings.items()), [window for _, window in windows])
         rows = [
-            {**said, "start": start, "stop": start + part.duration, "hypotheses": [one.to_json() for one in row]}
-            for (start, part), row in zip(windows, found, strict=True)
+            {
+                **about,
+                "start": start,
+                "stop": start + part.duration,
+                "hypotheses": [hypothesis.to_json() for hypothesis in row],
+            }
+            for (start, part), row in zip(windows, descriptions, strict=True)
         ]
-        return _said(rows)
+        return _json_answer(rows)
 
     def _describe(self, key: Key, files: list[list[Motion]]) -> list[list[list[Description]]]:
-        found = iter(self._describer.describe([window for file in files for window in file], **cast(Any, dict(key))))
-        return [[next(found) for _ in file] for file in files]
+        all_windows: list[Motion] = []
+        for windows in files:
+            all_windows += windows
+        descriptions = iter(self._describer.describe(all_windows, **cast(Any, dict(key))))
+        return [list(islice(descriptions, len(windows))) for windows in files]
 
-    async def _given(self, asked: Asked) -> Motion:
+    async def _uploaded_motion(self, data: RequestData) -> Motion:
         """The motion of the file of a request."""
-        if "file" not in asked.files:
+        if "file" not in data.files:
             raise RequestError(
                 "there is no file: send its bytes as the body, and its type as format, or a form's 'file'"
             )
-        unit = asked.settings.get("unit_in")
+        unit = data.settings.get("unit_in")
         if unit is not None and unit not in METRES:
             raise RequestError(f"unit_in: expected one of {', '.join(METRES)}, not {unit!r}")
-        options = {**asked.some("clip", "figure", "partial"), **({"unit": unit} if unit else {})}
-        return await self._readers.motion(asked.files["file"], self._bounds, options)
+        options = {**data.some("clip", "figure", "partial"), **({"unit": unit} if unit else {})}
+        return await self._readers.motion(data.files["file"], self._bounds, options)
 
     # ---- predict
 
-    async def predict(self, asked: Asked, form: str) -> Answer:
+    async def predict(self, data: RequestData, form: str) -> Answer:
         """How the motion of a file goes on, like ``motet predict`` writes it."""
-        motion = await self._given(asked)
+        motion = await self._uploaded_motion(data)
         model = self._predictor
-        character = await _in(self._threads, rig_of, asked, form, self.limits)
-        count = model.count(**asked.some("seconds", "frames"))
+        character = await _in(self._threads, rig_of, data, form, self.limits)
+        count = model.count(**data.some("seconds", "frames"))
         self._check_length(count / model.fps)
-        key = frozenset({"frames": count, **asked.some("append")}.items())
-        result = await self._predicted(key, (motion, asked.settings.get("seed", 0)))
-        order = order_of(asked, form, PurePath(asked.files["file"].name).stem)
-        return await self._answer(result, order, asked, character)
+        key = frozenset({"frames": count, **data.some("append")}.items())
+        result = await self._predicted(key, (motion, data.settings.get("seed", 0)))
+        order = order_of(data, form, PurePath(data.files["file"].name).stem)
+        return await self._answer(result, order, data, character)
 
-    def _predict(self, key: Key, asked: list[tuple[Motion, int]]) -> list[Motion]:
-        motions, seeds = zip(*asked, strict=True)
+    def _predict(self, key: Key, requests: list[tuple[Motion, int]]) -> list[Motion]:
+        motions, seeds = zip(*requests, strict=True)
         options = {**dict(key), "seed": list(seeds), "beyond": self._writer}
         return self._predictor.predict(list(motions), **cast(Any, options))
 
 
-def rig_of(asked: Asked, form: str, limits: Limits) -> Character | None:
+def rig_of(data: RequestData, form: str, limits: Limits) -> Character | None:
     """The rig "like" that a motion is to be put on. RequestError where that, or a file "like" or "onto", does not go
     with the format, or the frame rate is out of range."""
-    like = asked.files.get("like") or asked.settings.get("like")
-    onto = asked.files.get("onto")
-    if not 0 < asked.settings.get("fps", 1.0) <= limits.fps:
-        raise RequestError(f"fps: expected more than 0 and at most {limits.fps:g}, not {asked.settings['fps']:g}")
+    like = data.files.get("like") or data.settings.get("like")
+    onto = data.files.get("onto")
+    if not 0 < data.settings.get("fps", 1.0) <= limits.fps:
+        raise RequestError(f"fps: expected more than 0 and at most {limits.fps:g}, not {data.settings['fps']:g}")
     if like and onto:
         raise RequestError("'like' gives only the motion, 'onto' the character with it: give one of the two")
     if onto is None and form == "vrm":
@@ -251,29 +263,29 @@ def rig_of(asked: Asked, form: str, limits: Limits) -> Character | None:
 
 
 def order_of(
-    asked: Asked, form: str, title: str, captions: Captions | None = None, said: dict[str, Any] | None = None
+    data: RequestData, form: str, title: str, captions: Captions | None = None, details: dict[str, Any] | None = None
 ) -> Order:
     """What a request orders."""
-    settings = asked.settings
-    how = {"fps": settings.get("fps"), "in_place": settings.get("in_place", False), "onto": "onto" in asked.files}
-    return Order(form, title, **how, captions=captions, said=said or {})
+    settings = data.settings
+    options = {"fps": settings.get("fps"), "in_place": settings.get("in_place", False), "onto": "onto" in data.files}
+    return Order(form, title, **options, captions=captions, details=details or {})
 
 
-def _said(rows: list[dict[str, Any]]) -> Answer:
+def _json_answer(rows: list[dict[str, Any]]) -> Answer:
     return Answer(as_json(rows), MEDIA["json"])
 
 
-async def _in(pool: ThreadPoolExecutor, call: Callable[..., T], *given: Any) -> T:
+async def _in(pool: ThreadPoolExecutor, call: Callable[..., T], *arguments: Any) -> T:
     """What a call gives, made in a thread of a pool."""
-    return await asyncio.get_running_loop().run_in_executor(pool, unwarned(call), *given)
+    return await asyncio.get_running_loop().run_in_executor(pool, unwarned(call), *arguments)
 
 
 def unwarned(call: Callable[P, T]) -> Callable[P, T]:
     """A call of which nothing is warned: the answers say what was not understood."""
 
     @wraps(call)
-    def without_warnings(*given: P.args, **settings: P.kwargs) -> T:
+    def without_warnings(*arguments: P.args, **settings: P.kwargs) -> T:
         with collected(TextWarning, TravelWarning):
-            return call(*given, **settings)
+            return call(*arguments, **settings)
 
     return without_warnings

@@ -18,7 +18,7 @@ Found = TypeVar("Found")
 class _Waiting(Generic[Key, Item, Found]):
     key: Key
     item: Item
-    found: asyncio.Future[Found]
+    result: asyncio.Future[Found]
 
 
 class Batcher(Generic[Key, Item, Found]):
@@ -42,11 +42,11 @@ class Batcher(Generic[Key, Item, Found]):
 
     async def __call__(self, key: Key, item: Item) -> Found:
         """The result for an item; the errors of ``call`` for it."""
-        one = _Waiting[Key, Item, Found](key, item, asyncio.get_running_loop().create_future())
-        self._waiting.append(one)
+        waiting = _Waiting[Key, Item, Found](key, item, asyncio.get_running_loop().create_future())
+        self._waiting.append(waiting)
         if self._running is None or self._running.done():
             self._running = asyncio.create_task(self._run())
-        return await one.found
+        return await waiting.result
 
     async def _run(self) -> None:
         while self._waiting:
@@ -54,28 +54,28 @@ class Batcher(Generic[Key, Item, Found]):
             await asyncio.get_running_loop().run_in_executor(self._worker, bool)  # its turn; until then more may come
             batch = self._next()
             if batch and not await self._answered(batch):
-                for one in batch:
-                    await self._answered([one])
+                for waiting in batch:
+                    await self._answered([waiting])
 
     def _next(self) -> list[_Waiting[Key, Item, Found]]:
-        here = [one for one in self._waiting if not one.found.done()]
-        batch = [one for one in here if one.key == here[0].key][: self._batch]
-        self._waiting = deque(one for one in here if one not in batch)
+        here = [waiting for waiting in self._waiting if not waiting.result.done()]
+        batch = [waiting for waiting in here if waiting.key == here[0].key][: self._batch]
+        self._waiting = deque(waiting for waiting in here if waiting not in batch)
         return batch
 
     async def _answered(self, batch: Sequence[_Waiting[Key, Item, Found]]) -> bool:
         """Answer a batch, by an error where all are at fault; False where one of several is."""
         run = asyncio.get_running_loop().run_in_executor
         try:
-            results = await run(self._worker, self._call, batch[0].key, [one.item for one in batch])
+            results = await run(self._worker, self._call, batch[0].key, [waiting.item for waiting in batch])
         except Exception as error:
             if len(batch) > 1 and isinstance(error, MotetError):
                 return False
-            for one in batch:
-                if not one.found.done():
-                    one.found.set_exception(error)
+            for waiting in batch:
+                if not waiting.result.done():
+                    waiting.result.set_exception(error)
             return True
-        for one, result in zip(batch, results, strict=True):
-            if not one.found.done():
-                one.found.set_result(result)
+        for waiting, result in zip(batch, results, strict=True):
+            if not waiting.result.done():
+                waiting.result.set_result(result)
         return True

@@ -33,7 +33,7 @@ class Order:
     """What an answer with a motion is to be, as plain values.
 
     form: a format out of MEDIA. title: of a page, or of the clip in a character's file. captions: of a page.
-    onto: whether the character itself is given with the motion. said: what JSON says beside the motion.
+    onto: whether the character itself is given with the motion. details: the other entries of an answer in JSON.
     """
 
     form: str
@@ -42,7 +42,7 @@ class Order:
     in_place: bool = False
     onto: bool = False
     captions: Captions | None = None
-    said: dict[str, Any] = field(default_factory=dict)
+    details: dict[str, Any] = field(default_factory=dict)
 
 
 def content_of(motion: Motion, order: Order, character: Character | None) -> bytes:
@@ -51,7 +51,7 @@ def content_of(motion: Motion, order: Order, character: Character | None) -> byt
     motion = motion if order.fps is None else motion.resample(order.fps)
     motion = in_place(motion) if order.in_place else motion
     if order.form == "json":
-        return as_json({**order.said, "seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
+        return as_json({**order.details, "seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
     file = Upload(b"", f"motion.{order.form}")
     if order.onto and character:
         write_all_on(file, {order.title: motion}, character)
@@ -77,16 +77,16 @@ def frames_of(motion: Motion) -> dict[str, Any]:
 def figure_of(motion: Motion) -> dict[str, Any]:
     """The skeleton and the frame rate of a motion, for JSON."""
     skeleton = skeleton_of(motion)
-    joints = [{"name": one.name, "parent": one.parent, "offset": list(one.offset)} for one in skeleton.joints]
+    joints = [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in skeleton.joints]
     return {"fps": motion.fps, "metres_per_unit": skeleton.metres_per_unit, "joints": joints}
 
 
 def rounded(values: Array) -> list[Any]:
     """Values for JSON, to five decimals: hundredths of millimetres."""
-    found: list[Any] = np.round(values, 5).tolist()
-    return found
+    lists: list[Any] = np.round(values, 5).tolist()
+    return lists
 
 
-def as_json(said: Any) -> bytes:
+def as_json(value: Any) -> bytes:
     """What is said as JSON that is as short as it can be."""
-    return json.dumps(said, separators=(",", ":"), allow_nan=False).encode()
+    return json.dumps(value, separators=(",", ":"), allow_nan=False).encode()

@@ -17,7 +17,7 @@ from motet.serve.answers import Answer, Answers
 from motet.serve.content import MEDIA
 from motet.serve.limits import Limits, refusal
 from motet.serve.openapi import described, manual
-from motet.serve.request import Asked, asked
+from motet.serve.request import RequestData, read_request
 from motet.serve.routes import DOORS, Door
 from motet.serve.uploads import TAKES
 
@@ -71,24 +71,24 @@ def endpoint(door: Door, answers: Answers) -> Endpoint:
     async def answered(request: Request) -> Response:
         try:
             async with asyncio.timeout(limits.seconds):
-                given = await asked(request, door.parameters, door.files, limits)
-                return await while_there(request, _answer(door, answers, given, request))
+                data = await read_request(request, door.parameters, door.files, limits)
+                return await while_there(request, _answer(door, answers, data, request))
         except TimeoutError:
             raise HTTPException(504, f"there was no answer within {limits.seconds:g} s") from None
 
     return answered
 
 
-async def _answer(door: Door, answers: Answers, given: Asked, request: Request) -> Response:
+async def _answer(door: Door, answers: Answers, data: RequestData, request: Request) -> Response:
     if door.name == "stream":
-        lines = await answers.stream(given)
+        lines = await answers.stream(data)
         return StreamingResponse(_to_the_end(lines, answers.limits), media_type="application/x-ndjson")
     if door.name == "describe":
-        return _response(await answers.describe(given), "description.json")
+        return _response(await answers.describe(data), "description.json")
     form = request.path_params["format"]
     if form not in MEDIA:
         raise HTTPException(404, f"there is no format {form!r}: expected one of {', '.join(MEDIA)}")
-    made = await (answers.generate if door.name == "generate" else answers.predict)(given, form)
+    made = await (answers.generate if door.name == "generate" else answers.predict)(data, form)
     return _response(made, f"motion.{form}")
 
 
@@ -122,8 +122,8 @@ async def _to_the_end(lines: AsyncIterator[bytes], limits: Limits) -> AsyncItera
                 return
             yield line
     except (MotetError, TimeoutError) as error:
-        said = str(error) or f"there were no frames within {limits.seconds:g} s"
-        yield json.dumps({"error": said, "type": type(error).__name__}).encode() + b"\n"
+        message = str(error) or f"there were no frames within {limits.seconds:g} s"
+        yield json.dumps({"error": message, "type": type(error).__name__}).encode() + b"\n"
 
 
 async def while_there(request: Request, work: Awaitable[T]) -> T:

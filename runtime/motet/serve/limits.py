@@ -42,9 +42,9 @@ class Limits:
     body_bytes_a_second: int = 1000
 
 
-def refusal(status: int, said: str, kind: str = "RequestError", **headers: str) -> JSONResponse:
+def refusal(status: int, message: str, kind: str = "RequestError", **headers: str) -> JSONResponse:
     """An answer that says in a sentence why there is no other."""
-    printable = said.encode(errors="backslashreplace").decode()  # names in files may be no characters
+    printable = message.encode(errors="backslashreplace").decode()  # names in files may be no characters
     return JSONResponse({"error": printable, "type": kind}, status, headers)
 
 
@@ -107,8 +107,8 @@ class Gate:
         elif declared(scope) > self.limits.body_bytes:
             await refusal(413, self._too_large(), Connection="close")(scope, receive, send)
         elif self.requests >= self.limits.requests:
-            said = f"{self.requests} requests are being answered already: try again later"
-            await refusal(503, said, **{"Retry-After": "1", "Connection": "close"})(scope, receive, send)
+            message = f"{self.requests} requests are being answered already: try again later"
+            await refusal(503, message, **{"Retry-After": "1", "Connection": "close"})(scope, receive, send)
         else:
             await self._passed(scope, receive, send)
 
@@ -125,8 +125,8 @@ class Gate:
             if held > self.limits.body_bytes:
                 raise HTTPException(413, self._too_large(), {"Connection": "close"})
             if self.held > self.limits.all_bytes:
-                said = f"the files of all requests exceed {self.limits.all_bytes} bytes: try again later"
-                raise HTTPException(503, said, {"Retry-After": "1", "Connection": "close"})
+                reason = f"the files of all requests exceed {self.limits.all_bytes} bytes: try again later"
+                raise HTTPException(503, reason, {"Retry-After": "1", "Connection": "close"})
             return message
 
         async def timed(message: Message) -> None:

@@ -26,20 +26,20 @@ REFUSALS = {
 
 def schema(parameter: Parameter) -> dict[str, Any]:
     """The JSON schema of a setting."""
-    found = {**TYPES[parameter.kind], "description": parameter.help}
-    return {**found, "enum": list(parameter.choices)} if parameter.choices else found
+    entry = {**TYPES[parameter.kind], "description": parameter.help}
+    return {**entry, "enum": list(parameter.choices)} if parameter.choices else entry
 
 
 def described(version: str) -> dict[str, Any]:
     """The OpenAPI document."""
-    said = {"type": "object", "properties": {"error": {"type": "string"}, "type": {"type": "string"}}}
+    error = {"type": "object", "properties": {"error": {"type": "string"}, "type": {"type": "string"}}}
     health = {"summary": "Whether it runs, its version, and what it does.", "responses": {"200": {"description": "OK"}}}
     paths = {door.path: {method.lower(): _operation(door, method) for method in door.methods} for door in DOORS}
     return {
         "openapi": "3.1.0",
         "info": {"title": "motet", "version": version, "description": "Motions from sentences, and back."},
         "paths": {**paths, "/health": {"get": health}},
-        "components": {"schemas": {"Error": said}},
+        "components": {"schemas": {"Error": error}},
     }
 
 
@@ -49,10 +49,12 @@ def _operation(door: Door, method: str) -> dict[str, Any]:
     operation: dict[str, Any] = {
         "operationId": door.name if method == "POST" else f"{door.name}_get",
         "summary": door.help,
-        "parameters": [{"name": name, "in": "query", "schema": schema(one)} for name, one in door.parameters.items()],
+        "parameters": [
+            {"name": name, "in": "query", "schema": schema(parameter)} for name, parameter in door.parameters.items()
+        ],
         "responses": {
-            "200": {"description": "The answer.", "content": {one: {} for one in media}},
-            **{status: {"description": said, "content": fault} for status, said in REFUSALS.items()},
+            "200": {"description": "The answer.", "content": {kind: {} for kind in media}},
+            **{status: {"description": meaning, "content": fault} for status, meaning in REFUSALS.items()},
         },
     }
     if door.formats:
@@ -68,7 +70,7 @@ def _media(door: Door) -> str:
 
 
 def _bodies(door: Door) -> dict[str, Any]:
-    settings = {name: schema(one) for name, one in door.parameters.items()}
+    settings = {name: schema(parameter) for name, parameter in door.parameters.items()}
     binary = {"type": "string", "contentMediaType": "application/octet-stream"}
     files = {name: {**binary, "description": FILES[name]} for name in door.files}
     both = {"multipart/form-data": {"schema": {"type": "object", "properties": {**settings, **files}}}}
@@ -86,12 +88,14 @@ def manual(version: str) -> str:
 
 def _section(door: Door) -> str:
     form = f"<p>Formats: {', '.join(MEDIA)}.</p>" if door.formats else ""
-    settings = "".join(_row(name, one.kind, one.help, one.choices) for name, one in door.parameters.items())
+    settings = "".join(
+        _row(name, parameter.kind, parameter.help, parameter.choices) for name, parameter in door.parameters.items()
+    )
     files = "".join(_row(name, "file", FILES[name], ()) for name in door.files)
     title = f"{' or '.join(door.methods)} <code>{escape(door.path)}</code>"
     return f"<h2>{title}</h2><p>{escape(door.help)}</p>{form}<table>{settings}{files}</table>"
 
 
-def _row(name: str, kind: str, said: str, choices: tuple[str, ...]) -> str:
+def _row(name: str, kind: str, help_text: str, choices: tuple[str, ...]) -> str:
     more = f" One of {', '.join(choices)}." if choices else ""
-    return f"<tr><th><code>{escape(name)}</code></th><td>{kind}</td><td>{escape(said + more)}</td></tr>"
+    return f"<tr><th><code>{escape(name)}</code></th><td>{kind}</td><td>{escape(help_text + more)}</td></tr>"

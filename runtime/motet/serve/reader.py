@@ -153,10 +153,10 @@ def main() -> None:
         while True:
             head, parts = receive(requests, memory)
             limit_time(head["seconds"])
-            found, content = answer(head, parts)
+            reply, content = answer(head, parts)
             del parts
-            failed = found.get("error") in {"MemoryError", "Exception"}
-            send(answers, {**found, "last": failed or is_used()}, content)
+            failed = reply.get("error") in {"MemoryError", "Exception"}
+            send(answers, {**reply, "last": failed or is_used()}, content)
 
 
 if __name__ == "__main__":

@@ -130,8 +130,8 @@ class Readers:
     async def motion(self, file: Upload, bounds: Bounds, options: Mapping[str, Any]) -> Motion:
         """The motion of a file, like :func:`motet.serve.uploads.read_upload`."""
         head = {"task": "read", "bounds": asdict(bounds), "options": dict(options)}
-        found, values = await self._answered(file, head, [file.getbuffer()])
-        return unpacked(found, values)
+        reply, values = await self._answered(file, head, [file.getbuffer()])
+        return unpacked(reply, values)
 
     async def content(self, motion: Motion, order: Order, file: Upload) -> bytes:
         """The content of an answer on a file's character, like :func:`motet.serve.content.content_of`."""
@@ -155,18 +155,18 @@ class Readers:
         try:
             if not work.begin(reader):
                 raise MessageError
-            found, content = reader.ask(head, parts, self._memory)
+            reply, content = reader.ask(head, parts, self._memory)
         except MessageError:
             work.end()
             reader.close()
             raise self._too_costly(head["name"]) from None
         is_free = work.end()
-        if is_free and not found.pop("last"):
+        if is_free and not reply.pop("last"):
             self._idle.append(reader)
         else:
             reader.close()
-        self._check(head["name"], found)
-        return found, content[0]
+        self._check(head["name"], reply)
+        return reply, content[0]
 
     def _free(self) -> _Reader:
         """A process that waits, or another."""
@@ -178,16 +178,16 @@ class Readers:
                 reader.close()
         return _Reader(self._memory)
 
-    def _check(self, name: str, found: Head) -> None:
+    def _check(self, name: str, reply: Head) -> None:
         """Raise the error that a process answered with."""
-        kind = found.get("error")
+        kind = reply.get("error")
         if kind is None:
             return
         if kind == "MemoryError":
             raise self._too_costly(name)
         if kind == "FormatError":
-            raise FormatError(found["path"], found["said"], found["line"])
-        raise ERRORS[kind](found["said"]) if kind in ERRORS else RuntimeError(f"{name}: reading it failed")
+            raise FormatError(reply["path"], reply["said"], reply["line"])
+        raise ERRORS[kind](reply["said"]) if kind in ERRORS else RuntimeError(f"{name}: reading it failed")
 
     def _too_costly(self, name: str) -> FormatError:
         megabytes = self._memory >> 20

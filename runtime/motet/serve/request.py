@@ -34,11 +34,11 @@ class Parameter:
     help: str
     choices: tuple[str, ...] = ()
 
-    def from_text(self, name: str, given: Sequence[str]) -> Any:
+    def from_text(self, name: str, texts: Sequence[str]) -> Any:
         """The value of a setting from the texts of an address or a form; RequestError like :meth:`checked`."""
         if self.kind in ("text", "texts"):
-            return self.checked(name, given[-1] if self.kind == "text" else list(given))
-        values = [FLAGS.get(text.lower()) if self.kind == "flag" else _number(text) for text in given]
+            return self.checked(name, texts[-1] if self.kind == "text" else list(texts))
+        values = [FLAGS.get(text.lower()) if self.kind == "flag" else _number(text) for text in texts]
         return self.checked(name, values if self.kind == "numbers" and len(values) > 1 else values[-1])
 
     def checked(self, name: str, value: Any) -> Any:
@@ -63,7 +63,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Asked:
+class RequestData:
     """A request: settings by name as far as they are given, and files by name."""
 
     settings: Mapping[str, Any]
@@ -74,36 +74,38 @@ class Asked:
         return {name: self.settings[name] for name in names if name in self.settings}
 
 
-async def asked(request: Request, parameters: Mapping[str, Parameter], files: Sequence[str], limits: Limits) -> Asked:
+async def read_request(
+    request: Request, parameters: Mapping[str, Parameter], files: Sequence[str], limits: Limits
+) -> RequestData:
     """What a request asks; RequestError for anything that is not among the parameters and files.
 
     The body is a JSON object, a form, or the bytes of the file called "file", whose type is in "format".
     """
-    given = from_texts(request.query_params.multi_items(), parameters)
+    settings = from_texts(request.query_params.multi_items(), parameters)
     uploads = dict[str, Upload]()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "multipart/form-data" or (kind == "application/x-www-form-urlencoded" and "file" not in files):
         async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:
             parts = form.multi_items()
-            uploads = {name: await _upload(name, one, files) for name, one in parts if isinstance(one, UploadFile)}
-            given |= from_texts([(name, one) for name, one in parts if isinstance(one, str)], parameters)
+            uploads = {name: await _upload(name, part, files) for name, part in parts if isinstance(part, UploadFile)}
+            settings |= from_texts([(name, part) for name, part in parts if isinstance(part, str)], parameters)
     elif body := await request.body():
         if kind == "application/json" or "file" not in files:
-            given |= from_json(body, parameters, limits)
+            settings |= from_json(body, parameters, limits)
         else:
             uploads["file"] = Upload(body, "file")
-    if "file" in uploads and "format" in given:
-        uploads["file"].name = f"{PurePath(uploads['file'].name).stem}.{given.pop('format')}"
-    return Asked(given, uploads)
+    if "file" in uploads and "format" in settings:
+        uploads["file"].name = f"{PurePath(uploads['file'].name).stem}.{settings.pop('format')}"
+    return RequestData(settings, uploads)
 
 
 def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> dict[str, Any]:
     """Settings from names and texts, without those that are left empty; RequestError like :func:`from_json`."""
-    found: dict[str, list[str]] = {}
+    texts_of: dict[str, list[str]] = {}
     for name, text in pairs:
         if text or name == "text":
-            found.setdefault(name, []).append(text)
-    return {name: _known(name, parameters).from_text(name, texts) for name, texts in found.items()}
+            texts_of.setdefault(name, []).append(text)
+    return {name: _known(name, parameters).from_text(name, texts) for name, texts in texts_of.items()}
 
 
 def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) -> dict[str, Any]:
@@ -115,20 +117,22 @@ def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) 
     if len(body) > limits.text_bytes:
         raise HTTPException(413, f"the JSON is too large: expected at most {limits.text_bytes} bytes")
     try:
-        told = json.loads(body, parse_constant=refuse)
+        document = json.loads(body, parse_constant=refuse)
     except (ValueError, RecursionError) as fault:
         raise RequestError(f"the body must be JSON: {fault}") from fault
-    if not isinstance(told, dict):
-        raise RequestError(f"the body must be a JSON object, not {quoted(json.dumps(told))}")
-    return {name: _known(name, parameters).checked(name, value) for name, value in told.items() if value is not None}
+    if not isinstance(document, dict):
+        raise RequestError(f"the body must be a JSON object, not {quoted(json.dumps(document))}")
+    return {
+        name: _known(name, parameters).checked(name, value) for name, value in document.items() if value is not None
+    }
 
 
 def _known(name: str, parameters: Mapping[str, Parameter]) -> Parameter:
     if name in parameters:
         return parameters[name]
     near = get_close_matches(name, parameters, 1)
-    said = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(parameters)}"
-    raise RequestError(f"{quoted(name)} is unknown: {said}")
+    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(parameters)}"
+    raise RequestError(f"{quoted(name)} is unknown: {hint}")
 
 
 def _number(text: str) -> float | str:
