@@ -120,7 +120,7 @@ def test_errors_are_the_librarys() -> None:
     [
         Order("bvh", "a walk", fps=20),
         Order("glb", "a walk", onto=True, in_place=True),
-        Order("json", "", said={"understood": [{"confidence": 0.1}]}),
+        Order("json", "", details={"understood": [{"confidence": 0.1}]}),
         Order("html", "a walk", captions=[(0.0, "first"), (0.25, "then")]),
     ],
     ids=lambda order: order.form,
@@ -258,7 +258,7 @@ def test_sentences_are_answered_while_files_are_read(monkeypatch: pytest.MonkeyP
     from motet.predict.model import PredictModel
     from motet.serve.answers import Answers
     from motet.serve.limits import Limits
-    from motet.serve.request import Asked
+    from motet.serve.request import RequestData
 
     pipe = hanging(monkeypatch, tmp_path)
     writer, describer = load_as(CodesModel, "generate"), load_as(DescribeModel, "describe")
@@ -266,11 +266,11 @@ def test_sentences_are_answered_while_files_are_read(monkeypatch: pytest.MonkeyP
 
     async def scenario() -> bytes:
         files = [Upload(file_of(walker(), "bvh"), "a.bvh") for _ in range(readers.READERS + 2)]
-        waiting = [asyncio.create_task(answers.describe(Asked({}, {"file": file}))) for file in files]
+        waiting = [asyncio.create_task(answers.describe(RequestData({}, {"file": file}))) for file in files]
         file = await asyncio.to_thread(pipe.open)
         for _ in range(readers.READERS):
             assert await asyncio.to_thread(file.readline) == "begun\n"
-        answer = await answers.generate(Asked({"text": ["a person walks"], "seconds": 1.0}), "csv")
+        answer = await answers.generate(RequestData({"text": ["a person walks"], "seconds": 1.0}), "csv")
         assert not any(task.done() for task in waiting)
         for task in waiting:
             task.cancel()

@@ -54,7 +54,7 @@ def tdbn_cases(model: TdbnModel, _: Path | None = None) -> list[Case]:
         changing.set_control(next(controls))
         changing.step()
 
-    found = [
+    cases = [
         Case("control.tick", model.start(smooth=False).step, "us"),
         Case("control.tick_smooth", model.start().step, "us"),
         Case("control.tick_changing", changed, "us"),
@@ -62,30 +62,30 @@ def tdbn_cases(model: TdbnModel, _: Path | None = None) -> list[Case]:
     for name, variety in (("control.frames", 0.0), ("control.frames_sampled", 1.0)):
         for batch in (64, 256, 512, 1024, 2048, 4096):
             session = model.start(characters=batch, variety=variety, smooth=False)
-            found.append(Case(name, session.step, "frames/s", batch))
-    return found
+            cases.append(Case(name, session.step, "frames/s", batch))
+    return cases
 
 
 @cases.register
 def steer_cases(model: SteerModel, _: Path | None = None) -> list[Case]:
     """A tick of one character that walks, and of 1000 that go all ways, without and with the foot lock; and the
     positions of all joints of the crowd. Of one character, only one tick in a few searches the table."""
-    found = []
+    cases = []
     for name, characters, unit in (("tick", 1, "us"), ("crowd", 1000, "ms")):
         for kind, hold_feet in (("", False), ("_locked", True)):
             session = model.start(characters=characters, hold_feet=hold_feet)
             session.control(speed=model.usual[model.gaits[0]], direction=np.arange(characters) * 360 / characters)
-            found.append(Case(f"control.{name}{kind}", session.tick, unit))
-    return [*found, Case("control.crowd_positions", session.tick().positions)]
+            cases.append(Case(f"control.{name}{kind}", session.tick, unit))
+    return [*cases, Case("control.crowd_positions", session.tick().positions)]
 
 
 @cases.register
 def _(model: DescribeModel, file: Path | None = None) -> list[Case]:
-    found = describe_cases(model)
+    cases = describe_cases(model)
     if file is None and model.contract.skeleton is None:
-        return found
+        return cases
     path = file or _written("describe.amc", _wandering(model.contract, round(2.8 * model.fps)).resample(120.0))
-    return [*found, Case("describe.file", lambda: model.describe(read_motion(path)))]
+    return [*cases, Case("describe.file", lambda: model.describe(read_motion(path)))]
 
 
 def describe_cases(model: DescribeModel) -> list[Case]:
@@ -93,7 +93,7 @@ def describe_cases(model: DescribeModel) -> list[Case]:
     one alone. By beam search; and one by consensus of 100 draws."""
     end = model.vocabulary.ids[EOS]
     motion = _noise(model.contract, model.fps)
-    never = {"log_probabilities": lambda found: np.where(np.arange(found.shape[1]) == end, np.float32(-1e9), found)}
+    never = {"log_probabilities": lambda rows: np.where(np.arange(rows.shape[1]) == end, np.float32(-1e9), rows)}
     manifest = replace(model.manifest, defaults={"beams": BEAMS, "max_words": WORDS}, loop="beam")
     graphs = {name: graph for name, graph in model.graphs.items() if name != "space"}  # it writes nothing
     steady = DescribeModel(manifest, {**graphs, "step": _Steady(model.graphs["step"], never)})
@@ -140,14 +140,14 @@ def predict_cases(model: PredictModel, file: Path | None = None) -> list[Case]:
     size = (512, model.seed_frames, len(model.contract.channels))
     seeds = np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size).astype(np.float32)
     motion = model.contract.motion(np.tile(seeds[0], (10, 1)))
-    found = [
+    cases = [
         Case("predict.first_frame", lambda: model.next_frames(seeds[:1], 1), "us"),
         Case("predict.horizon", lambda: model.next_frames(seeds[:1]), "us"),
         Case("predict.motion", lambda: model.predict(motion)),
         *_batches("predict.horizons", lambda size: model.next_frames(seeds[:size]), "figures/s", (128, 512)),
     ]
     if motion.skeleton is None:
-        return found
+        return cases
     joints = [replace(one, offset=(*(1.1 * np.array(one.offset)),)) for one in motion.skeleton.joints]
     other = replace(motion, skeleton=replace(motion.skeleton, joints=tuple(joints))).resample(100.0)
     session = model.stream(other)
@@ -158,7 +158,7 @@ def predict_cases(model: PredictModel, file: Path | None = None) -> list[Case]:
 
     path = file or _written("predict.bvh", motion)
     return [
-        *found,
+        *cases,
         Case("predict.streamed", pushed),
         Case("predict.file", lambda: model.predict(read_motion(path))),
     ]

@@ -4,7 +4,7 @@ import json
 import time
 
 
-def main(started: float, what: str, *given: str) -> None:
+def main(started: float, what: str, *arguments: str) -> None:
     """``ceilings``, or ``model BUNDLE THREADS PROVIDER...``: milliseconds of import and load, and memory in MB.
 
     started: by ``time.perf_counter``, before motet was imported.
@@ -12,8 +12,8 @@ def main(started: float, what: str, *given: str) -> None:
     imported = time.perf_counter() - started
     from motet.bench import machine
 
-    found = machine.ceilings() if what == "ceilings" else {"import": 1e3 * imported, **model(*given)}
-    print(json.dumps(found))
+    figures = machine.ceilings() if what == "ceilings" else {"import": 1e3 * imported, **model(*arguments)}
+    print(json.dumps(figures))
 
 
 def model(bundle: str, threads: str, *providers: str) -> dict[str, float]:
@@ -22,9 +22,9 @@ def model(bundle: str, threads: str, *providers: str) -> dict[str, float]:
     from motet.bench import cases, machine
 
     before = time.perf_counter()
-    found = load(bundle, SessionOptions(int(threads), providers))
+    loaded = load(bundle, SessionOptions(int(threads), providers))
     memory = {"load": 1e3 * (time.perf_counter() - before), "memory": machine.peak_memory()}
-    for case in cases.cases(found):
+    for case in cases.cases(loaded):
         case.call()
     memory["memory_peak"] = machine.peak_memory()
     return {name: value for name, value in memory.items() if value is not None}

@@ -56,25 +56,25 @@ class Machine:
         """This one, measured for a second or two."""
         load = round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
         versions = {name: version(name) for name in ("motet", "onnxruntime", "numpy")}
-        found = {str(count): fresh("ceilings", threads=count) for count in sorted({1, cores()})}
-        gflops = {count: one["gflops"] for count, one in found.items()}
-        return Machine(processor(), cores(), versions, load, gflops, found["1"]["gigabytes"])
+        ceilings_of = {str(count): fresh("ceilings", threads=count) for count in sorted({1, cores()})}
+        gflops = {count: ceilings["gflops"] for count, ceilings in ceilings_of.items()}
+        return Machine(processor(), cores(), versions, load, gflops, ceilings_of["1"]["gigabytes"])
 
 
 def processor() -> str:
     """The processor's name, as far as the system tells it."""
     with suppress(OSError):
-        found = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
-        if found:
-            return found[1]
+        entry = re.search(r"model name\s*:\s*(.+)", Path("/proc/cpuinfo").read_text(encoding="utf-8"))
+        if entry:
+            return entry[1]
     return platform.processor() or platform.machine()
 
 
 def ceilings(seconds: float = 0.3) -> dict[str, float]:
     """GFLOP/s of a float32 product and GB/s of a copy by numpy here: the best of calls over ``seconds``."""
-    one = np.ones((768, 768), np.float32)
+    square = np.ones((768, 768), np.float32)
     much = np.ones(16_000_000, np.float32)
-    product = taken(lambda: one @ one, seconds).wall.min()
+    product = taken(lambda: square @ square, seconds).wall.min()
     copy = taken(much.copy, seconds).wall.min()
     return {"gflops": 2 * 768**3 / float(product) / 1e9, "gigabytes": 2 * much.nbytes / float(copy) / 1e9}
 
@@ -82,25 +82,25 @@ def ceilings(seconds: float = 0.3) -> dict[str, float]:
 def peak_memory() -> float | None:
     """The most memory that this process has held so far, in MB; None where the system does not tell."""
     with suppress(OSError):  # not getrusage: it counts what the process was before it began another program
-        found = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text(encoding="utf-8"))
-        if found:
-            return int(found[1]) / 1e3
+        entry = re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text(encoding="utf-8"))
+        if entry:
+            return int(entry[1]) / 1e3
     return None
 
 
-def fresh(what: str, *given: str, threads: int = 1) -> dict[str, float]:
+def fresh(what: str, *arguments: str, threads: int = 1) -> dict[str, float]:
     """What :mod:`motet.bench.fresh` finds in a new process, whose numpy takes so many threads."""
     begin = "import sys, time; now = time.perf_counter(); from motet.bench import fresh; fresh.main(now, *sys.argv[1:])"
-    command = [sys.executable, "-c", begin, what, *given]
+    command = [sys.executable, "-c", begin, what, *arguments]
     environment = os.environ | dict.fromkeys(POOLS, str(threads))
     environment.pop("OPENBLAS_CORETYPE", None)  # it would have numpy take another processor's products
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
-    found: dict[str, float] = json.loads(done.stdout)
-    return found
+    figures: dict[str, float] = json.loads(done.stdout)
+    return figures
 
 
 def begun(bundle: str, options: SessionOptions) -> list[Row]:
     """What a process takes that starts with a model: import and load, and its memory then and after all calls."""
-    found = fresh("model", bundle, str(options.threads), *options.providers)
+    entry = fresh("model", bundle, str(options.threads), *options.providers)
     units = {"import": "ms", "load": "ms", "memory": "MB", "memory_peak": "MB"}
-    return [Row(f"process.{name}", value, units[name]) for name, value in found.items()]
+    return [Row(f"process.{name}", value, units[name]) for name, value in entry.items()]

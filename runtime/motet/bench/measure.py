@@ -112,39 +112,40 @@ def compared(cases: Mapping[str, Sequence[Case]], seconds: float) -> list[Row]:
     ``seconds`` each. A ratio is the median of those of the rounds. Who fails at a row is left out of it."""
     names = dict.fromkeys(case.name for case in next(iter(cases.values())))
     return [
-        _row({who: [one for one in of if one.name == name] for who, of in cases.items()}, seconds) for name in names
+        _row({rival: [case for case in of if case.name == name] for rival, of in cases.items()}, seconds)
+        for name in names
     ]
 
 
 def _row(cases: Mapping[str, Sequence[Case]], seconds: float) -> Row:
     us = next(iter(cases))
-    chosen = {who: case for who, of in cases.items() if (case := _fastest(who, of, seconds, must=who == us))}
-    rounds = [{who: taken(case.call, seconds / ROUNDS) for who, case in chosen.items()} for _ in range(ROUNDS)]
-    middle = [{who: np.median(one.wall) / chosen[who].count for who, one in of.items()} for of in rounds]
-    times = {who: Times.of(_joined([of[who] for of in rounds])) for who in chosen}
-    worked = {who: times[who].processor / case.count for who, case in chosen.items()}
+    chosen = {rival: case for rival, of in cases.items() if (case := _fastest(rival, of, seconds, must=rival == us))}
+    rounds = [{rival: taken(case.call, seconds / ROUNDS) for rival, case in chosen.items()} for _ in range(ROUNDS)]
+    middle = [{rival: np.median(calls.wall) / chosen[rival].count for rival, calls in of.items()} for of in rounds]
+    times = {rival: Times.of(_joined([of[rival] for of in rounds])) for rival in chosen}
+    worked = {rival: times[rival].processor / case.count for rival, case in chosen.items()}
     beside = {
-        who: Beside(
-            case.value(times[who].median / 1e3),
-            float(np.median([of[who] / of[us] for of in middle])),
-            worked[who] / max(worked[us], 1e-9),  # its clock may be a coarse one
-            times[who].p99,
+        rival: Beside(
+            case.value(times[rival].median / 1e3),
+            float(np.median([of[rival] / of[us] for of in middle])),
+            worked[rival] / max(worked[us], 1e-9),  # its clock may be a coarse one
+            times[rival].p99,
         )
-        for who, case in chosen.items()
-        if who != us
+        for rival, case in chosen.items()
+        if rival != us
     }
     case = chosen[us]
     return Row(case.name, case.value(times[us].median / 1e3), case.unit, case.count, times[us], beside)
 
 
-def _fastest(who: str, cases: Sequence[Case], seconds: float, must: bool) -> Case | None:
+def _fastest(rival: str, cases: Sequence[Case], seconds: float, must: bool) -> Case | None:
     """The case that does the most a second; None, with a word, where they fail and need not work."""
     try:
         speed = [case.count / float(taken(case.call, seconds / 10, 1).wall.min()) for case in cases]
     except Exception as error:  # torch.compile fails with classes of many packages, where there is no compiler
         if must:
             raise
-        log.warning("%s: %s is left out: %s", cases[0].name, who, str(error).strip().partition("\n")[0])
+        log.warning("%s: %s is left out: %s", cases[0].name, rival, str(error).strip().partition("\n")[0])
         return None
     return cases[int(np.argmax(speed))]
 

@@ -85,8 +85,8 @@ def with_profiles(
     found = []
     for row in rows:
 
-        def call_of(given: SessionOptions, name: str = row.name, batch: int = row.batch) -> Call:
-            return next(case.call for case in cases(given) if (case.name, case.count) == (name, batch))
+        def call_of(options_of_call: SessionOptions, name: str = row.name, batch: int = row.batch) -> Call:
+            return next(case.call for case in cases(options_of_call) if (case.name, case.count) == (name, batch))
 
         profile = profiled(options, call_of, seconds)
         share = None
@@ -120,14 +120,13 @@ def operations_of(kernel: Mapping[str, Any]) -> float:
     of Einsum it does not have the equation, so that its products are not counted.
     """
     name = kernel["op_name"].removeprefix("Fused")
-    given, found = (
-        [next(iter(one.values())) for one in kernel[f"{which}_type_shape"]] for which in ("input", "output")
-    )
+    inputs = [next(iter(shape.values())) for shape in kernel["input_type_shape"]]
+    outputs = [next(iter(shape.values())) for shape in kernel["output_type_shape"]]
     if name in PRODUCTS:
-        return 2.0 * float(math.prod(found[0])) * float(given[0][-1])
+        return 2.0 * float(math.prod(outputs[0])) * float(inputs[0][-1])
     if name in GATES:
-        directions, batch, units = found[-1][-3:]  # of all states or of the last ones
-        return 2.0 * float(given[0][0] * directions * batch * units * GATES[name] * (given[0][2] + units))
+        directions, batch, units = outputs[-1][-3:]  # of all states or of the last ones
+        return 2.0 * float(inputs[0][0] * directions * batch * units * GATES[name] * (inputs[0][2] + units))
     if name == "Conv":
-        return 2.0 * float(math.prod(found[0])) * float(math.prod(given[1][1:]))
+        return 2.0 * float(math.prod(outputs[0])) * float(math.prod(inputs[1][1:]))
     return 0.0

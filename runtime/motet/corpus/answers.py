@@ -56,16 +56,16 @@ class Answer:
         self.warned = tuple(each_once(notes))
 
 
-def named(given: object, error: MotetError) -> str:
+def named(source: object, error: MotetError) -> str:
     """What an error says, with the motion that it is about."""
     hint = " (--unit-in)" if isinstance(error, UnitError) else ""
-    text = str(error).removeprefix(f"{getattr(given, 'path', None)}: ")
-    return f"{text}{hint}" if str(given) in text else f"{given}: {text}{hint}"
+    text = str(error).removeprefix(f"{getattr(source, 'path', None)}: ")
+    return f"{text}{hint}" if str(source) in text else f"{source}: {text}{hint}"
 
 
 def to_json(row: Any) -> str:
     """A row as JSON on one line."""
-    return json.dumps(row, default=lambda one: one.tolist() if isinstance(one, np.ndarray) else one.to_json())
+    return json.dumps(row, default=lambda value: value.tolist() if isinstance(value, np.ndarray) else value.to_json())
 
 
 @dataclass(frozen=True)
@@ -182,10 +182,10 @@ class Describe(OfModel[DescribeModel]):
 
     def _say(self, windows: Sequence[_Window]) -> None:
         """Describe windows, each a row of its answer."""
-        found = self.model.describe([part for *_, part in windows], **self.settings)
-        for (answer, start, seconds, _), descriptions in zip(windows, found, strict=True):
-            said = {"input": str(answer.source), "in_place": answer.in_place, "start": start, "stop": start + seconds}
-            answer.rows.append({**said, "hypotheses": [one.to_json() for one in descriptions]})
+        hypotheses = self.model.describe([part for *_, part in windows], **self.settings)
+        for (answer, start, seconds, _), descriptions in zip(windows, hypotheses, strict=True):
+            about = {"input": str(answer.source), "in_place": answer.in_place, "start": start, "stop": start + seconds}
+            answer.rows.append({**about, "hypotheses": [description.to_json() for description in descriptions]})
 
     def about(self) -> dict[str, Any]:
         """Also the settings."""
@@ -211,8 +211,8 @@ class Timeline(OfModel[DescribeModel]):
     def alone(self, source: Source) -> Answer:
         """The answer of one motion."""
         answer = super().alone(source)
-        said = {"input": str(source), "in_place": answer.in_place}
-        answer.rows = [{**said, **row} for row in answer.rows]
+        about = {"input": str(source), "in_place": answer.in_place}
+        answer.rows = [{**about, **row} for row in answer.rows]
         return answer
 
 
@@ -247,5 +247,5 @@ class Check(Verb):
 def look(source: Source, reading: Mapping[str, Any]) -> Checked:
     """:func:`motet.check` of a source, whose file may be in a zip."""
     with opened(source.path) as file:
-        found = checked.check(file, clip=source.clip, figure=source.figure, **reading)
-    return found if file == source.path else replace(found, file=str(source.path))
+        row = checked.check(file, clip=source.clip, figure=source.figure, **reading)
+    return row if file == source.path else replace(row, file=str(source.path))

@@ -111,16 +111,16 @@ def check(file: str | Path, *, clip: Clip = None, figure: Figure = None, **optio
     joints = 0 if motion.skeleton is None else len(motion.skeleton.joints)
     about = (str(path), taken, parts.clips, title, titles, len(motion), motion.fps, joints)
     try:
-        found = to_humanoid(motion)
+        humanoid = to_humanoid(motion)
     except MotionError as error:
         return Checked(*about, refused=str(error))
-    way = np.ptp(positions(found.motion)[:, 0], axis=0)
-    travel = float(np.hypot(way[0], way[2])) * (found.leg or leg_length()) / leg_length()
+    way = np.ptp(positions(humanoid.motion)[:, 0], axis=0)
+    travel = float(np.hypot(way[0], way[2])) * (humanoid.leg or leg_length()) / leg_length()
     strides = is_in_place(motion)
-    measured = (_facing(found.motion), *_heights(motion, found), travel)
-    said = found.convention, found.confidence, found.unit, found.height
-    notes = (*found.notes, IMPLIED) if strides else found.notes
-    return Checked(*about, None, *said, *measured, strides, notes, found.joints)
+    measured = (_facing(humanoid.motion), *_heights(motion, humanoid), travel)
+    understood = humanoid.convention, humanoid.confidence, humanoid.unit, humanoid.height
+    notes = (*humanoid.notes, IMPLIED) if strides else humanoid.notes
+    return Checked(*about, None, *understood, *measured, strides, notes, humanoid.joints)
 
 
 def _facing(motion: Motion) -> float | None:
@@ -130,13 +130,13 @@ def _facing(motion: Motion) -> float | None:
     return float(np.degrees(heading(motion[:1])[0])) if level > 0.5 else None
 
 
-def _heights(motion: Motion, found: Humanoid) -> tuple[float, float]:
+def _heights(motion: Motion, humanoid: Humanoid) -> tuple[float, float]:
     """The ground under the soles and the lowest point of soles and joints, in metres over the file's y = 0."""
-    fitted = found.figure.fitted
-    turn = found.figure.turn
-    rotations = global_transforms(found.motion)[0]
+    fitted = humanoid.figure.fitted
+    turn = humanoid.figure.turn
+    rotations = global_transforms(humanoid.motion)[0]
     places = positions(with_figure(motion) if is_mmm(motion) else motion) @ turn.T
     soles = fitted.soles({bone: rotations[:, HUMANOID.index(bone)] for bone in fitted.heights}, places)
     lowest = min(float(places[..., 1].min()), float(soles[..., 1].min()))
-    metres = (found.leg or leg_length()) / fitted.leg
+    metres = (humanoid.leg or leg_length()) / fitted.leg
     return ground_under(soles) * metres, lowest * metres

@@ -45,10 +45,10 @@ ROWS = 10_000
 
 def digest(files: Iterable[Path]) -> str:
     """SHA-256 of the names and sizes of files, by which all parts know that they are of one corpus."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for file in files:
-        found.update(f"{file}\0{size_of(file)}\n".encode(errors="surrogateescape"))
-    return found.hexdigest()
+        digest.update(f"{file}\0{size_of(file)}\n".encode(errors="surrogateescape"))
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,8 @@ class Part:
 
     def _check(self, head: dict[str, Any], path: Path) -> None:
         if different := _different(self.about, {key: value for key, value in head.items() if key != "answers"}):
-            said = f"it was begun with another {different}: remove it, or name another folder"
-            raise OutputError(f"cannot go on with {path}: {said}")
+            reason = f"it was begun with another {different}: remove it, or name another folder"
+            raise OutputError(f"cannot go on with {path}: {reason}")
 
 
 def failures(path: Path) -> tuple[int, int]:
@@ -151,12 +151,12 @@ def _locked(path: Path) -> Iterator[Any]:
         yield file
 
 
-def _different(one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+def _different(row: Mapping[str, Any], other: Mapping[str, Any]) -> str:
     """What two parts differ in, by name."""
-    return ", ".join(sorted(key for key in {*one, *other} if one.get(key) != other.get(key)))
+    return ", ".join(sorted(key for key in {*row, *other} if row.get(key) != other.get(key)))
 
 
-def merge(given: Sequence[Path], out: Path) -> int:
+def merge(paths: Sequence[Path], out: Path) -> int:
     """Merge all parts of a corpus, files or the folders that they are in, into one file; how many answers it has.
 
     out: ``.jsonl``, the same bytes as of one part for all; ``.parquet`` with the columns path, hash, answer (rows as
@@ -166,16 +166,16 @@ def merge(given: Sequence[Path], out: Path) -> int:
     writers = {".jsonl": _write_lines, ".parquet": _write_parquet, ".npy": _write_vectors}
     if out.suffix.lower() not in writers:
         raise OutputError(f"cannot write {out}: parts are merged into {' '.join(writers)}")
-    parts = _complete(given)
+    parts = _complete(paths)
     with replacing(out) as temporary:
         return writers[out.suffix.lower()](parts, temporary)
 
 
-def _complete(given: Sequence[Path]) -> list[Path]:
+def _complete(folders: Sequence[Path]) -> list[Path]:
     """All parts of one corpus, in order."""
-    paths = [file for path in given for file in (sorted(path.glob("*.jsonl*")) if path.is_dir() else [path])]
+    paths = [file for path in folders for file in (sorted(path.glob("*.jsonl*")) if path.is_dir() else [path])]
     if not paths:
-        raise FormatError(given[0], "no parts (.jsonl) are in it")
+        raise FormatError(folders[0], "no parts (.jsonl) are in it")
     by_shard: dict[str, Path] = {}
     first: dict[str, Any] = {}
     for path in paths:
@@ -329,7 +329,7 @@ def _write_parquet(parts: Sequence[Path], out: Path) -> int:
     schema = pa.schema([(name, pa.string()) for name in columns])
     with pq.ParquetWriter(out, schema) as writer:
         while batch := list(islice(answers, ROWS)):
-            table = {name: [one[key] for one in batch] for name, key in columns.items()}
+            table = {name: [row[key] for row in batch] for name, key in columns.items()}
             writer.write_table(pa.table(table, schema=schema))
             count += len(batch)
     return count

@@ -26,7 +26,7 @@ class Actor:
 
     def __call__(self, batch: dict[str, Any]) -> dict[str, list[bytes]]:
         """Pickled sources to pickled answers."""
-        return {"answer": [pickle.dumps(one) for one in self.verb(list(map(pickle.loads, batch["source"])))]}
+        return {"answer": [pickle.dumps(answer) for answer in self.verb(list(map(pickle.loads, batch["source"])))]}
 
 
 def answers(verb: Verb, sources: Sequence[Source], workers: int | None, address: str | None) -> Iterator[Answer]:
@@ -45,14 +45,14 @@ def answers(verb: Verb, sources: Sequence[Source], workers: int | None, address:
     if not items:
         return
     size = max(1, min(verb.most, len(items) // (16 * count)))  # small, so that all actors end at once
-    found = ray.data.from_items(items, override_num_blocks=-(-len(items) // size)).map_batches(
+    rows = ray.data.from_items(items, override_num_blocks=-(-len(items) // size)).map_batches(
         Actor,
         fn_constructor_args=(pickle.dumps(verb), Path.cwd()),
         batch_size=size,
         compute=ray.data.ActorPoolStrategy(size=max(1, count)),
         num_cpus=1,
     )
-    for row in found.iter_rows():
+    for row in rows.iter_rows():
         yield pickle.loads(row["answer"])
 
 
@@ -65,8 +65,8 @@ def _connected(workers: int | None, address: str | None) -> Any:
     quiet: dict[str, Any] = {"logging_level": "ERROR", "log_to_driver": False}
     try:
         if not ray.is_initialized() and address:
-            if found := re.fullmatch(r"(?:ray://)?([^:/]+):(\d+)", address):  # Ray itself tries for minutes
-                socket.create_connection((found[1], int(found[2])), timeout=5).close()
+            if host := re.fullmatch(r"(?:ray://)?([^:/]+):(\d+)", address):  # Ray itself tries for minutes
+                socket.create_connection((host[1], int(host[2])), timeout=5).close()
             ray.init(address=address, **quiet)
         elif not ray.is_initialized():  # one core more reads and hands out what the actors work on
             ray.init(num_cpus=(workers or cores()) + 1, include_dashboard=False, **quiet)

@@ -107,32 +107,32 @@ class Source:
             return Contents((), {})
 
 
-def files_of(given: Sequence[Path]) -> list[Path]:
+def files_of(places: Sequence[Path]) -> list[Path]:
     """The motion files that are meant: of folders and zips all in them, of patterns what they match, each in order of
     names. FormatError for a folder, zip or pattern without any."""
-    return [file for path in given for file in _files(path)]
+    return [file for path in places for file in _files(path)]
 
 
 def _files(path: Path) -> list[Path]:
     if path.is_dir():
-        found = files_in(path, KINDS)
+        files = files_in(path, KINDS)
         where = "are in it"
     elif url := url_of(path):
-        found = _listed(path, url)
+        files = _listed(path, url)
         where = "are there"
     elif path.suffix.lower() == ".zip" and path.is_file():
         with ZipFiles(path) as archive:
-            found = [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in KINDS]
+            files = [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in KINDS]
             where = "are in it"
     elif glob.has_magic(str(path)) and not place_of(split_clip(path, READABLE)[0]).exists():
         matching = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-        found = [one for one in matching if one.suffix.lower() in KINDS]
+        files = [file for file in matching if file.suffix.lower() in KINDS]
         where = "have such names"
     else:
         return [path]
-    if not found:
+    if not files:
         raise FormatError(path, f"no motion files ({' '.join(KINDS)}) {where}")
-    return found
+    return files
 
 
 def sources_of(file: Path, clip: str | None = None, figure: str | None = None, every: bool = False) -> list[Source]:
@@ -235,8 +235,8 @@ def size_of(file: Path) -> int:
 
 def url_of(path: Path) -> str | None:
     """The URL that a path is of, as which "s3://bucket/a.bvh" and what else fsspec knows is given; None for others."""
-    found = re.fullmatch(r"([a-z][a-z0-9+.-]+):/+(.*)", path.as_posix())
-    return f"{found[1]}://{found[2]}" if found else None
+    parts = re.fullmatch(r"([a-z][a-z0-9+.-]+):/+(.*)", path.as_posix())
+    return f"{parts[1]}://{parts[2]}" if parts else None
 
 
 def _system(path: Path, url: str) -> tuple[Any, str]:
@@ -257,8 +257,8 @@ def _listed(path: Path, url: str) -> list[Path]:
         if not glob.has_magic(url) and not system.isdir(name):
             return [path]
         names = system.glob(name) if glob.has_magic(url) else system.find(name)
-    shown = (Path(system.unstrip_protocol(one)) for one in sorted(names))
-    return [one for one in shown if one.suffix.lower() in KINDS and one.name[0] != "."]
+    shown = (Path(system.unstrip_protocol(file)) for file in sorted(names))
+    return [file for file in shown if file.suffix.lower() in KINDS and file.name[0] != "."]
 
 
 def _fetched(path: Path, url: str, folder: Path) -> Path:

@@ -56,23 +56,23 @@ def _pages(place: Path) -> Iterator[Card]:
     made = [drawn.motion for (drawn,) in writer.generate(PROMPTS)]
     write_many(place / "generate.html", made, PROMPTS, "motet generate")
     yield Card("generate.html", "Generate", "Motions from sentences, such as “a person kicks”.", made[1])
-    given = walk[: round(GIVEN * walk.fps) + 1]
-    future = load_as(PredictModel, "predict").predict(given, seconds=FUTURE, append=True, beyond=writer)
-    write(place / "predict.html", future, [(0.0, "given"), (given.duration, "predicted")], "motet predict")
+    start_of_walk = walk[: round(GIVEN * walk.fps) + 1]
+    future = load_as(PredictModel, "predict").predict(start_of_walk, seconds=FUTURE, append=True, beyond=writer)
+    write(place / "predict.html", future, [(0.0, "given"), (start_of_walk.duration, "predicted")], "motet predict")
     yield Card("predict.html", "Predict", "A second of a walk is given; the rest goes on from it.", future)
-    one = made[0][:SHORT]
+    first = made[0][:SHORT]
     other = made[2][:SHORT]
-    joined = load_as(FillModel, "fill").join(one, other)
-    start = one.duration
-    told = [(0.0, PROMPTS[0]), (start, "filled"), (start + JOIN_SECONDS, PROMPTS[2])]
-    write(place / "join.html", joined, told, "motet join")
+    joined = load_as(FillModel, "fill").join(first, other)
+    start = first.duration
+    captions = [(0.0, PROMPTS[0]), (start, "filled"), (start + JOIN_SECONDS, PROMPTS[2])]
+    write(place / "join.html", joined, captions, "motet join")
     yield Card("join.html", "Fill and join", "Two motions, with a transition between them.", joined)
     yield _described(place, [walk[:90], walk[-60:], *made[1:3]])
 
 
 def _described(place: Path, motions: list[Motion]) -> Card:
-    found = load_as(DescribeModel, "describe").describe(motions)
-    write_many(place / "describe.html", motions, [best.text for best, *_ in found], "motet describe")
+    descriptions = load_as(DescribeModel, "describe").describe(motions)
+    write_many(place / "describe.html", motions, [best.text for best, *_ in descriptions], "motet describe")
     return Card("describe.html", "Describe", "Sentences for motions, each above its own.", motions[1])
 
 

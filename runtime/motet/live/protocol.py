@@ -62,31 +62,33 @@ class ClientSession:
 
         ProtocolError or ControlError for one that cannot be obeyed; nothing has changed then.
         """
-        kind, given = parsed(text)
+        kind, arguments = parsed(text)
         with collected(ControlWarning, TextWarning) as notes:
-            unknown = self._obey(kind, given)
+            unknown = self._obey(kind, arguments)
         self.heard += 1
         return [*unknown, *each_once(notes)]
 
-    def _obey(self, kind: str, given: dict[str, Any]) -> list[str]:
+    def _obey(self, kind: str, arguments: dict[str, Any]) -> list[str]:
         """Do what a message says; why an act is not known."""
         if kind == "start":
-            self._start(given)
+            self._start(arguments)
         elif kind == "act":
             try:
-                self.session.act(given.pop("motion", None), **given)
+                self.session.act(arguments.pop("motion", None), **arguments)
             except TextError as error:
                 return [str(error)]
         else:
             nowhere = {"points": None} if "points" in KEYS[kind] else {}
-            getattr(self.session, kind)(**{**nowhere, **given})
+            getattr(self.session, kind)(**{**nowhere, **arguments})
         return []
 
-    def _start(self, given: dict[str, Any]) -> None:
-        characters = given.pop("characters", 1)
-        positions = given.pop("positions", False)
+    def _start(self, arguments: dict[str, Any]) -> None:
+        characters = arguments.pop("characters", 1)
+        positions = arguments.pop("positions", False)
         checked_int("characters", characters, 1, CLIENT_FIGURES, ControlError)
-        self.session = self.model.start(given.pop("gait", None), characters=characters, words=self.words, **given)
+        self.session = self.model.start(
+            arguments.pop("gait", None), characters=characters, words=self.words, **arguments
+        )
         self.positions = positions
         self.ticks = 0
 
@@ -120,9 +122,9 @@ def hello(model: SteerModel) -> str:
     return message("hello", fps=model.fps, gaits=speeds, bones=list(BONES), joints=joints)
 
 
-def message(kind: str, **said: Any) -> str:
+def message(kind: str, **fields: Any) -> str:
     """A message to a client, as JSON that is as short as it can be."""
-    return json.dumps({"type": kind, **said}, separators=(",", ":"), allow_nan=False)
+    return json.dumps({"type": kind, **fields}, separators=(",", ":"), allow_nan=False)
 
 
 def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
@@ -134,21 +136,21 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
     if not isinstance(text, str):
         raise ProtocolError("messages must be text, not binary")
     try:
-        told = json.loads(text, parse_constant=refuse)
+        document = json.loads(text, parse_constant=refuse)
     except (ValueError, RecursionError) as fault:
         raise ProtocolError(f"a message must be JSON: {fault}") from fault
-    kind = told.pop("type", None) if isinstance(told, dict) else None
+    kind = document.pop("type", None) if isinstance(document, dict) else None
     if not isinstance(kind, str) or kind not in KEYS:
         raise ProtocolError(f'a message must be an object whose "type" is one of {", ".join(KEYS)}')
-    given = {name: value for name, value in told.items() if value is not None}
-    for name, value in given.items():
+    arguments = {name: value for name, value in document.items() if value is not None}
+    for name, value in arguments.items():
         if name not in KEYS[kind]:
             raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
         if wanted := _unfit(kind, name, value):
             raise ProtocolError(f"{kind}, {name}: expected {wanted}")
-    if kind in NEEDED and NEEDED[kind] not in given:
+    if kind in NEEDED and NEEDED[kind] not in arguments:
         raise ProtocolError(f"{kind}: expected {NEEDED[kind]}")
-    return kind, given
+    return kind, arguments
 
 
 def _unfit(kind: str, name: str, value: Any) -> str | None:
@@ -160,7 +162,7 @@ def _unfit(kind: str, name: str, value: Any) -> str | None:
         return "the name of a gait"
     if name == "hand" and value not in LEFT_RIGHT:
         return " or ".join(LEFT_RIGHT)
-    if name == "motion" and not all(one is None or isinstance(one, str) for one in _each(value)):
+    if name == "motion" and not all(text is None or isinstance(text, str) for text in _each(value)):
         return "a sentence, or a list of sentences and null"
     if name in ("hold_feet", "positions", "upper") and not isinstance(value, bool):
         return "true or false"
@@ -169,8 +171,8 @@ def _unfit(kind: str, name: str, value: Any) -> str | None:
 
 def sentences(text: str | bytes) -> list[str]:
     """What a client's message tells its figures to do in words, so that it can be made before it is obeyed."""
-    kind, given = parsed(text)
-    return [one for one in _each(given.get("motion")) if one] if kind == "act" else []
+    kind, arguments = parsed(text)
+    return [text for text in _each(arguments.get("motion")) if text] if kind == "act" else []
 
 
 def _each(value: Any) -> list[Any]:

@@ -94,8 +94,8 @@ COMPLETE = {"a human takes a seat on a small stool then rises": 18.0, "a man wal
 @cache
 def repertoire() -> dict[str, Any]:
     """The acts that ship, as pages hold them: their sentences, words and lengths, and all frames."""
-    found: dict[str, Any] = json.loads((files("motet.live") / "repertoire.json").read_text(encoding="utf-8"))
-    return found
+    repertoire: dict[str, Any] = json.loads((files("motet.live") / "repertoire.json").read_text(encoding="utf-8"))
+    return repertoire
 
 
 def made(generate: CodesModel, control: SteerModel) -> dict[str, Any]:
@@ -131,10 +131,10 @@ def differences(numbers: Array) -> NDArray[np.int16]:
 
 def main() -> None:
     """Write ``repertoire.json`` anew."""
-    found = made(load_as(CodesModel, "generate"), load_as(SteerModel, "control"))
+    repertoire = made(load_as(CodesModel, "generate"), load_as(SteerModel, "control"))
     place = Path(__file__).with_name("repertoire.json")
-    place.write_text(json.dumps(found, separators=(",", ":")) + "\n", encoding="utf-8")
-    print(f"{len(found['acts'])} acts: {place.stat().st_size} bytes")
+    place.write_text(json.dumps(repertoire, separators=(",", ":")) + "\n", encoding="utf-8")
+    print(f"{len(repertoire['acts'])} acts: {place.stat().st_size} bytes")
 
 
 if __name__ == "__main__":

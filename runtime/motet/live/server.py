@@ -81,8 +81,8 @@ class Connection(ServerConnection):
         now = self.loop.time()
         self.controls, self.since = (self.controls + 1, self.since) if now < self.since + 1 else (1, now)
         if self.controls > LIMITS.controls and not self.transport.is_closing():
-            said = "dropped a client: more than %d pings, pongs and parts of messages in a second"
-            log.warning(said, LIMITS.controls)
+            reason = "dropped a client: more than %d pings, pongs and parts of messages in a second"
+            log.warning(reason, LIMITS.controls)
             self.transport.abort()
 
 
@@ -151,8 +151,8 @@ class LiveClients:
     async def client(self, connection: Wire) -> None:
         """All of one client, until it goes or is dropped: ticks and its messages, side by side."""
         if len(self._clients) >= self.limits.clients or self._figures() + self.characters > self.limits.figures:
-            said = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
-            await connection.close(1013, said)  # try again later
+            reason = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
+            await connection.close(1013, reason)  # try again later
             return
         client = ClientSession(self.model, self.characters, self.words)
         fault = None
@@ -187,8 +187,8 @@ class LiveClients:
             notes = client.handle(text)
             if self._figures() > self.limits.figures:
                 raise ProtocolError(f"all clients together may have {self.limits.figures} figures")
-            for said in notes:
-                await self._send(connection, protocol.message("note", message=said))
+            for note in notes:
+                await self._send(connection, protocol.message("note", message=note))
 
     async def _made(self, text: str | bytes) -> None:
         """Make the acts that a message tells, in a thread: the figures of all go on meanwhile."""

@@ -35,12 +35,16 @@ OFFSETS = HUMANOID.offsets[[HUMANOID.index(bone) for bone in BONES]].astype(np.f
 def messages(pose: Pose, seconds: float) -> list[Message]:
     """The messages of the first character of a pose: that there is one, the time, the root, and the bones."""
     root: list[str | int | float] = ["root", *_place(pose.place[0]), *_turn(pose.heading[0])]
-    found: list[Message] = [("/VMC/Ext/OK", [1]), ("/VMC/Ext/T", [float(seconds)]), ("/VMC/Ext/Root/Pos", root)]
+    messages_of_pose: list[Message] = [
+        ("/VMC/Ext/OK", [1]),
+        ("/VMC/Ext/T", [float(seconds)]),
+        ("/VMC/Ext/Root/Pos", root),
+    ]
     places = [np.array([0, pose.height[0], 0], dtype=np.float32), *OFFSETS[1:]]  # the hips are the first bone
     for bone, place, quat in zip(BONES, places, pose.rotations[0], strict=True):
         name = bone[0].upper() + bone[1:]  # as Unity calls it (HumanBodyBones)
-        found.append(("/VMC/Ext/Bone/Pos", [name, *_place(place), *_turn(quat)]))
-    return found
+        messages_of_pose.append(("/VMC/Ext/Bone/Pos", [name, *_place(place), *_turn(quat)]))
+    return messages_of_pose
 
 
 def _place(place: Floats) -> list[float]:
@@ -63,11 +67,11 @@ class Sender:
 
     def send(self, pose: Pose, seconds: float) -> None:
         """Send the messages of a pose at a time, 14 in a datagram, so that it has less than 1,400 bytes."""
-        found = messages(pose, seconds)
+        pose_messages = messages(pose, seconds)
         with self._named():
-            for start in range(0, len(found), 14):
+            for start in range(0, len(pose_messages), 14):
                 bundle = OscBundleBuilder(IMMEDIATELY)
-                for address, values in found[start : start + 14]:
+                for address, values in pose_messages[start : start + 14]:
                     bundle.add_content(build_msg(address, values))
                 self._client.send(bundle.build())
 

@@ -138,8 +138,8 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         seconds[-1] += 2 / self.model.fps  # what the last frame is interpolated from
         if steps.keys() - {0}:
             starts = accumulate(seconds, initial=0.0)
-            told = [Moment(at, text) for at, text in zip(starts, [*texts, None], strict=True)]
-            composed = self.model.compose(_line(told, steps, fps, self.model.fps), steer=self.steer, seed=seed)
+            prompts = [Moment(at, text) for at, text in zip(starts, [*texts, None], strict=True)]
+            composed = self.model.compose(_line(prompts, steps, fps, self.model.fps), steer=self.steer, seed=seed)
             return composed.motion.resample(fps)[: request.total_frames]
         plant = request.options is None or request.options.post_processing
         story = self.model.story(texts, seconds=seconds, seed=seed)
@@ -167,42 +167,42 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         if len(posed) < 2:
             raise MotionError("without a prompt, motet goes from key pose to key pose: give two, or a prompt")
         motion = _humanoid(figure, posed, fps)
-        poses = [np.repeat(one[None], self.fill.least, axis=0) for one in placed(motion)]
+        poses = [np.repeat(frame[None], self.fill.least, axis=0) for frame in placed(motion)]
         pieces = [np.repeat(poses[0][:1], min(posed), axis=0)]
-        for (one, two), (before, after) in zip(pairwise(posed), pairwise(poses), strict=True):
-            if (two - one) / fps > self.fill.seconds:
-                far = f"the key poses of frames {one} and {two} are {(two - one) / fps:.2g} s apart"
+        for (start, stop), (before, after) in zip(pairwise(posed), pairwise(poses), strict=True):
+            if (stop - start) / fps > self.fill.seconds:
+                far = f"the key poses of frames {start} and {stop} are {(stop - start) / fps:.2g} s apart"
                 raise MotionError(f"{far}, and at most {self.fill.seconds:g} s are filled: add one, or a prompt")
-            span = (two - one) / fps * self.fill.fps
+            span = (stop - start) / fps * self.fill.fps
             count = max(0, round(span) - 1)
             way = [before[:1], self.fill.frames_between(before, after, count, span / (count + 1)), after[:1]]
-            pieces.append(spline(np.concatenate(way), np.arange(two - one) / (two - one) * (count + 1)))
+            pieces.append(spline(np.concatenate(way), np.arange(stop - start) / (stop - start) * (count + 1)))
         pieces.append(np.repeat(poses[-1][:1], frames - max(posed), axis=0))
         return unplaced(np.concatenate(pieces), motion[:1])
 
     def _notes(self, request: GenerateRequest, seed: int) -> list[dict[str, str]]:
         """What the client cannot see: the seed that was drawn, and what was not understood."""
-        said = [("seed", "info", f"drawn with the seed {seed}")]
+        notes = [("seed", "info", f"drawn with the seed {seed}")]
         for text in dict.fromkeys(getattr(segment, "prompt", IDLE) for segment in request.segments):
-            found = self.model.understood(text)
+            understood = self.model.understood(text)
             unknown = self.model.unknown(text)
             shown = self.model.likeliest(text)
             if shown.lacking:
-                said.append(("left_out", "warning", shown.left_out(text)))
+                notes.append(("left_out", "warning", shown.left_out(text)))
             if unknown:
-                said.append(("unknown_words", "warning", f"{text!r}: unknown words: {', '.join(unknown)}"))
-            if not found.confident:
-                near = ", ".join(map(repr, found.nearest))
-                said.append(("unfamiliar", "warning", f"{text!r} is outside the training data; nearest: {near}"))
+                notes.append(("unknown_words", "warning", f"{text!r}: unknown words: {', '.join(unknown)}"))
+            if not understood.confident:
+                near = ", ".join(map(repr, understood.nearest))
+                notes.append(("unfamiliar", "warning", f"{text!r} is outside the training data; nearest: {near}"))
         if request.options and request.options.guidance and request.options.guidance.type != "nocfg":
-            said.append(("guidance", "info", "guidance is the model's own: the request's is not used"))
-        return [dict(zip(("code", "severity", "message"), one, strict=True)) for one in said]
+            notes.append(("guidance", "info", "guidance is the model's own: the request's is not used"))
+        return [dict(zip(("code", "severity", "message"), note, strict=True)) for note in notes]
 
 
 def _check(request: GenerateRequest, fps: float, options: schemas.Options) -> None:
     """ProtocolError for what the SDK does not check."""
     size = request.total_frames * len(request.skeleton.joints) * options.num_samples
-    for wrong, code, said in (
+    for wrong, code, message in (
         (not SLOWEST <= fps <= FASTEST, "invalid_options", f"timing.fps must be from {SLOWEST:g} to {FASTEST:g}"),
         (size > LARGEST, "invalid_options", f"frames x joints x samples must be at most {LARGEST:,}, not {size:,}"),
         (
@@ -222,7 +222,7 @@ def _check(request: GenerateRequest, fps: float, options: schemas.Options) -> No
         ),
     ):
         if wrong:
-            raise ProtocolError(code, said)
+            raise ProtocolError(code, message)
 
 
 @contextmanager
@@ -242,10 +242,10 @@ def _joint(skeleton: Skeleton, index: int) -> schemas.Joint:
     return schemas.Joint(name=joint.name, parent=parent, rest_translation=joint.offset, rest_rotation=(0, 0, 0, 1))
 
 
-def _figure(given: schemas.Skeleton) -> Figure:
+def _figure(skeleton: schemas.Skeleton) -> Figure:
     """The client's figure; MotionError where it is no human's."""
-    at = {joint.name: place for place, joint in enumerate(given.joints)}
-    joints = [Joint(one.name, at.get(one.parent, -1), one.rest_translation) for one in given.joints]
+    at = {joint.name: place for place, joint in enumerate(skeleton.joints)}
+    joints = [Joint(joint.name, at.get(joint.parent, -1), joint.rest_translation) for joint in skeleton.joints]
     return replace(Figure.of(Skeleton(tuple(joints), 1.0)), ground=0.0)
 
 
@@ -256,29 +256,29 @@ def _keys(request: GenerateRequest, skeleton: Skeleton) -> Keys:
     def add(frame: int, key: Key) -> None:
         keys[frame] = key.joined(keys[frame]) if frame in keys else key
 
-    for one in request.constraints:
-        if one.type == "pose_keyframe":
-            add(one.frame, _pose(one, skeleton))
+    for constraint in request.constraints:
+        if constraint.type == "pose_keyframe":
+            add(constraint.frame, _pose(constraint, skeleton))
             continue
-        facing = one.heading_radians or [np.nan] * len(one.frames)
-        if not np.isfinite([*np.ravel(one.positions_xz), *(one.heading_radians or ())]).all():
+        facing = constraint.heading_radians or [np.nan] * len(constraint.frames)
+        if not np.isfinite([*np.ravel(constraint.positions_xz), *(constraint.heading_radians or ())]).all():
             raise MotionError("root_path: positions and headings must be finite numbers")
-        for frame, (x, z), angle in zip(one.frames, one.positions_xz, facing, strict=True):
+        for frame, (x, z), angle in zip(constraint.frames, constraint.positions_xz, facing, strict=True):
             add(frame, Key(place=np.array([x, np.nan, z]), facing=angle))
     return keys
 
 
-def _pose(given: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
+def _pose(constraint: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
     """A key pose; MotionError for a rotation or a place that is none."""
-    where = f"pose_keyframe of frame {given.frame}"
-    turns = {} if given.fill_mode == "generate" else dict.fromkeys(range(len(skeleton.joints)), np.eye(3))
-    for name, quat in given.joint_rotations.items():
+    where = f"pose_keyframe of frame {constraint.frame}"
+    turns = {} if constraint.fill_mode == "generate" else dict.fromkeys(range(len(skeleton.joints)), np.eye(3))
+    for name, quat in constraint.joint_rotations.items():
         length = float(np.linalg.norm(quat))
         if not 1e-3 < length < 1e3:  # NaN is neither
             raise MotionError(f"{where}: {name!r}: {list(quat)} is no rotation")
         turns[skeleton.index(name)] = quat_to_rotmat(np.array(quat) / length)
-    place = np.full(3, np.nan) if given.root_position is None else np.array(given.root_position)
-    if given.root_position is not None and not np.isfinite(place).all():
+    place = np.full(3, np.nan) if constraint.root_position is None else np.array(constraint.root_position)
+    if constraint.root_position is not None and not np.isfinite(place).all():
         raise MotionError(f"{where}: root_position must be finite numbers")
     return Key(turns, place)
 
@@ -286,23 +286,23 @@ def _pose(given: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
 def _steps(keys: Keys, figure: Figure) -> dict[int, Moment]:
     """Where a root path goes, by frame, at the humanoid's size; where the figure faces first."""
     scale = leg_length() / figure.fitted.leg
-    found = {}
+    moments = {}
     for frame, key in keys.items():
         if np.isfinite(key.place[[0, 2]]).all():
             x, z = (scale * key.place[[0, 2]]).tolist()
             facing = None if frame or np.isnan(key.facing) else math.degrees(key.facing)
-            found[frame] = Moment(0, place=(x, z), facing=facing)
-    return found
+            moments[frame] = Moment(0, place=(x, z), facing=facing)
+    return moments
 
 
-def _line(told: Sequence[Moment], steps: Mapping[int, Moment], fps: float, rate: float) -> list[Moment]:
+def _line(prompts: Sequence[Moment], steps: Mapping[int, Moment], fps: float, rate: float) -> list[Moment]:
     """Prompts and the steps of a path in order of time; a step that is nearly at the time of a moment joins it."""
-    line = {one.at: one for one in told}
+    line = {moment.at: moment for moment in prompts}
     for frame, step in sorted(steps.items()):
         at = frame / fps + 1 / rate if frame else 0.0  # a moment's frame is the last one before it
-        at = next((one for one in line if abs(one - at) < APART), at)
-        one = line.get(at, Moment(at))
-        line[at] = one if one.place else replace(one, place=step.place, facing=step.facing)
+        at = next((time for time in line if abs(time - at) < APART), at)
+        moment = line.get(at, Moment(at))
+        line[at] = moment if moment.place else replace(moment, place=step.place, facing=step.facing)
     return [line[at] for at in sorted(line)]
 
 
@@ -324,7 +324,7 @@ def _humanoid(figure: Figure, keys: Keys, fps: float) -> Motion:
 
 def _on_figure(motion: Motion, figure: Figure) -> Moves:
     """A motion of the humanoid on the client's figure, whose root alone moves: joints above the hips do not turn."""
-    found = from_humanoid(motion, figure)
+    put = from_humanoid(motion, figure)
     skeleton = figure.posture[0]
-    root = skeleton.offsets[0] + (local_translations(found) - skeleton.offsets).sum(axis=1)
-    return Moves(local_rotations(found), root, heading(motion))
+    root = skeleton.offsets[0] + (local_translations(put) - skeleton.offsets).sum(axis=1)
+    return Moves(local_rotations(put), root, heading(motion))
