@@ -1,7 +1,7 @@
-"""Compose: prompts on a time line, and places, facings and poses that are met at given times.
+"""Compose: prompts on a time line, and places, facings and poses that are met at their times.
 
-Walks and runs to a place are steered as by ``control``, all else is a story as of ``generate``; what then still lacks
-at a place is added to the path, and at a pose to the joints around it; standing feet are held.
+Walks and runs to a place are steered as by ``control``, all else is a story as of ``generate``. The rest of the way to
+a place is added to the path, and the difference from a pose to the joints around it; standing feet are held.
 """
 
 import math
@@ -39,13 +39,13 @@ REACH = 0.5
 """Seconds within which a figure comes to a pose, and leaves it."""
 
 DRIFT = 0.5
-"""Metres a second by which a motion that is not steered is moved at most: more is seen."""
+"""Largest invisible correction of an unsteered motion, m/s."""
 
 DRAWS = 4
-"""How often such a motion is drawn at most."""
+"""The most times that an unsteered motion is drawn."""
 
 FLAT = np.array([1.0, np.nan, 1.0])
-"""Of a place, x and z: the height stays free."""
+"""Multiplies a place: x and z stay, and the height is free."""
 
 BURIED = 0.05
 """Metres that a pose may be under the ground, where soles are thinner than the humanoid's."""
@@ -55,18 +55,22 @@ What = Literal["place", "facing", "pose"]
 
 
 class Met(NamedTuple):
-    """How well something asked for was met.
-
-    off: centimetres of a place; degrees of a facing; of a pose the mean distance of its joints in centimetres, with the
-        figure's place and heading taken out. worst: of a pose, that of its worst joint. late: seconds from when it was
-        asked to when it is nearest, within a centimetre or a degree.
-    """
+    """How well a place, a facing or a pose was met."""
 
     at: float
+    """Its time in the plan, seconds."""
+
     what: What
+
     off: float
+    """Centimetres of a place; degrees of a facing; of a pose the mean distance of its joints in centimetres, with the
+    figure's place and heading taken out."""
+
     worst: float
+    """Of a pose, the distance of its worst joint."""
+
     late: float
+    """Seconds between its time and the time at which it is nearest, within a centimetre or a degree."""
 
     def __str__(self) -> str:
         """In words."""
@@ -77,15 +81,20 @@ class Met(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """A motion of the humanoid at the models' rate; when each prompt is shown; how well all else was met."""
+    """A motion that follows a plan."""
 
     motion: Motion
+    """Of the humanoid, at the models' frame rate."""
+
     passages: tuple[Passage, ...]
+    """When each prompt is shown."""
+
     met: tuple[Met, ...]
+    """How well places, facings and poses were met."""
 
 
 def _frame(at: float, fps: float) -> int:
-    """The frame of a moment: the last one before it, since the next one begins what comes then."""
+    """The frame of a moment: the last one before it, since the next frame begins what follows."""
     return max(0, round(at * fps) - 1)
 
 
@@ -103,48 +112,64 @@ def compose(moments: Sequence[Moment], writer: "CodesModel", steer: SteerModel, 
     fps = writer.fps
     if fps != steer.fps:
         raise SettingError(f"models of one frame rate are needed, not {fps:g} and {steer.fps:g}")
-    line, motion, passages = time_line(moments), None, list[Passage]()
-    poses = {_frame(one.at, fps): _pose(one) for one in line if one.pose is not None}
+    line = time_line(moments)
+    poses = {_frame(moment.at, fps): _pose(moment) for moment in line if moment.pose is not None}
     start = _start(line[0])
-    legs = [_leg(one, start, fps) for one in line[1:] if (one.place, one.facing) != (None, None)]
+    legs = []
+    for moment in line[1:]:
+        if moment.place is not None or moment.facing is not None:
+            legs.append(_leg(moment, start, fps))
+
+    # Prompts are drawn one after another, seen from the start: walks alone, and all between two walks as one story.
+    motion: Motion | None = None
+    passages: list[Passage] = []
     for parts in _runs(_parts(line, legs, steer)):
-        own = [leg for leg in legs if parts[0].start <= leg.frame < parts[-1].stop]
+        legs_of_parts = [leg for leg in legs if parts[0].start <= leg.frame < parts[-1].stop]
         if walk := parts[0].walk:
-            motion = _led(motion, walked(steer, walk, motion), parts, own)
+            motion = _led(motion, walked(steer, walk, motion), parts, legs_of_parts)
             passages.append(Passage(walk.text, walk.start / fps, walk.stop / fps, f"{walk.gait.name}, steered"))
         else:
-            motion, story = _told(parts, own, writer, motion, seed, strict)
-            begun = parts[0].start / fps
-            passages += [replace(one, start=one.start + begun, stop=one.stop + begun) for one in story.passages]
+            motion, story = _drawn(parts, legs_of_parts, writer, motion, seed, strict)
+            begin = parts[0].start / fps
+            for passage in story.passages:
+                passages.append(replace(passage, start=passage.start + begin, stop=passage.stop + begin))
     assert motion is not None
+
+    # Then it is put where the plan starts, led through the poses, and its feet are held.
     motion = hold_feet(_through(moved(motion, line[0]), poses), ground=0.0)
     return Composition(motion, tuple(passages), met(motion, line))
 
 
 def _leg(moment: Moment, start: Array, fps: float) -> Leg:
-    """Where a moment asks to be, as it is seen from the start (3,): x, z and facing."""
-    sin, cos = np.sin(start[2]), np.cos(start[2])
-    x, z = np.array(moment.place or (0.0, 0.0)) - start[:2]
-    place = np.array([x * cos - z * sin, z * cos + x * sin]) if moment.place else None
-    return Leg(_frame(moment.at, fps), place, None if moment.facing is None else math.radians(moment.facing) - start[2])
+    """The place and facing of a moment, seen from the start (3,): x, z and facing."""
+    frame = _frame(moment.at, fps)
+    place = None
+    if moment.place:
+        sin = np.sin(start[2])
+        cos = np.cos(start[2])
+        x, z = np.array(moment.place) - start[:2]
+        place = np.array([x * cos - z * sin, z * cos + x * sin])
+    return Leg(frame, place, None if moment.facing is None else math.radians(moment.facing) - start[2])
 
 
 def _parts(line: Sequence[Moment], legs: Sequence[Leg], steer: SteerModel) -> list[_Part]:
-    """The prompts in order. One with a gait goes to its own places, then towards the next one that is asked for."""
-    told = [one for one in line if one.text is not None]
-    starts = [round(one.at * steer.fps) for one in (*told, line[-1])]
-    gaits = [gait_of(str(one.text), steer) for one in told]
-    found = []
-    for i, (one, gait, (start, stop)) in enumerate(zip(told, gaits, pairwise(starts), strict=True)):
-        until = next((starts[j] for j in range(i + 1, len(told)) if gaits[j]), starts[-1])
-        ahead = [leg for leg in legs if start <= leg.frame < until]
-        own = [leg for leg in ahead if leg.frame < stop]
-        if not own or own[-1].frame < stop - 1:
-            own += [leg._replace(frame=stop - 1) for leg in ahead[len(own) : len(own) + 1]]
-        halts = i + 1 < len(told) and not gaits[i + 1]
-        walk = Walk(str(one.text), start, stop, gait, own, halts) if gait and own else None
-        found.append(_Part(str(one.text), start, stop, walk))
-    return found
+    """The prompts in order. One with a gait goes to its own places, then towards the next place of the plan."""
+    prompts = [moment for moment in line if moment.text is not None]
+    starts = [round(moment.at * steer.fps) for moment in (*prompts, line[-1])]
+    gaits = [gait_of(str(prompt.text), steer) for prompt in prompts]
+    parts = []
+    for i, (prompt, gait, (start, stop)) in enumerate(zip(prompts, gaits, pairwise(starts), strict=True)):
+        next_walk = next((starts[j] for j in range(i + 1, len(prompts)) if gaits[j]), starts[-1])
+        legs_ahead = [leg for leg in legs if start <= leg.frame < next_walk]
+        walk_legs = [leg for leg in legs_ahead if leg.frame < stop]
+        following = legs_ahead[len(walk_legs) :]
+        if following and (not walk_legs or walk_legs[-1].frame < stop - 1):
+            walk_legs.append(following[0]._replace(frame=stop - 1))
+        halts = i + 1 < len(prompts) and not gaits[i + 1]
+        text = str(prompt.text)
+        walk = Walk(text, start, stop, gait, walk_legs, halts) if gait and walk_legs else None
+        parts.append(_Part(text, start, stop, walk))
+    return parts
 
 
 def _runs(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
@@ -153,87 +178,104 @@ def _runs(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
         yield list(run)
 
 
-def _told(
+def _drawn(
     parts: Sequence[_Part], legs: Sequence[Leg], writer: "CodesModel", after: Motion | None, seed: int, strict: bool
 ) -> tuple[Motion, "Story"]:
-    """Prompts that are not steered, each as long as it is shown; drawn anew where a draw is too far from a place."""
+    """Prompts that are not steered, each as long as it is shown; drawn again if the motion is too far from a place."""
     seconds = [(part.stop - part.start) / writer.fps for part in parts]
     texts = [part.text for part in parts]
-    for again in reversed(range(DRAWS)):
+    for draws_left in reversed(range(DRAWS)):
         story = writer.story(texts, seconds=seconds, after=after, seed=seed, strict=strict)
         try:
             new = writer.contract.motion(story.frames, after=after, plant=False)
             return _led(after, new, parts, legs), story
         except MotionError:
-            if not again:
+            if not draws_left:
                 raise
         seed = int(np.random.SeedSequence(seed).generate_state(1)[0])
     raise AssertionError
 
 
 def _through(motion: Motion, poses: Mapping[int, Array]) -> Motion:
-    """The motion that comes to poses (1, E), where the figure is then, and leaves them."""
-    moves, keys = _moves(motion), {}
+    """The motion that comes to poses (1, E), wherever the figure is at their frames, and leaves them."""
+    moves = _moves(motion)
+    keys = {}
     for at, pose in poses.items():
-        here = unplaced(put_at(seen_from(pose, pose_of(pose[0])), pose_of(placed(motion[at])[0])), motion)
+        place_of_figure = pose_of(placed(motion[at])[0])
+        pose_there = unplaced(put_at(seen_from(pose, pose_of(pose[0])), place_of_figure), motion)
         height = np.array([np.nan, pose[0, 1], np.nan])
-        keys[at] = Key(dict(enumerate(local_rotations(here)[0])), height, moves.facing[at])
+        keys[at] = Key(dict(enumerate(local_rotations(pose_there)[0])), height, moves.facing[at])
     moves = moves.through(keys, round(REACH * motion.fps))
-    turned = {name: moves.turns[:, joint] for joint, name in enumerate(HUMANOID.names)}
-    return posed(motion, turned, {BONES[0]: moves.root}).continuous()
+    turns = {name: moves.turns[:, joint] for joint, name in enumerate(HUMANOID.names)}
+    return posed(motion, turns, {BONES[0]: moves.root}).continuous()
 
 
 def _moves(motion: Motion) -> Moves:
     return Moves(local_rotations(motion), local_translations(motion)[:, 0], heading(motion))
 
 
-def _led(before: Motion | None, own: Motion, parts: Sequence[_Part], legs: Sequence[Leg]) -> Motion:
-    """A motion and the next parts, which are led to where they lack: turned on the way to a place, and moved.
-    MotionError where that is too much, with the time it takes."""
-    begun, last = parts[0].start, 0
-    moves = _moves(own)
+def _led(before: Motion | None, motion: Motion, parts: Sequence[_Part], legs: Sequence[Leg]) -> Motion:
+    """A motion and the next parts, led to their places: turned on the way to each, and moved. MotionError where that
+    is too much, with the time it takes."""
+    moves = _moves(motion)
+    last = 0
     for leg in legs:
-        at = leg.frame - begun
-        here = {last: Key(place=moves.root[last] * FLAT, facing=moves.facing[last])}
+        at = leg.frame - parts[0].start
+        # The way over the ground that the motion goes, and the way to the place; NaN without one.
+        way = (moves.root[at] - moves.root[last])[[0, 2]]
         place = FLAT * np.nan if leg.place is None else np.insert(leg.place, 1, np.nan)
-        went, wanted = ((to - moves.root[last])[[0, 2]] for to in (moves.root[at], place))
-        if leg.facing is None and np.hypot(*(wanted - went)) > DRIFT and np.hypot(*went) > DRIFT:
-            turn, turned = np.arctan2(*wanted) - np.arctan2(*went), min(last + round(own.fps), at)
+        wanted = (place - moves.root[last])[[0, 2]]
+        here = {last: Key(place=moves.root[last] * FLAT, facing=moves.facing[last])}
+        # Turned within a second, unless the facing is planned or the way is short.
+        if leg.facing is None and np.hypot(*(wanted - way)) > DRIFT and np.hypot(*way) > DRIFT:
+            turn = np.arctan2(*wanted) - np.arctan2(*way)
+            turned = min(last + round(motion.fps), at)
             moves = moves.through(here | {turned: Key(facing=moves.facing[turned] + turn)}, 1)
-        lacks, seconds = float(np.hypot(*(place - moves.root[at])[[0, 2]])), (at - last) / own.fps
-        if lacks > DRIFT * max(1.0, seconds):
+        # Moved the rest of the way.
+        rest = float(np.hypot(*(place - moves.root[at])[[0, 2]]))
+        seconds = (at - last) / motion.fps
+        if rest > DRIFT * max(1.0, seconds):
             text = next(part.text for part in parts if leg.frame < part.stop)
-            goes, far = (float(np.hypot(*way)) for way in (went, wanted))
-            takes = "walk there first" if goes < DRIFT else f"it takes {far / goes * seconds:.1f} s"
-            raise MotionError(
-                f"{text!r} goes {goes:.1f} m in {seconds:.1f} s, and the place of {(leg.frame + 1) / own.fps:.3g} s "
-                f"is {far:.1f} m away: {takes if goes < far else 'it does not stay so near'}"
-            )
-        moves = moves.through(here | {at: Key(place=place, facing=np.nan if leg.facing is None else leg.facing)}, 1)
+            raise _too_far(text, way, wanted, seconds, (leg.frame + 1) / motion.fps)
+        facing = np.nan if leg.facing is None else leg.facing
+        moves = moves.through(here | {at: Key(place=place, facing=facing)}, 1)
         last = at
     root = BONES[0]
-    found = posed(own, {root: moves.turns[:, 0]}, {root: moves.root})
-    together = found.values if before is None else np.concatenate([before.values, found.values])
-    return replace(own, values=together).continuous()
+    new = posed(motion, {root: moves.turns[:, 0]}, {root: moves.root})
+    together = new.values if before is None else np.concatenate([before.values, new.values])
+    return replace(motion, values=together).continuous()
+
+
+def _too_far(text: str, way: Array, wanted: Array, seconds: float, at: float) -> MotionError:
+    """The error of a prompt that goes a way (2,) in some seconds, and not the way that is wanted until ``at``."""
+    goes = float(np.hypot(*way))
+    far = float(np.hypot(*wanted))
+    advice = "it does not stay so near"
+    if goes < far:
+        advice = "walk there first" if goes < DRIFT else f"it takes {far / goes * seconds:.1f} s"
+    return MotionError(
+        f"{text!r} goes {goes:.1f} m in {seconds:.1f} s, and the place of {at:.3g} s is {far:.1f} m away: {advice}"
+    )
 
 
 def _pose(moment: Moment) -> Array:
     """The placed frame (1, E) of a moment's pose; MotionError for one of no human, or under the ground."""
     assert moment.pose is not None
     try:
-        one = on_humanoid(moment.pose)[int(moment.pose_at * moment.pose.fps)]
+        pose = on_humanoid(moment.pose)[int(moment.pose_at * moment.pose.fps)]
     except MotionError as error:
         raise MotionError(f"the pose of {moment.at:g} s: {error}") from error
-    turned, places = global_transforms(one)
-    low = min(float(places[..., 1].min()), float(sole_points(turned, places)[..., 1].min()))
+    rotations, positions_of_joints = global_transforms(pose)
+    soles = sole_points(rotations, positions_of_joints)
+    low = min(float(positions_of_joints[..., 1].min()), float(soles[..., 1].min()))
     if low < -BURIED:
         raise MotionError(f"the pose of {moment.at:g} s is {-100 * low:.0f} cm under the ground")
-    found: Array = placed(one)
-    return found
+    frame: Array = placed(pose)
+    return frame
 
 
 def moved(motion: Motion, start: Moment) -> Motion:
-    """A motion of the humanoid that begins at the origin, as it is seen where a moment says."""
+    """A motion of the humanoid that begins at the origin, put at the place and facing of a moment."""
     return unplaced(put_at(placed(motion), _start(start)), motion)
 
 
@@ -242,29 +284,39 @@ def _start(moment: Moment) -> Array:
 
 
 def met(motion: Motion, moments: Sequence[Moment]) -> tuple[Met, ...]:
-    """What moments ask for, beside what a motion of the humanoid does within a second of them."""
-    frames, turned, found = placed(motion), heading(motion), list[Met]()
-    for one in moments:
-        at = min(_frame(one.at, motion.fps), len(motion) - 1)
-        near = slice(max(0, at - round(motion.fps)), at + round(motion.fps) + 1)
-        off: dict[What, Array] = {}  # by frame and joint
-        if one.place is not None:
-            off["place"] = 100 * np.hypot(*(frames[near][:, [0, 2]] - one.place).T)[:, None]
-        if one.facing is not None:
-            off["facing"] = np.abs(np.degrees(wrapped(turned[near] - math.radians(one.facing))))[:, None]
-        if one.pose is not None:
-            off["pose"] = 100 * np.linalg.norm(_joints(frames[near], motion) - _joints(_pose(one), motion), axis=-1)
-        for what, each in off.items():
-            mean, late = each.mean(axis=1), np.abs(np.arange(len(each)) + near.start - at) / motion.fps
-            here = at - near.start
-            nearest = float(late[mean <= mean.min() + 1].min())
-            found.append(Met(one.at, what, float(mean[here]), float(each[here].max()), nearest))
-    return tuple(found)
+    """How well a motion of the humanoid meets the moments of a plan, within a second of each."""
+    frames = placed(motion)
+    headings = heading(motion)
+    results = []
+    for moment in moments:
+        at = min(_frame(moment.at, motion.fps), len(motion) - 1)
+        first = max(0, at - round(motion.fps))
+        near = slice(first, at + round(motion.fps) + 1)
+        for what, distances in _distances(moment, frames[near], headings[near], motion).items():
+            mean = distances.mean(axis=1)
+            seconds_off = np.abs(np.arange(len(mean)) + first - at) / motion.fps
+            late = float(seconds_off[mean <= mean.min() + 1].min())
+            here = at - first
+            results.append(Met(moment.at, what, float(mean[here]), float(distances[here].max()), late))
+    return tuple(results)
+
+
+def _distances(moment: Moment, frames: Array, headings: Array, motion: Motion) -> dict[What, Array]:
+    """The distances (T, J) of a moment's place, facing and pose from placed frames (T, E): centimetres and degrees."""
+    distances: dict[What, Array] = {}
+    if moment.place is not None:
+        distances["place"] = 100 * np.hypot(*(frames[:, [0, 2]] - moment.place).T)[:, None]
+    if moment.facing is not None:
+        distances["facing"] = np.abs(np.degrees(wrapped(headings - math.radians(moment.facing))))[:, None]
+    if moment.pose is not None:
+        off = _joints(frames, motion) - _joints(_pose(moment), motion)
+        distances["pose"] = 100 * np.linalg.norm(off, axis=-1)
+    return distances
 
 
 def _joints(frames: Array, like: Motion) -> Array:
     """Places (T, J, 3) of the joints of placed frames (T, E), each frame seen from where it is, without tips."""
     seen = seen_from(frames[:, None], pose_of(frames))[:, 0]
     joints = [HUMANOID.index(name) for name in BONES]
-    found: Array = positions(unplaced(seen, like))[:, joints]
-    return found
+    places: Array = positions(unplaced(seen, like))[:, joints]
+    return places

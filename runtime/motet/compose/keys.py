@@ -1,7 +1,7 @@
 """A motion made to pass through given places, facings and poses: motion warping (Witkin and Popović 1995).
 
-What lacks at a key is added to the motion around it, so all the motion's own detail stays. The path keeps what was
-added from the last key on; poses return to the motion's own.
+The difference from a key is added to the motion around it, so that the motion keeps its detail. After the last key the
+path keeps its offset, and poses return to those of the motion.
 """
 
 from collections.abc import Mapping
@@ -24,27 +24,28 @@ from motet.motion.rotations import (
 )
 
 ALIKE = 0.01
-"""Metres and radians: what is asked for twice may differ by this."""
+"""Metres and radians by which two keys of one frame may differ."""
 
 
 @dataclass(frozen=True, eq=False)
 class Key:
-    """What a figure is to be at one frame.
-
-    turns: joint -> its rotation (3, 3) in its parent's frame. place: x, y and z of the root. facing: radians about the
-    vertical axis, 0 along z and positive towards x. Of place and facing what is free is NaN.
-    """
+    """The pose, place and facing of a figure at one frame, as far as they are fixed."""
 
     turns: Mapping[int, Array] = field(default_factory=dict)
+    """Joint -> its rotation (3, 3) in its parent's frame."""
+
     place: Array = field(default_factory=lambda: np.full(3, np.nan))
+    """x, y and z of the root; NaN where free."""
+
     facing: float = np.nan
+    """Radians about the vertical axis, 0 along z and positive towards x; NaN where free."""
 
     def joined(self, other: "Key") -> "Key":
         """Both keys of one frame; MotionError where they contradict each other."""
         shared = self.turns.keys() & other.turns.keys()
         off = [np.linalg.norm(rotmat_to_rotvec(self.turns[joint].T @ other.turns[joint])) for joint in shared]
         off += [*np.abs(self.place - other.place), np.abs(wrapped(np.array(self.facing - other.facing)))]
-        if any(one > ALIKE for one in off):  # what is free is NaN
+        if any(distance > ALIKE for distance in off):  # NaN where one of them is free
             raise MotionError("two constraints ask for different poses or places at the same time")
         place = np.where(np.isnan(self.place), other.place, self.place)
         facing = other.facing if np.isnan(self.facing) else self.facing
@@ -65,54 +66,74 @@ class Moves:
 
         reach: frames before and after a key from which the pose leaves, and to which it returns to, the motion's own.
         """
-        led = self._led({frame: keys[frame] for frame in sorted(keys)})
-        turns, root = led.turns.copy(), led.root.copy()
-        rises = {frame: key.place[1:2] - root[frame, 1:2] for frame, key in keys.items() if np.isfinite(key.place[1])}
+        moves = self._led({frame: keys[frame] for frame in sorted(keys)})
+        turns = moves.turns.copy()
+        root = moves.root.copy()
+
+        # The height of the root.
+        rises = {}
+        for frame, key in keys.items():
+            if np.isfinite(key.place[1]):
+                rises[frame] = key.place[1:2] - root[frame, 1:2]
         root[:, 1:2] += _swell(rises, len(root), reach)
+
+        # The rotation of each joint, as a rotation vector from the motion to the key.
         for joint in set().union(*(key.turns for key in keys.values())):
-            own = turns[:, joint]
-            off = {f: rotmat_to_rotvec(key.turns[joint] @ own[f].T) for f, key in keys.items() if joint in key.turns}
-            turns[:, joint] = product(rotvec_to_rotmat(_swell(off, len(root), reach)), own)
-        return Moves(turns, root, led.facing)
+            before = turns[:, joint]
+            off = {}
+            for frame, key in keys.items():
+                if joint in key.turns:
+                    off[frame] = rotmat_to_rotvec(key.turns[joint] @ before[frame].T)
+            turns[:, joint] = product(rotvec_to_rotmat(_swell(off, len(root), reach)), before)
+        return Moves(turns, root, moves.facing)
 
     def _led(self, keys: Mapping[int, Key]) -> "Moves":
         """The path turned and moved over the ground, as a whole before the first key and after the last, and evenly in
         between."""
         frames = np.arange(len(self.root))
-        off = {frame: turn for frame, key in keys.items() if np.isfinite(turn := self._off(frame, key))}
-        angle = np.interp(frames, list(off), np.unwrap(list(off.values()))) if off else np.zeros(len(frames))
+        # Turned as a whole, every step of the path about the vertical axis.
+        angle = np.zeros(len(frames))
+        off = {frame: self._off(frame, key) for frame, key in keys.items()}
+        off = {frame: turn for frame, turn in off.items() if np.isfinite(turn)}
+        if off:
+            angle = np.interp(frames, list(off), np.unwrap(list(off.values())))
         about = axis_to_rotmat("y", angle)
         turns = np.concatenate([product(about, self.turns[:, 0])[:, None], self.turns[:, 1:]], axis=1)
         steps = np.diff(self.root, axis=0, prepend=self.root[:1])
         root = self.root[:1] + np.cumsum(rotated(about, steps), axis=0)
+        # Then moved along x and z.
         for axis in (0, 2):
-            pins = {frame: key.place[axis] - root[frame, axis] for frame, key in keys.items()}
-            pins = {frame: pin for frame, pin in pins.items() if np.isfinite(pin)}
-            root[:, axis] += np.interp(frames, list(pins), list(pins.values())) if pins else 0.0
+            shifts = {frame: key.place[axis] - root[frame, axis] for frame, key in keys.items()}
+            shifts = {frame: shift for frame, shift in shifts.items() if np.isfinite(shift)}
+            if shifts:
+                root[:, axis] += np.interp(frames, list(shifts), list(shifts.values()))
         return Moves(turns, root, self.facing + angle)
 
     def _off(self, frame: int, key: Key) -> float:
-        """By how much a key faces elsewhere, in radians; NaN where it does not say."""
+        """The angle from the motion's facing to a key's, in radians; NaN where that is free."""
         if 0 in key.turns and np.isnan(key.facing):
             return float(rotmat_to_rotvec(twist((key.turns[0] @ self.turns[frame, 0].T)[None], UP))[0, 1])
         return float(wrapped(np.array(key.facing - self.facing[frame])))
 
 
 def _swell(values: Mapping[int, Array], count: int, reach: int) -> Array:
-    """Values (count, ...) that are those given at frames, and rise from and fall to zero within ``reach`` frames,
-    smoothly; keys nearer to each other than that are led from one to the next."""
+    """Values (count, ...) that equal some values at their frames, and rise and fall smoothly within ``reach`` frames;
+    between keys that are nearer to each other they go from one to the next."""
     if not values:
         return np.zeros((count, 1))
     frames = sorted(values)
-    knots = {frames[0] - reach: 0 * values[frames[0]], frames[-1] + reach: 0 * values[frames[0]]}
-    for one, two in pairwise(frames):
-        if two - one > 2 * reach:
-            knots |= {one + reach: 0 * values[one], two - reach: 0 * values[one]}
+    zero = 0 * values[frames[0]]
+    knots = {frames[0] - reach: zero, frames[-1] + reach: zero}
+    for before, after in pairwise(frames):
+        if after - before > 2 * reach:
+            knots[before + reach] = zero
+            knots[after - reach] = zero
     knots |= values
+    # Between two knots, a cubic that is flat at both.
     at = np.array(sorted(knots))
-    height = np.array([knots[frame] for frame in at.tolist()])
+    heights = np.array([knots[frame] for frame in at.tolist()])
     now = np.arange(count).clip(at[0], at[-1])
-    before = np.searchsorted(at, now, side="right").clip(1, len(at) - 1) - 1
-    part = ((now - at[before]) / (at[before + 1] - at[before]))[:, None]
-    found: Array = height[before] + part**2 * (3 - 2 * part) * (height[before + 1] - height[before])
-    return found
+    left = np.searchsorted(at, now, side="right").clip(1, len(at) - 1) - 1
+    share = ((now - at[left]) / (at[left + 1] - at[left]))[:, None]
+    swell: Array = heights[left] + share**2 * (3 - 2 * share) * (heights[left + 1] - heights[left])
+    return swell

@@ -1,4 +1,4 @@
-"""Plans of compositions: what is asked for at which time, as moments, a JSON file of them, or a script.
+"""Plans of compositions: prompts, places, facings and poses at their times, as moments, a JSON file, or a script.
 
 A script's moments are separated by semicolons or lines: ``0s a person walks; 3s at 0 3 facing 90 a person waves;
 4.5s pose kick.bvh@1.2; 6s``. Each is a time, then, in this order and each optional: ``at`` with x and z in metres,
@@ -18,8 +18,18 @@ from motet.formats import read_motion
 from motet.motion.motion import Motion, motions_of
 from motet.settings import is_number
 
-LONGEST, FARTHEST = 600.0, 1000.0  # seconds of a composition; metres from its start, and degrees
-SHORTEST, APART = 0.3, 0.1 - 1e-9  # seconds of a prompt, and from one moment to the next
+LONGEST = 600.0
+"""Seconds of a composition."""
+
+FARTHEST = 1000.0
+"""Metres from its start, and degrees."""
+
+SHORTEST = 0.3
+"""Seconds of a prompt."""
+
+APART = 0.1 - 1e-9
+"""Seconds from one moment to the next."""
+
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 PART = re.compile(
     rf"(?P<at>{NUMBER})s?(?!\S)(?:\s+at\s+(?P<x>{NUMBER})\s+(?P<z>{NUMBER})(?!\S))?"
@@ -34,37 +44,40 @@ Reader = Callable[[Path], Motion]
 
 @dataclass(frozen=True)
 class Moment:
-    """What is asked for ``at`` so many seconds.
-
-    text: a prompt, shown from here to the next one. place: x and z of the hips in metres, the figure's left is +x when
-    it faces 0. facing: degrees from +z to the left, 90 along x. pose: a motion of any human figure, of which the frame
-    at ``pose_at`` seconds is met, wherever the figure then is. The first moment's place and facing are the start; the
-    last moment is the end. SettingError for what is no such value.
-    """
+    """A time of a plan, and the prompt, place, facing and pose that belong to it. SettingError for a wrong value."""
 
     at: float
+    """Seconds. The first moment's place and facing are the start; the last moment is the end."""
+
     text: str | None = None
+    """A prompt, shown from here to the next one."""
+
     place: tuple[float, float] | None = None
+    """x and z of the hips in metres; the figure's left is +x when it faces 0."""
+
     facing: float | None = None
+    """Degrees from +z to the left, 90 along x."""
+
     pose: Motion | None = None
+    """A motion of any human figure, one frame of which is met, wherever the figure is then."""
+
     pose_at: float = 0.0
+    """Seconds of that frame in the motion."""
 
     def __post_init__(self) -> None:
         if self.pose is not None:
             motions_of([self.pose])
-        place, motion = self.place, self.pose
-        flat = isinstance(place, Sequence) and len(place) == 2 and all(map(_near, place))
-        within = motion is None or (is_number(self.pose_at) and 0 <= self.pose_at * motion.fps < len(motion))
-        for wrong, said in (
-            (not (is_number(self.at) and 0 <= self.at <= LONGEST), f"at must be 0 to {LONGEST:g} s, not {self.at!r}"),
-            (self.text is not None and not (isinstance(self.text, str) and self.text.strip()), "text must be a prompt"),
-            (place is not None and not flat, f"place must be x and z in metres, not {place!r}"),
-            (self.facing is not None and not _near(self.facing), f"facing must be degrees, not {self.facing!r}"),
-            (motion is not None and not isinstance(motion, Motion), f"pose must be a motion, not {motion!r}"),
-        ):
-            if wrong:
-                raise SettingError(said)
-        if not within and motion is not None:
+        place = self.place
+        motion = self.pose
+        if not (is_number(self.at) and 0 <= self.at <= LONGEST):
+            raise SettingError(f"at must be 0 to {LONGEST:g} s, not {self.at!r}")
+        if self.text is not None and not (isinstance(self.text, str) and self.text.strip()):
+            raise SettingError("text must be a prompt")
+        if place is not None and not (isinstance(place, Sequence) and len(place) == 2 and all(map(_near, place))):
+            raise SettingError(f"place must be x and z in metres, not {place!r}")
+        if self.facing is not None and not _near(self.facing):
+            raise SettingError(f"facing must be degrees, not {self.facing!r}")
+        if motion is not None and not (is_number(self.pose_at) and 0 <= self.pose_at * motion.fps < len(motion)):
             raise SettingError(f"pose_at must be within the motion's {motion.duration:g} s, not {self.pose_at!r}")
 
 
@@ -87,13 +100,13 @@ def read_plan(path: str | Path, read: Reader = read_motion) -> list[Moment]:
         raise FormatError(path, f"is no JSON: {error}", getattr(error, "lineno", None)) from error
     if not isinstance(rows, list):
         raise FormatError(path, 'a plan is a list of moments, such as [{"at": 0, "text": "a person walks"}, {"at": 3}]')
-    found = []
+    moments = []
     for number, row in enumerate(rows, start=1):
         try:
-            found.append(_moment(row, lambda name: read(path.parent / name)))
+            moments.append(_moment(row, lambda name: read(path.parent / name)))
         except MotetError as error:
             raise FormatError(path, f"moment {number}: {error}") from error
-    return found
+    return moments
 
 
 def _moment(row: Any, read: Callable[[str], Motion]) -> Moment:
@@ -109,39 +122,42 @@ def _moment(row: Any, read: Callable[[str], Motion]) -> Moment:
 
 def parse_plan(script: str, read: Reader = read_motion) -> list[Moment]:
     """The moments of a script; ScriptError marks the place of an error. ``read`` reads the files of poses."""
-    found, start = [], 0
+    moments = []
+    start = 0
     for part in re.split(r"[;\n]", script):
         match = PART.fullmatch(part.strip())
         if not match or re.match(r"(at|facing|pose)\b", match["text"] or ""):
             where = "expected a time, then at X Z, facing DEGREES, pose FILE@SECONDS, a prompt, in this order"
             raise ScriptError(script, start, f'{where}, such as "3s at 0 3 facing 90 a person waves"')
-        given = {key: float(match[key]) for key in ("at", "facing", "pose_at") if match[key]}
+        numbers = {key: float(match[key]) for key in ("at", "facing", "pose_at") if match[key]}
         place = (float(match["x"]), float(match["z"])) if match["x"] else None
         pose = read(Path(match["pose"])) if match["pose"] else None
         try:
-            found.append(Moment(text=match["text"], place=place, pose=pose, **given))
+            moments.append(Moment(text=match["text"], place=place, pose=pose, **numbers))
         except SettingError as error:
             raise ScriptError(script, start, str(error)) from error
         start += len(part) + 1
-    return found
+    return moments
 
 
 def time_line(moments: Sequence[Moment]) -> list[Moment]:
     """The moments, if they are in order; SettingError says which is not."""
-    found = list(moments)
-    if len(found) < 2 or found[0].at or found[0].text is None:
+    line = list(moments)
+    if len(line) < 2 or line[0].at or line[0].text is None:
         raise SettingError("a plan begins with a prompt at 0 s, and its last moment is its end")
-    for number, (one, two) in enumerate(pairwise(found), start=2):
-        if two.at - one.at < APART:
+    for number, (before, moment) in enumerate(pairwise(line), start=2):
+        if moment.at - before.at < APART:
             raise SettingError(
-                f"moment {number} is at {two.at:g} s, the one before it at {one.at:g} s: times must rise"
+                f"moment {number} is at {moment.at:g} s, the one before it at {before.at:g} s: times must rise"
             )
-        if two is not found[-1] and two == Moment(two.at):
-            raise SettingError(f"moment {number}, at {two.at:g} s, asks for nothing")
-    if found[-1].text is not None:
-        raise SettingError(f"the last moment is the end: {quoted(found[-1].text)} needs a later one")
-    told = [one for one in found if one.text is not None] + found[-1:]
-    for one, two in pairwise(told):
-        if two.at - one.at < SHORTEST:
-            raise SettingError(f"{quoted(str(one.text))} has {two.at - one.at:.2g} s: a prompt needs {SHORTEST:g}")
-    return found
+        if moment is not line[-1] and moment == Moment(moment.at):
+            raise SettingError(f"moment {number}, at {moment.at:g} s, asks for nothing")
+    end = line[-1]
+    if end.text is not None:
+        raise SettingError(f"the last moment is the end: {quoted(end.text)} needs a later one")
+    prompts = [moment for moment in line if moment.text is not None]
+    for prompt, following in pairwise([*prompts, end]):
+        seconds = following.at - prompt.at
+        if seconds < SHORTEST:
+            raise SettingError(f"{quoted(str(prompt.text))} has {seconds:.2g} s: a prompt needs {SHORTEST:g}")
+    return line

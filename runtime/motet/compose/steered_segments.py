@@ -1,4 +1,4 @@
-"""Walks and runs that are steered from place to place in the time that is given, as parts of compositions."""
+"""Walks and runs that are steered from place to place in time, as parts of compositions."""
 
 import math
 import re
@@ -19,30 +19,36 @@ from motet.steering.session import SteerSession
 from motet.text.clauses import FUNCTION_WORDS, stem
 
 GAITS = {"walk": "walk", "stroll": "walk", "go": "walk", "run": "run", "jog": "run", "skip": "skip", "zombi": "zombie"}
-"""Stems of words -> the gait that they ask for."""
+"""Stems of words -> the gait that they mean."""
 
 EASY = {stem("forward"), stem("straight"), stem("ahead"), stem("slowly"), stem("quickly"), stem("fast"), stem("like")}
-"""Stems of what steering does by itself, where a place says where and how fast to go."""
+"""Stems of words that a place makes superfluous: it says where and how fast to go."""
 
 GOAL = re.compile(r"\b(to|towards?|into|past|around|across|along)\s+(a|an|the|his|her|their)\s+\w+")
-"""Where to: a place says it better."""
+"""The destination in words, which a place replaces."""
 
 BACK = {stem("backward"), stem("backwards")}
 
-STOP, TURN, START = 0.5, 0.8, 0.3
-"""Seconds in which a figure stops, in which it then turns by 90 degrees, and until it is on the way."""
+STOP = 0.5
+"""Seconds in which a figure stops."""
+
+TURN = 0.8
+"""Seconds in which a standing figure turns by 90 degrees."""
+
+START = 0.3
+"""Seconds until a standing figure is on its way."""
 
 HURRIED = 0.5
-"""Share of the time to stop and turn in which it can be done."""
+"""Share of the time to stop and turn that is needed at least."""
 
 AHEAD = math.radians(30)
-"""A figure walks on through a place where it is to face no further from the way that it goes."""
+"""A figure walks on through a place if its facing there is no farther from its way."""
 
 NEAR = 0.05
-"""Metres within which it is at a place."""
+"""Metres within which a figure is at a place."""
 
 AGAIN = 0.2
-"""Seconds after which it is told anew where to go."""
+"""Seconds between two commands."""
 
 
 class Gait(NamedTuple):
@@ -56,7 +62,7 @@ class Gait(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """Where a figure is to be at a frame, metres (2,), and which way to face there, radians; each may be None."""
+    """The place at a frame, metres (2,), and the facing there, radians; each may be None."""
 
     frame: int
     place: Array | None
@@ -75,7 +81,7 @@ class Walk(NamedTuple):
 
 
 def gait_of(text: str, model: SteerModel) -> Gait | None:
-    """The gait that a prompt asks for and nothing else, such as that of "a person walks slowly"; else None."""
+    """The gait of a prompt for walking or running and nothing else, such as "a person walks slowly"; else None."""
     words = [stem(word) for word in re.findall(r"\w+", GOAL.sub("", text.lower())) if word not in FUNCTION_WORDS]
     named = [GAITS[word] for word in words if GAITS.get(word) in model.gaits]
     if not named or not all(word in GAITS or word in EASY or word in BACK for word in words):
@@ -87,33 +93,44 @@ def gait_of(text: str, model: SteerModel) -> Gait | None:
 
 
 def walked(model: SteerModel, walk: Walk, after: Motion | None) -> Motion:
-    """The motion of a walk that continues another one, in the same channels; from the origin without one. What lacks
-    at its places is left to be added. MotionError for a place that is out of reach, with the time it takes."""
-    session, ground = model.start(walk.gait.name), np.zeros(3)
-    if after is not None:
-        x, z = local_translations(after[-6:])[:, 0, [0, 2]].T
-        ground = np.array([x[-1], z[-1], facing(after[-60:])[-1]])
-        session.take(model.pose_of(after[-60:]))
-        session.put((x[-1], z[-1], math.degrees(ground[2])))
-        session.push(np.array([np.ptp(x), np.ptp(z)]) * [np.sign(x[-1] - x[0]), np.sign(z[-1] - z[0])] * model.fps / 5)
+    """The motion of a walk that continues another one, in the same channels; from the origin without one. It ends near
+    its places, not at them. MotionError for a place that is out of reach, with the time it takes."""
+    session = model.start(walk.gait.name)
+    ground = np.zeros(3) if after is None else _take_over(session, model, after)
     _check(walk, ground, model.fps)
-    poses = list[Pose]()
+    ticks_between = round(AGAIN * model.fps)
+    poses: list[Pose] = []
     for now in range(walk.start, walk.stop):
         leg = next((leg for leg in walk.legs if leg.frame >= now), walk.legs[-1])
-        if (now - walk.start) % round(AGAIN * model.fps) == 0:
-            _tell(session, walk, leg, (leg.frame + 1 - now) / model.fps, poses[-1].ground[0] if poses else ground)
+        if (now - walk.start) % ticks_between == 0:
+            place = poses[-1].ground[0] if poses else ground
+            _command(session, walk, leg, (leg.frame + 1 - now) / model.fps, place)
         poses.append(session.tick())
     poses.insert(0, replace(poses[0], ground=ground[None]))
     return model.contract.motion(session.frames_of(poses)[0, 1:], after=after, plant=False)
 
 
-def _tell(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: Array) -> None:
-    """Say where to go: to the place in the seconds left, but no slower than the gait, and to stand there."""
-    gait, gap = walk.gait, np.zeros(2) if leg.place is None else leg.place - ground[:2]
-    far, way = float(np.hypot(*gap)), float(np.arctan2(*gap))
+def _take_over(session: SteerSession, model: SteerModel, motion: Motion) -> Array:
+    """Put a session's figure where a motion ends, in its pose and at its speed; returns x, z and facing (3,)."""
+    x, z = local_translations(motion[-6:])[:, 0, [0, 2]].T
+    ground = np.array([x[-1], z[-1], facing(motion[-60:])[-1]])
+    session.take(model.pose_of(motion[-60:]))
+    session.put((x[-1], z[-1], math.degrees(ground[2])))
+    direction = np.array([np.sign(x[-1] - x[0]), np.sign(z[-1] - z[0])])
+    session.push(np.array([np.ptp(x), np.ptp(z)]) * direction * model.fps / 5)
+    return ground
+
+
+def _command(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: Array) -> None:
+    """Command a session to go to a place in the seconds left, but no slower than the gait, and to stand there."""
+    gait = walk.gait
+    gap = np.zeros(2) if leg.place is None else leg.place - ground[:2]
+    far = float(np.hypot(*gap))
+    way = float(np.arctan2(*gap))
     left -= _pause(walk, leg, way)
     if leg.place is None and leg.facing is not None:
-        speed, way = gait.usual, leg.facing + math.pi * gait.back
+        speed = gait.usual
+        way = leg.facing + math.pi * gait.back
     elif far < NEAR or left <= 0:
         session.control(speed=0, facing=None if leg.facing is None else math.degrees(leg.facing))
         return
@@ -134,17 +151,21 @@ def _pause(walk: Walk, leg: Leg, way: float) -> float:
 
 def _check(walk: Walk, ground: Array, fps: float) -> None:
     """MotionError for a place that is out of reach."""
-    at, now = ground[:2], walk.start / fps
+    place = ground[:2]
+    now = walk.start / fps
     for leg in walk.legs:
         if leg.place is None:
             continue
-        far, way = float(np.hypot(*(leg.place - at))), float(np.arctan2(*(leg.place - at)))
-        at, then = leg.place, (leg.frame + 1) / fps
-        begun = START * min(1.0, then - now) if leg is walk.legs[0] else 0.0
-        need = far / walk.gait.high + HURRIED * _pause(walk, leg, way) + begun
+        gap = leg.place - place
+        far = float(np.hypot(*gap))
+        then = (leg.frame + 1) / fps
+        starting = START * min(1.0, then - now) if leg is walk.legs[0] else 0.0
+        pause = HURRIED * _pause(walk, leg, float(np.arctan2(*gap)))
+        need = far / walk.gait.high + pause + starting
         if far > NEAR and need > then - now:
             raise MotionError(
                 f"{walk.text!r} cannot be at the place of {then:.3g} s in time: {far:.1f} m at up to "
                 f"{walk.gait.high:g} m/s take {need:.1f} s, so be there at {now + need:.1f} s, or go faster"
             )
+        place = leg.place
         now = then
