@@ -120,24 +120,30 @@ def compose(moments: Sequence[Moment], writer: "CodesModel", steer: SteerModel, 
         if moment.place is not None or moment.facing is not None:
             legs.append(_leg(moment, start, fps))
 
-    # Prompts are drawn one after another, seen from the start: walks alone, and all between two walks as one story.
+    # Prompts are drawn as seen from the start; then the motion is put there, led through the poses, and its feet held.
+    motion, passages = _shown(_parts(line, legs, steer), legs, writer, steer, seed, strict)
+    motion = hold_feet(_through(moved(motion, line[0]), poses), ground=0.0)
+    return Composition(motion, tuple(passages), met(motion, line))
+
+
+def _shown(
+    parts: Sequence[_Part], legs: Sequence[Leg], writer: "CodesModel", steer: SteerModel, seed: int, strict: bool
+) -> tuple[Motion, list[Passage]]:
+    """The motion of prompts, and when each is shown: walks one by one, and all between two walks as one story."""
     motion: Motion | None = None
     passages: list[Passage] = []
-    for parts in _runs(_parts(line, legs, steer)):
-        legs_of_parts = [leg for leg in legs if parts[0].start <= leg.frame < parts[-1].stop]
-        if walk := parts[0].walk:
-            motion = _led(motion, walked(steer, walk, motion), parts, legs_of_parts)
-            passages.append(Passage(walk.text, walk.start / fps, walk.stop / fps, f"{walk.gait.name}, steered"))
+    for run in _runs(parts):
+        begin = run[0].start / writer.fps
+        run_legs = [leg for leg in legs if run[0].start <= leg.frame < run[-1].stop]
+        if walk := run[0].walk:
+            motion = _led(motion, walked(steer, walk, motion), run, run_legs)
+            passages.append(Passage(walk.text, begin, walk.stop / writer.fps, f"{walk.gait.name}, steered"))
         else:
-            motion, story = _drawn(parts, legs_of_parts, writer, motion, seed, strict)
-            begin = parts[0].start / fps
+            motion, story = _drawn(run, run_legs, writer, motion, seed, strict)
             for passage in story.passages:
                 passages.append(replace(passage, start=passage.start + begin, stop=passage.stop + begin))
     assert motion is not None
-
-    # Then it is put where the plan starts, led through the poses, and its feet are held.
-    motion = hold_feet(_through(moved(motion, line[0]), poses), ground=0.0)
-    return Composition(motion, tuple(passages), met(motion, line))
+    return motion, passages
 
 
 def _leg(moment: Moment, start: Array, fps: float) -> Leg:
@@ -159,17 +165,22 @@ def _parts(line: Sequence[Moment], legs: Sequence[Leg], steer: SteerModel) -> li
     gaits = [gait_of(str(prompt.text), steer) for prompt in prompts]
     parts = []
     for i, (prompt, gait, (start, stop)) in enumerate(zip(prompts, gaits, pairwise(starts), strict=True)):
-        next_walk = next((starts[j] for j in range(i + 1, len(prompts)) if gaits[j]), starts[-1])
-        legs_ahead = [leg for leg in legs if start <= leg.frame < next_walk]
-        walk_legs = [leg for leg in legs_ahead if leg.frame < stop]
-        following = legs_ahead[len(walk_legs) :]
-        if following and (not walk_legs or walk_legs[-1].frame < stop - 1):
-            walk_legs.append(following[0]._replace(frame=stop - 1))
-        halts = i + 1 < len(prompts) and not gaits[i + 1]
         text = str(prompt.text)
+        next_walk = next((starts[j] for j in range(i + 1, len(prompts)) if gaits[j]), starts[-1])
+        walk_legs = _walk_legs([leg for leg in legs if start <= leg.frame < next_walk], stop)
+        halts = i + 1 < len(prompts) and not gaits[i + 1]
         walk = Walk(text, start, stop, gait, walk_legs, halts) if gait and walk_legs else None
         parts.append(_Part(text, start, stop, walk))
     return parts
+
+
+def _walk_legs(ahead: Sequence[Leg], stop: int) -> list[Leg]:
+    """The legs of a walk that stops at a frame, of those ahead: its own, then the next one as far as it gets."""
+    walk_legs = [leg for leg in ahead if leg.frame < stop]
+    following = ahead[len(walk_legs) :]
+    if following and (not walk_legs or walk_legs[-1].frame < stop - 1):
+        walk_legs.append(following[0]._replace(frame=stop - 1))
+    return walk_legs
 
 
 def _runs(parts: Sequence[_Part]) -> Iterator[list[_Part]]:
@@ -221,29 +232,36 @@ def _led(before: Motion | None, motion: Motion, parts: Sequence[_Part], legs: Se
     last = 0
     for leg in legs:
         at = leg.frame - parts[0].start
-        # The way over the ground that the motion goes, and the way to the place; NaN without one.
-        way = (moves.root[at] - moves.root[last])[[0, 2]]
-        place = FLAT * np.nan if leg.place is None else np.insert(leg.place, 1, np.nan)
-        wanted = (place - moves.root[last])[[0, 2]]
-        here = {last: Key(place=moves.root[last] * FLAT, facing=moves.facing[last])}
-        # Turned within a second, unless the facing is planned or the way is short.
-        if leg.facing is None and np.hypot(*(wanted - way)) > DRIFT and np.hypot(*way) > DRIFT:
-            turn = np.arctan2(*wanted) - np.arctan2(*way)
-            turned = min(last + round(motion.fps), at)
-            moves = moves.through(here | {turned: Key(facing=moves.facing[turned] + turn)}, 1)
-        # Moved the rest of the way.
-        rest = float(np.hypot(*(place - moves.root[at])[[0, 2]]))
-        seconds = (at - last) / motion.fps
-        if rest > DRIFT * max(1.0, seconds):
-            text = next(part.text for part in parts if leg.frame < part.stop)
-            raise _too_far(text, way, wanted, seconds, (leg.frame + 1) / motion.fps)
-        facing = np.nan if leg.facing is None else leg.facing
-        moves = moves.through(here | {at: Key(place=place, facing=facing)}, 1)
+        text = next(part.text for part in parts if leg.frame < part.stop)
+        moves = _led_to(moves, leg, last, at, motion.fps, text)
         last = at
     root = BONES[0]
     new = posed(motion, {root: moves.turns[:, 0]}, {root: moves.root})
     together = new.values if before is None else np.concatenate([before.values, new.values])
     return replace(motion, values=together).continuous()
+
+
+def _led_to(moves: Moves, leg: Leg, last: int, at: int, fps: float, text: str) -> Moves:
+    """Moves of a text that are led from where they are at one frame to the place of a leg at another."""
+    # The way over the ground that the motion goes, and the way to the place; NaN without one.
+    way = (moves.root[at] - moves.root[last])[[0, 2]]
+    place = FLAT * np.nan if leg.place is None else np.insert(leg.place, 1, np.nan)
+    wanted = (place - moves.root[last])[[0, 2]]
+    here = {last: Key(place=moves.root[last] * FLAT, facing=moves.facing[last])}
+
+    # Turned within a second, unless the facing is planned or the way is short.
+    if leg.facing is None and np.hypot(*(wanted - way)) > DRIFT and np.hypot(*way) > DRIFT:
+        turn = np.arctan2(*wanted) - np.arctan2(*way)
+        turned = min(last + round(fps), at)
+        moves = moves.through(here | {turned: Key(facing=moves.facing[turned] + turn)}, 1)
+
+    # Moved the rest of the way.
+    rest = float(np.hypot(*(place - moves.root[at])[[0, 2]]))
+    seconds = (at - last) / fps
+    if rest > DRIFT * max(1.0, seconds):
+        raise _too_far(text, way, wanted, seconds, (leg.frame + 1) / fps)
+    facing = np.nan if leg.facing is None else leg.facing
+    return moves.through(here | {at: Key(place=place, facing=facing)}, 1)
 
 
 def _too_far(text: str, way: Array, wanted: Array, seconds: float, at: float) -> MotionError:

@@ -90,23 +90,18 @@ class Moves:
     def _led(self, keys: Mapping[int, Key]) -> "Moves":
         """The path turned and moved over the ground, as a whole before the first key and after the last, and evenly in
         between."""
-        frames = np.arange(len(self.root))
-        # Turned as a whole, every step of the path about the vertical axis.
-        angle = np.zeros(len(frames))
-        off = {frame: self._off(frame, key) for frame, key in keys.items()}
-        off = {frame: turn for frame, turn in off.items() if np.isfinite(turn)}
-        if off:
-            angle = np.interp(frames, list(off), np.unwrap(list(off.values())))
+        count = len(self.root)
+        # Turned, every step of the path about the vertical axis.
+        turn = {frame: self._off(frame, key) for frame, key in keys.items()}
+        angle = _evenly(turn, count)
         about = axis_to_rotmat("y", angle)
         turns = np.concatenate([product(about, self.turns[:, 0])[:, None], self.turns[:, 1:]], axis=1)
         steps = np.diff(self.root, axis=0, prepend=self.root[:1])
         root = self.root[:1] + np.cumsum(rotated(about, steps), axis=0)
         # Then moved along x and z.
         for axis in (0, 2):
-            shifts = {frame: key.place[axis] - root[frame, axis] for frame, key in keys.items()}
-            shifts = {frame: shift for frame, shift in shifts.items() if np.isfinite(shift)}
-            if shifts:
-                root[:, axis] += np.interp(frames, list(shifts), list(shifts.values()))
+            shift = {frame: float(key.place[axis] - root[frame, axis]) for frame, key in keys.items()}
+            root[:, axis] += _evenly(shift, count, wraps=False)
         return Moves(turns, root, self.facing + angle)
 
     def _off(self, frame: int, key: Key) -> float:
@@ -114,6 +109,17 @@ class Moves:
         if 0 in key.turns and np.isnan(key.facing):
             return float(rotmat_to_rotvec(twist((key.turns[0] @ self.turns[frame, 0].T)[None], UP))[0, 1])
         return float(wrapped(np.array(key.facing - self.facing[frame])))
+
+
+def _evenly(values: Mapping[int, float], count: int, wraps: bool = True) -> Array:
+    """Values (count,) that go evenly from one value to the next, NaN ones left out; 0 where there are none.
+    wraps: whether they are angles."""
+    finite = {frame: value for frame, value in values.items() if np.isfinite(value)}
+    if not finite:
+        return np.zeros(count)
+    heights = list(finite.values())
+    evenly: Array = np.interp(np.arange(count), list(finite), np.unwrap(heights) if wraps else heights)
+    return evenly
 
 
 def _swell(values: Mapping[int, Array], count: int, reach: int) -> Array:
