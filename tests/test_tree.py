@@ -10,11 +10,11 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 278
+MOST_LARGE_FUNCTIONS = 276
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 554
-MOST_TUPLE_ASSIGNMENTS = 177
+MOST_BANNED_NAMES = 522
+MOST_TUPLE_ASSIGNMENTS = 156
 MOST_NESTED_COMPREHENSIONS = 155
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
@@ -87,7 +87,7 @@ CEILINGS = {
     "motet.bench": 5_200,
     "motet.bundle": 10_000,
     "motet.cli": 16_600,
-    "motet.compose": 7_400,
+    "motet.compose": 7_600,
     "motet.corpus": 9_200,
     "motet.decode": 3_900,
     "motet.draw": 12_000,
