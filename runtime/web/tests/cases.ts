@@ -27,7 +27,8 @@ export interface Case {
 }
 
 export function equal(found: unknown, wanted: unknown, what: string): void {
-  const [one, other] = [JSON.stringify(found), JSON.stringify(wanted)];
+  const one = JSON.stringify(found);
+  const other = JSON.stringify(wanted);
   if (one !== other) throw new Error(`${what}: ${one}, not ${other}`);
 }
 

@@ -147,7 +147,8 @@ test("what is out of reach is told, and what a figure no longer reaches for is n
 });
 
 test("a look and a reach leave nothing once they are over, and a restored session has them", () => {
-  const [guided, plain] = [model.start(), model.start()];
+  const guided = model.start();
+  const plain = model.start();
   const both = (count: number) => Array.from({ length: count }, () => [guided.tick(), plain.tick()]).at(-1)!;
   guided.lookAt([3, 1.6, 1]);
   guided.reach("right", [-0.2, 1.5, 0.4]);

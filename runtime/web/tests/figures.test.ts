@@ -43,7 +43,8 @@ const manifestOf = async (name: string) =>
   (await Bundle.open(new Uint8Array(await readFile(`../motet/bundles/${name}.zip`)))).manifest;
 
 function near(found: unknown, wanted: unknown, within = 1e-4, what = ""): void {
-  const [own, other] = [[found].flat(4) as number[], [wanted].flat(4) as number[]];
+  const own = [found].flat(4) as number[];
+  const other = [wanted].flat(4) as number[];
   assert.equal(own.length, other.length, what);
   const off = own.map((value, at) => Math.abs(value - other[at]!));
   const worst = off.indexOf(Math.max(...off));
@@ -114,7 +115,8 @@ test("BVH that is written is read again, with the same positions; Python reads i
   near(worldOf(toHumanoid(readBVH(text)).motion).places, worldOf(motion).places, 1e-6);
   const words = (content: string) =>
     content.split(/\s+/).map((word) => (Number.isNaN(Number(word)) ? word : Number(word)));
-  const [own, wanted] = [words(text), words(readFileSync("tests/written/walk.bvh", "utf8"))];
+  const own = words(text);
+  const wanted = words(readFileSync("tests/written/walk.bvh", "utf8"));
   assert.deepEqual(
     own.filter((word) => typeof word === "string"),
     wanted.filter((word) => typeof word === "string"),
@@ -137,7 +139,8 @@ test("VRMA is written as the file that Python reads", () => {
       numbers: Array.from(new Float32Array(data.buffer, 28 + length)),
     };
   };
-  const [own, wanted] = [parts(toVRMA(motion)), parts(readFileSync("tests/written/walk.vrma"))];
+  const own = parts(toVRMA(motion));
+  const wanted = parts(readFileSync("tests/written/walk.vrma"));
   assert.equal(own.json, wanted.json);
   near(own.numbers, wanted.numbers, 1e-6);
 });

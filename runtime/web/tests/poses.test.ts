@@ -6,7 +6,9 @@ import { rotationOf, type Vector } from "../src/motion/rotations.js";
 
 /** A vector turned by a quaternion. */
 function turned([x, y, z, w]: [number, number, number, number], [a, b, c]: Vector): Vector {
-  const [p, q, r] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+  const p = 2 * (y * c - z * b);
+  const q = 2 * (z * a - x * c);
+  const r = 2 * (x * b - y * a);
   return [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p];
 }
 

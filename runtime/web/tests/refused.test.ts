@@ -52,7 +52,8 @@ function zipped(files: Record<string, Uint8Array>): Uint8Array {
   const [local, central]: Uint8Array[][] = [[], []];
   let at = 0;
   for (const [name, data] of Object.entries(files)) {
-    const [own, entry] = [new DataView(new ArrayBuffer(30)), new DataView(new ArrayBuffer(46))];
+    const own = new DataView(new ArrayBuffer(30));
+    const entry = new DataView(new ArrayBuffer(46));
     own.setUint32(0, 0x04034b50, true);
     entry.setUint32(0, 0x02014b50, true);
     for (const [view, size, length] of [

@@ -68,7 +68,8 @@ function stepping(slides: number): Motion {
       ["right", Math.PI],
     ] as const) {
       const angle = (2 * Math.PI * frame) / 30 + phase;
-      const [swung, lifted] = [slides * Math.sin(angle), Math.max(0, Math.cos(angle))];
+      const swung = slides * Math.sin(angle);
+      const lifted = Math.max(0, Math.cos(angle));
       const turns = { UpperLeg: -swung - 40 * lifted, LowerLeg: 80 * lifted, Foot: swung - 40 * lifted };
       for (const [part, degrees] of Object.entries(turns))
         own[HUMANOID.index(side + part)] = about(X, (degrees * Math.PI) / 180);

@@ -3,7 +3,8 @@ import { FIELDS } from "../generated.js";
 import { DTYPES } from "./arrays.js";
 import { BundleError } from "../errors.js";
 
-const [MOST_SIZE, MOST_FPS] = [2 ** 31, 1000];
+const MOST_SIZE = 2 ** 31;
+const MOST_FPS = 1000;
 const TENSOR_TYPES = ["float32", "int64", "bool"];
 const TEXTS = ["name", "version", "verb", "model", "loop"];
 const OBJECTS = ["files", "graphs", "tables", "golden", "motion", "defaults", "settings", "config"];

@@ -16,8 +16,10 @@ export interface Limb {
 
 /** Rotations and places in the world of the joints of a leg. */
 export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, root: Vector): Limb {
-  let [above, place] = [hips, root];
-  const [turned, places]: [Quaternion[], Vector[]] = [[], []];
+  let above = hips;
+  let place = root;
+  const turned: Quaternion[] = [];
+  const places: Vector[] = [];
   LEGS[side]!.forEach((bone, joint) => {
     place = plus(place, rotated(above, OFFSETS[side]![joint]!));
     above = product(above, rotations[bone]!);
@@ -39,7 +41,8 @@ export function reach(
   const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
   const leg = new TwoBones(hip, knee, ankle, rotated(shin, X));
   const turns = leg.turns(leg.eased(plus(ankle, move)));
-  const [above, below] = [product(turns.thigh, thigh), product(turns.shin, shin)];
+  const above = product(turns.thigh, thigh);
+  const below = product(turns.shin, shin);
   const bones = LEGS[side]!;
   rotations[bones[0]!] = product(inverse(hips), above);
   rotations[bones[1]!] = product(inverse(above), below);

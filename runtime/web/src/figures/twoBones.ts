@@ -31,8 +31,10 @@ export class TwoBones {
     readonly ankle: Vector,
     hinge: Vector,
   ) {
-    const [along, down] = [minus(knee, hip), minus(ankle, knee)];
-    [this.upper, this.lower] = [size(along), size(down)];
+    const along = minus(knee, hip);
+    const down = minus(ankle, knee);
+    this.upper = size(along);
+    this.lower = size(down);
     this.axis = unit(minus(hinge, times(along, dot(hinge, along) / dot(along, along))));
     this.inPlane = Math.sqrt(Math.max(1 - dot(unit(down), this.axis) ** 2, 1e-12));
     this.longest = Math.sqrt(this.upper ** 2 + this.lower ** 2 + 2 * this.upper * this.lower * this.inPlane);
@@ -41,7 +43,8 @@ export class TwoBones {
   /** The place near a target, on the line to the hip, that the ankle reaches without a snap of the knee. */
   eased(target: Vector): Vector {
     const away = minus(target, this.hip);
-    const [now, wanted] = [size(minus(this.ankle, this.hip)), size(away)];
+    const now = size(minus(this.ankle, this.hip));
+    const wanted = size(away);
     const left = Math.max(this.longest - now, 1e-9);
     const longer =
       -TWO_BONES.EASED_SHARE * left * Math.expm1(-Math.max(wanted - now, 0) / (TWO_BONES.EASED_SHARE * left));
@@ -53,7 +56,8 @@ export class TwoBones {
 
   /** Turns in the world of thigh and shin that bring the ankle to a target, or as near as possible. */
   turns(target: Vector): { thigh: Quaternion; shin: Quaternion } {
-    const [along, down] = [minus(this.knee, this.hip), minus(this.ankle, this.knee)];
+    const along = minus(this.knee, this.hip);
+    const down = minus(this.ankle, this.knee);
     const aim = minus(target, this.hip);
     const cosine =
       (dot(aim, aim) - this.upper ** 2 - this.lower ** 2) / (2 * this.upper * this.lower * this.inPlane);

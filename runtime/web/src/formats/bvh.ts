@@ -34,7 +34,8 @@ export function readBVH(content: string | Uint8Array): Motion {
   if (count * nodes.length > 2 ** 25)
     throw new FormatError(`${count} frames of ${nodes.length} joints are too many`);
   const skeleton = new Skeleton(nodes.map((node) => node.joint));
-  const [rotations, translations]: [Quaternion[][], Vector[][]] = [[], []];
+  const rotations: Quaternion[][] = [];
+  const translations: Vector[][] = [];
   for (let frame = 0; frame < count; frame++) {
     const { turned, moved } = posed(skeleton, channels, values.subarray(frame * channels.length));
     rotations.push(turned);
@@ -259,7 +260,8 @@ function number(value: number): string {
 
 /** The lines of the hierarchy, and the joints of it in order; lone tips are End Sites. */
 function tree(skeleton: Skeleton, moving: (joint: number) => boolean, offset: (joint: number) => Vector) {
-  const [lines, order]: [string[], number[]] = [[], []];
+  const lines: string[] = [];
+  const order: number[] = [];
   const names = plainNames(skeleton.names);
   const write = (at: number, depth: number): void => {
     const indent = "\t".repeat(Math.min(depth, 40));

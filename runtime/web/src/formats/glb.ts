@@ -158,7 +158,8 @@ function animation(buffer: Buffer, { fps, rotations, translations }: Motion): ob
     true,
   );
   const start = buffer.add([[0]], true);
-  const [channels, samplers]: [object[], object[]] = [[], []];
+  const channels: object[] = [];
+  const samplers: object[] = [];
   const track = (node: number, path: string, values: number[][]) => {
     channels.push({ sampler: samplers.length, target: { node, path } });
     samplers.push({

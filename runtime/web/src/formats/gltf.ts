@@ -160,7 +160,8 @@ function animated(gltf: Gltf, moved: Set<number>, roots: Map<number, number>): S
   const bones = new Set([...moved].filter((node) => gltf.nodes[node]!.camera === undefined));
   const hanging = new Set<number>();
   for (const node of gltf.order) {
-    const [{ mesh, camera }, parent] = [gltf.nodes[node]!, gltf.parents[node]!];
+    const { mesh, camera } = gltf.nodes[node]!;
+    const parent = gltf.parents[node]!;
     if (
       (bones.has(parent) || hanging.has(parent)) &&
       (bones.has(node) || (mesh === undefined && camera === undefined))
@@ -228,7 +229,8 @@ function taken(gltf: Gltf, groups: Set<number>[], animation?: Animation): Motion
     const turned = (node: number, at: number): Quaternion => {
       const turn = product(world.get(node)!.turn, inverse(rest.get(node)!.turn));
       if (!sheared[at]) return turn;
-      const [place, atRest] = [world.get(node)!.place, rest.get(node)!.place];
+      const place = world.get(node)!.place;
+      const atRest = rest.get(node)!.place;
       return turnedOnto(
         turn,
         children[at]!.map((child) => [
@@ -287,7 +289,8 @@ function skeletonOf(gltf: Gltf, joints: number[], rest: Map<number, Placed>): Sk
   const bones = new Map(
     [...gltf.humanoid()].filter(([bone]) => BONES.includes(bone)).map(([bone, node]) => [node, bone]),
   );
-  const [used, reserved] = [new Set<string>(), new Set<string>(bones.values())];
+  const used = new Set<string>();
+  const reserved = new Set<string>(bones.values());
   const chain = joints.map((node): Joint => {
     const name = unique(gltf.name(node), used);
     const parent = joints.indexOf(gltf.parents[node]!);
@@ -358,10 +361,8 @@ function tracks(
     }
     keys.push({ node, path, times, values, kind: interpolation });
   }
-  const [start, end] = [
-    Math.min(...keys.map(({ times }) => times[0]!)),
-    Math.max(...keys.map(({ times }) => times.at(-1)!)),
-  ];
+  const start = Math.min(...keys.map(({ times }) => times[0]!));
+  const end = Math.max(...keys.map(({ times }) => times.at(-1)!));
   const fps = rateOf(keys.map(({ times }) => times));
   const count = (end - start) * fps + 1;
   if (!(count * gltf.nodes.length < 1e7))
@@ -409,7 +410,8 @@ export function rateOf(tracks: number[][]): number {
 
 /** A track's value at a time: linear (turns the shortest way), in steps, or by the tangents of splines. */
 function sampled({ times: at, values, kind, path }: Keys, time: number): number[] {
-  let [before, end] = [0, Math.max(at.length - 1, 1)];
+  let before = 0;
+  let end = Math.max(at.length - 1, 1);
   while (end - before > 1) {
     const middle = (before + end) >> 1;
     [before, end] = at[middle]! > time + 1e-6 ? [before, middle] : [middle, end];
@@ -418,12 +420,10 @@ function sampled({ times: at, values, kind, path }: Keys, time: number): number[
   const span = Math.max(at[next]! - at[before]!, 1e-9);
   const t = Math.max(0, Math.min(1, (time - at[before]!) / span));
   if (kind === "CUBICSPLINE") {
-    const [p, out, arrive, q] = [
-      values[3 * before + 1]!,
-      values[3 * before + 2]!,
-      values[3 * next]!,
-      values[3 * next + 1]!,
-    ];
+    const p = values[3 * before + 1]!;
+    const out = values[3 * before + 2]!;
+    const arrive = values[3 * next]!;
+    const q = values[3 * next + 1]!;
     const u = 1 - t;
     return p.map(
       (value, i) =>
@@ -433,7 +433,8 @@ function sampled({ times: at, values, kind, path }: Keys, time: number): number[
         t * t * u * span * arrive[i]!,
     );
   }
-  const [low, high] = [values[before]!, values[next]!];
+  const low = values[before]!;
+  const high = values[next]!;
   if (kind === "STEP") return t < 1 - 1e-4 ? low : high;
   return path === "rotation"
     ? slerp(low as Quaternion, high as Quaternion, t)
@@ -441,7 +442,8 @@ function sampled({ times: at, values, kind, path }: Keys, time: number): number[
 }
 
 function slerp(from: Quaternion, to: Quaternion, share: number): Quaternion {
-  const [low, high] = [normalised(from), normalised(to)];
+  const low = normalised(from);
+  const high = normalised(to);
   const cosine = low.reduce((sum, value, at) => sum + value * high[at]!, 0);
   const angle = Math.acos(Math.min(1, Math.abs(cosine)));
   const weight = (part: number) => (angle < 1e-4 ? part : Math.sin(part * angle) / Math.sin(angle));

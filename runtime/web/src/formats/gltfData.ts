@@ -277,8 +277,10 @@ export class Gltf {
     const view = this.document.bufferViews![bufferView]!;
     if (view.extensions && Object.keys(view.extensions).length)
       throw new FormatError("its animations are packed by meshoptimizer: unpack the file first");
-    const [[size, , read], content] = [READERS[componentType]!, this.buffers[view.buffer]!];
-    const [start, stride] = [(view.byteOffset ?? 0) + byteOffset, view.byteStride || size * width];
+    const [size, , read] = READERS[componentType]!;
+    const content = this.buffers[view.buffer]!;
+    const start = (view.byteOffset ?? 0) + byteOffset;
+    const stride = view.byteStride || size * width;
     const fits =
       Number.isInteger(count) &&
       count >= 0 &&
@@ -335,7 +337,8 @@ function chunks(content: Uint8Array): { json: Uint8Array; binary: Uint8Array } {
   const view = new DataView(content.buffer, content.byteOffset, content.byteLength);
   const parts = new Map<number, Uint8Array>();
   for (let at = 12; at + 8 <= content.length;) {
-    const [length, kind] = [view.getUint32(at, true), view.getUint32(at + 4, true)];
+    const length = view.getUint32(at, true);
+    const kind = view.getUint32(at + 4, true);
     if (at + 8 + length > content.length)
       throw new FormatError("cut short: the GLB file ends within a chunk");
     if (!parts.has(kind)) parts.set(kind, content.subarray(at + 8, at + 8 + length));

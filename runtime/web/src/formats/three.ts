@@ -97,11 +97,13 @@ function avatarTracks({ fps, rotations, translations }: Motion, { humanoid, meta
   // a VRM of version 0 faces -z
   const sign = meta.metaVersion === "0" ? -1 : 1;
   const node = (bone: string) => humanoid.getNormalizedBoneNode(bone as never)?.name;
-  const [hips, height] = [node("hips"), humanoid.normalizedRestPose.hips?.position?.[1]];
+  const hips = node("hips");
+  const height = humanoid.normalizedRestPose.hips?.position?.[1];
   if (hips === undefined || height === undefined)
     throw new MotionError("this avatar has no hips: a VRM humanoid is needed");
   const tracks = BONES.flatMap((bone) => {
-    const [name, at] = [node(bone), HUMANOID.index(bone)];
+    const name = node(bone);
+    const at = HUMANOID.index(bone);
     const turns = rotations.map((row): Quaternion => [
       sign * row[at]![0],
       row[at]![1],

@@ -28,7 +28,8 @@ export interface Context {
 /** Steps of codes (N, P) of frames (N hop, D) in the contract's units. */
 export async function codesOf(codec: Codec, frames: Frames): Promise<number[][]> {
   const { tokens, hop, fps } = codec;
-  const [steps, width] = [frames.length / hop, frames[0]!.length];
+  const steps = frames.length / hop;
+  const width = frames[0]!.length;
   const { data, shape } = (await tokens.run({ frames: stacked(frames, 1, steps, hop, width) })).codes!;
   const body = shape[2]!;
   const book = await bookOf(codec, body + 1);

@@ -245,7 +245,8 @@ export class Writer {
     const of = (at: number) =>
       data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
     return rows.map((_, at) => {
-      const [conditional, plain] = [of(at), of(at + rows.length)];
+      const conditional = of(at);
+      const plain = of(at + rows.length);
       return Array.from(
         conditional,
         (value, id) => plain[id]! + this.drawing.guidance * (value - plain[id]!),
@@ -314,7 +315,8 @@ function lately(
   const doubled: Record<string, NumberArray<Float32Array>> = {};
   for (const [name, array] of Object.entries(states)) {
     const axis = array.shape.length - 2;
-    const [steps, width] = [array.shape[axis]!, array.shape[axis + 1]!];
+    const steps = array.shape[axis]!;
+    const width = array.shape[axis + 1]!;
     if (steps <= CODES.WINDOW) {
       doubled[name] = array;
       continue;

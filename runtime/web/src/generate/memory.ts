@@ -34,7 +34,8 @@ export class Memory {
     actions: number,
     readonly settings: Settings<typeof memorySettings>,
   ) {
-    const [steps, columns] = [table.shape[0]!, table.shape[1]!];
+    const steps = table.shape[0]!;
+    const columns = table.shape[1]!;
     this.steps = steps;
     this.width = moves.shape[1]! + (columns - 3) * body.shape[1]!;
     this.numbers = new Float32Array(steps * this.width);
@@ -110,8 +111,11 @@ export class Memory {
   private remember(row: number, moves: NumberArray, body: NumberArray, actions: number): void {
     const columns = this.table.shape[1]!;
     const at = (column: number) => Number(this.table.data[row * columns + column]);
-    const [end, values] = [moves.shape[0]!, body.shape[0]!];
-    const [move, action, age] = [at(0), at(columns - 2), this.ages[row]!];
+    const end = moves.shape[0]!;
+    const values = body.shape[0]!;
+    const move = at(0);
+    const action = at(columns - 2);
+    const age = this.ages[row]!;
     let fits = move >= 0 && move <= end && action >= 0 && action < actions && age >= 0 && age <= row;
     for (let column = 1; column < columns - 2; column++) fits &&= at(column) >= 0 && at(column) < values;
     if (!fits) throw new BundleError("table memory is out of range");
@@ -246,7 +250,8 @@ export class Memory {
         (_, at) => (shown[at] = apart[first]![at]! <= this.settings.alike_distance ? first : shown[at]!),
       );
       const order = [...take.keys()].sort((a, b) => shown[a]! - shown[b]! || a - b);
-      let [sum, k] = [0, 0];
+      let sum = 0;
+      let k = 0;
       while (k < end && (sum += this.particular[take[order[k]!]!]!) < enough) k++;
       for (let last = Math.max(shown[order[k]!]! + 1, first + this.settings.act_steps); last <= end; last++) {
         spans.push([
@@ -259,7 +264,10 @@ export class Memory {
       }
     }
     for (const [cost, first, last] of spans.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
-      if (cost < least) [least, best] = [cost, [first, last]];
+      if (cost < least) {
+        least = cost;
+        best = [first, last];
+      }
     }
     return best;
   }
@@ -269,7 +277,8 @@ export class Memory {
     const all = this.rows.get(action)!;
     const entries: number[] = [];
     for (let at = 0; at < all.length;) {
-      const [start, last] = [all[at]!, this.lasts[all[at]!]!];
+      const start = all[at]!;
+      const last = this.lasts[all[at]!]!;
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
       const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
       const most = shown.reduce((a, b) => Math.max(a, b));

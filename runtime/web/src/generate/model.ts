@@ -230,7 +230,8 @@ export class GenerateModel extends LanguageModel {
       if (piece.shown) shown.push(piece.shown);
       steps[piece.sentence]! += piece.steps;
     }
-    let [start, over] = [0, 0];
+    let start = 0;
+    let over = 0;
     const passages = script.texts.map((text, at): Passage => {
       over += steps[at]! * this.codec.hop;
       const passage = { text, start, stop: Math.min(over, frames.length) / this.fps, ...shown[at]! };
@@ -345,7 +346,10 @@ export class GenerateModel extends LanguageModel {
     const before = after && (await this.continued(after));
     if (before) await writer.see(before.codes);
     const decoder = new StreamingDecoder(this.codec, before);
-    let [done, shown, end, limit] = [0, 0, 0, Infinity];
+    let done = 0;
+    let shown = 0;
+    let end = 0;
+    let limit = Infinity;
     for (const [sentence, text] of texts.entries()) {
       const context = await this.contextOf(text, strict);
       const action = drawnAction(this.source, context, noise, drawing.certainty);
@@ -399,7 +403,8 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
     Array.isArray(ahead) && ahead.length <= 8 && ahead.every((steps) => [0, 1, 2].includes(steps));
   if (!looks || hop !== shape[2])
     throw new BundleError(`the bundle ${manifest.name} does not say what its decoder looks at`);
-  const [actions, end] = [manifest.actions?.length ?? 0, moves.shape[0]!];
+  const actions = manifest.actions?.length ?? 0;
+  const end = moves.shape[0]!;
   const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
   const remembers = settingsOf("memory", memorySettings, manifest.settings.memory);
   const source: Source = {

@@ -9,7 +9,8 @@ import { minus, plus, rotated, times, type Vector, X, Y, Z } from "../motion/rot
 import { motionOf, type Shown } from "./figure.js";
 import type { Mesh, Primitive } from "./stage.js";
 
-const [VERTICES, TRIANGLES] = [400_000, 4];
+const VERTICES = 400_000;
+const TRIANGLES = 4;
 const AXES = [X, Y, Z];
 
 /** What of a file is drawn, and how its joints follow a pose. */

@@ -9,7 +9,8 @@ const element = <T extends HTMLElement = HTMLElement>(id: string) => document.ge
 const TOGGLES = ["hurry", "strafe", "trails", "contacts", "follows", "pause"] as const;
 const CROWDS = [0, 1, 2, 3, 4, 7, 11, 19, 29, 49];
 /** Pixels and milliseconds within which a press is a click and no drag. */
-const [STILL, SHORT] = [6, 400];
+const STILL = 6;
+const SHORT = 400;
 
 /** What a file is handed over as. */
 const KINDS: Record<string, string> = {

@@ -4,11 +4,15 @@ import { aside, keptApart } from "../steering/avoidance.js";
 import type { ControlModel } from "../steering/model.js";
 
 /** What figures keep between them, how far they go from the first one, and the room of one in the rows behind it. */
-const [ROOM, FAR, ROW, COLUMN] = [0.8, 9, 1, 0.9];
+const ROOM = 0.8;
+const FAR = 9;
+const ROW = 1;
+const COLUMN = 0.9;
 /** Figures side by side behind the first one. */
 const ABREAST = 6;
 /** m/s below which a figure stands, and how often one that wanders rests. */
-const [SLOWEST, REST] = [0.25, 0.25];
+const SLOWEST = 0.25;
+const REST = 0.25;
 
 /** The model of a page with what it is asked for often: the speeds of gaits are the lowest, usual and highest. */
 export interface Net {
@@ -30,7 +34,8 @@ const moods = new WeakMap<Figure, Mood>();
 
 /** What figure n (from 1) of a crowd does next: it goes after the first one, or where its mood leads it. */
 export function ownControl(net: Net, figures: Figure[], n: number, follows: boolean): Asked {
-  const [leader, figure] = [figures[0]!, figures[n]!];
+  const leader = figures[0]!;
+  const figure = figures[n]!;
   const [x, z] = figure.root;
   if (follows || Math.hypot(leader.root[0] - x, leader.root[1] - z) > FAR + n / 3)
     return followed(net, figures, n);
@@ -59,7 +64,8 @@ function newMood(net: Net, figure: Figure, random: () => number): Omit<Mood, "ra
 
 /** The place of figure n in the rows behind the first one: how far behind it and to its left. */
 export function placeBehind(n: number): [behind: number, left: number] {
-  const [row, at] = [Math.floor((n - 1) / ABREAST), (n - 1) % ABREAST];
+  const row = Math.floor((n - 1) / ABREAST);
+  const at = (n - 1) % ABREAST;
   return [ROW * (row + 1), COLUMN * (Math.floor(at / 2) + 0.5) * (at % 2 ? 1 : -1)];
 }
 

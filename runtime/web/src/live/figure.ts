@@ -79,7 +79,8 @@ export class Figure {
   tick(command: Asked | Going): void {
     if ("points" in command) this.lead(command);
     else this.tell(command);
-    [this.before, this.now] = [this.now, tick(this.model, this.steered, true)];
+    this.before = this.now;
+    this.now = tick(this.model, this.steered, true);
   }
 
   private tell({ gait, x, z, facing }: Asked): void {

@@ -61,9 +61,13 @@ function paletteOf(pictures: Uint8ClampedArray[]): { palette: number[][]; neares
 
 /** LZW with codes of 9 to 12 bits, the least bit first. */
 function packed(pixels: Uint8Array): Uint8Array {
-  const [START, END, LAST] = [256, 257, 4095];
+  const START = 256;
+  const END = 257;
+  const LAST = 4095;
   const out: number[] = [];
-  let [held, bits, size] = [0, 0, 9];
+  let held = 0;
+  let bits = 0;
+  let size = 9;
   const write = (code: number) => {
     held |= code << bits;
     for (bits += size; bits >= 8; bits -= 8, held >>>= 8) out.push(held & 255);
@@ -83,7 +87,8 @@ function packed(pixels: Uint8Array): Uint8Array {
     known.set((code << 8) | pixel, fresh);
     if (fresh === LAST) {
       write(START);
-      [known, size] = [new Map(), 9];
+      known = new Map();
+      size = 9;
     }
     code = pixel;
   }

@@ -3,7 +3,9 @@ import type { Stage } from "./stage.js";
 import { DEAD } from "./stick.js";
 
 /** Degrees a second that Q and E turn the view by, and the right stick of a gamepad aside and up. */
-const [LOOK, PAD_ASIDE, PAD_UP] = [100, 130, 80];
+const LOOK = 100;
+const PAD_ASIDE = 130;
+const PAD_UP = 80;
 const KNOB = 44;
 
 /** Keys that go, to the right and up as it is seen. */
@@ -46,9 +48,13 @@ export class Hands {
 
   /** Right and up, as they are seen, together at most 1 long. */
   get pushed(): [x: number, y: number] {
-    let [x, y] = [this.stick[0] + this.pad.x, this.stick[1] + this.pad.y];
-    for (const [key, [right, up]] of Object.entries(DIRECTIONS))
-      if (this.keys.has(key)) [x, y] = [x + right, y + up];
+    let x = this.stick[0] + this.pad.x;
+    let y = this.stick[1] + this.pad.y;
+    for (const [key, [right, up]] of Object.entries(DIRECTIONS)) {
+      if (!this.keys.has(key)) continue;
+      x += right;
+      y += up;
+    }
     const length = Math.hypot(x, y);
     return length > 1 ? [x / length, y / length] : length < DEAD ? [0, 0] : [x, y];
   }
@@ -72,7 +78,8 @@ export class Hands {
   private push({ clientX, clientY }: PointerEvent): void {
     const box = this.round.getBoundingClientRect();
     const radius = box.width / 2;
-    const [x, y] = [(clientX - box.left) / radius - 1, 1 - (clientY - box.top) / radius];
+    const x = (clientX - box.left) / radius - 1;
+    const y = 1 - (clientY - box.top) / radius;
     const length = Math.max(1, Math.hypot(x, y));
     this.move(x / length, y / length);
   }

@@ -26,7 +26,8 @@ export interface Given {
 const KNOWN = "walk, run, stop, turn left, faster and what people do";
 const RADIANS = Math.PI / 180;
 /** Seconds that a frame counts for, at most, and for which a page is drawn after something was done. */
-const [LATEST, AWAKE] = [0.1, 1];
+const LATEST = 0.1;
+const AWAKE = 1;
 /** What may change the picture though time stands still. */
 const DONE = ["click", "change", "input", "keydown", "drop"];
 
@@ -76,7 +77,8 @@ export class Page {
     for (let n = figures.length; n < count; n++) {
       const [x, z, facing] = figures[0]?.root ?? [0, 0, 0];
       const [behind, left] = n ? placeBehind(n) : [0, 0];
-      const [sin, cos] = [Math.sin(facing), Math.cos(facing)];
+      const sin = Math.sin(facing);
+      const cos = Math.cos(facing);
       const phase = n ? n % net.model.steerer.matcher.settings.search_every : undefined;
       figures.push(
         new Figure(net.model, [x - behind * sin + left * cos, z - behind * cos - left * sin, facing], phase),

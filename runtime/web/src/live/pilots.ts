@@ -10,18 +10,22 @@ export interface Pilot {
 }
 
 /** Half the length of an eight, how far ahead its point is, and a step along it; metres, metres, radians. */
-const [HALF, AHEAD, STEP] = [3.2, 0.9, 0.02];
+const HALF = 3.2;
+const AHEAD = 0.9;
+const STEP = 0.02;
 /** m/s at which the second round is run. */
 const RUNS = 2.6;
 /** Metres from its point from which on a figure runs there, and within which it is there. */
-const [FAR_AWAY, THERE] = [5, 0.01];
+const FAR_AWAY = 5;
+const THERE = 0.01;
 
 /** A figure of eight about where a figure stands, Gerono's lemniscate: walked, then run, in turns. */
 export function eight({ root: [x, z, facing] }: Figure): Pilot {
   let along = 0;
   const turned = facing - Math.PI / 4; // it starts at an angle of 45 degrees to its length
   const point = (): [number, number] => {
-    const [ahead, aside] = [HALF * Math.sin(along), HALF * Math.sin(along) * Math.cos(along)];
+    const ahead = HALF * Math.sin(along);
+    const aside = HALF * Math.sin(along) * Math.cos(along);
     return [
       x + ahead * Math.sin(turned) + aside * Math.cos(turned),
       z + ahead * Math.cos(turned) - aside * Math.sin(turned),

@@ -6,7 +6,9 @@ import { toGIF } from "./gif.js";
 import type { Scene } from "./scene.js";
 
 /** Seconds that are kept, pixels of a GIF's sides, and ticks between two of its pictures. */
-const [KEPT, SIZE, EVERY] = [8, 320, 3];
+const KEPT = 8;
+const SIZE = 320;
+const EVERY = 3;
 
 /** Keeps what a figure did last. */
 export class Recorder {

@@ -9,11 +9,15 @@ import type { Body, Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.j
 type Looks = (shown: Shown, n: number) => Drawn;
 
 /** Points of a way gone that are kept, ticks from one to the next, and how many figures' ways are shown. */
-const [TRAIL, SPARSE, TRACED] = [60, 5, 12];
+const TRAIL = 60;
+const SPARSE = 5;
+const TRACED = 12;
 /** Seconds of the asked path, and between its points. */
-const [SOON, APART] = [1.4, 0.1];
+const SOON = 1.4;
+const APART = 0.1;
 /** Seconds in which the camera comes half of the way after a figure, and how far it steps back for each further row. */
-const [LATE, STEP_BACK] = [0.12, 0.28];
+const LATE = 0.12;
+const STEP_BACK = 0.28;
 
 export interface Shows {
   trails: boolean;

@@ -5,7 +5,8 @@ export const DEAD = 0.15;
 /** Pushed so far, a figure goes at its usual walk; all the way, at its usual run. */
 const WALKS = 0.7;
 /** m/s from which a walk becomes a run, and below which a run becomes a walk. */
-const [RUNS, RESTS] = [1.95, 1.6];
+const RUNS = 1.95;
+const RESTS = 1.6;
 
 /** m/s: the slowest and the usual walk, and the usual run. */
 export interface Paces {

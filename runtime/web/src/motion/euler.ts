@@ -31,7 +31,8 @@ function continuous(angles: Vector[]): Vector[] {
   let last = angles[0]!;
   return angles.map((triple, at) => {
     if (at === 0) return triple;
-    const [same, other] = [near(solution(triple, flipped), last), near(solution(triple, !flipped), last)];
+    const same = near(solution(triple, flipped), last);
+    const other = near(solution(triple, !flipped), last);
     const changes = apart(other, last) < apart(same, last) - 1e-9;
     flipped = flipped !== changes;
     last = changes ? other : same;

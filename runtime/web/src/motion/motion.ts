@@ -60,7 +60,8 @@ export function worldOf({
   const turns: Quaternion[][] = [];
   const places: Vector[][] = [];
   rotations.forEach((local, frame) => {
-    const [turned, placed]: [Quaternion[], Vector[]] = [[], []];
+    const turned: Quaternion[] = [];
+    const placed: Vector[] = [];
     skeleton.joints.forEach(({ parent }, at) => {
       const move = translations[frame]![at]!;
       turned.push(parent < 0 ? local[at]! : product(turned[parent]!, local[at]!));

@@ -1,7 +1,11 @@
 /** The difference of the largest and the least number. */
 export function spread(values: number[]): number {
-  let [least, most] = [Infinity, -Infinity];
-  for (const value of values) [least, most] = [Math.min(least, value), Math.max(most, value)];
+  let least = Infinity;
+  let most = -Infinity;
+  for (const value of values) {
+    least = Math.min(least, value);
+    most = Math.max(most, value);
+  }
   return most - least;
 }
 

@@ -18,8 +18,12 @@ export function rotationOf(frame: ArrayLike<number>, at: number): Rotation {
 export function quaternionOf([x, y, z]: Rotation): Quaternion {
   const trace = x[0] + y[1] + z[2];
   const diagonal = [1 - trace + 2 * x[0], 1 - trace + 2 * y[1], 1 - trace + 2 * z[2], 1 + trace];
-  const [a, b, c] = [y[2] - z[1], z[0] - x[2], x[1] - y[0]];
-  const [d, e, f] = [x[1] + y[0], z[0] + x[2], y[2] + z[1]];
+  const a = y[2] - z[1];
+  const b = z[0] - x[2];
+  const c = x[1] - y[0];
+  const d = x[1] + y[0];
+  const e = z[0] + x[2];
+  const f = y[2] + z[1];
   // each is the quaternion times four times one of its parts
   const scaled: Quaternion[] = [
     [diagonal[0]!, d, e, a],
@@ -98,7 +102,9 @@ export function inverse([x, y, z, w]: Quaternion): Quaternion {
 
 /** A vector turned by a rotation. */
 export function rotated([x, y, z, w]: Quaternion, [a, b, c]: Vector): Vector {
-  const [p, q, r] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+  const p = 2 * (y * c - z * b);
+  const q = 2 * (z * a - x * c);
+  const r = 2 * (x * b - y * a);
   return [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p];
 }
 
@@ -130,7 +136,8 @@ export function ofVector(vector: Vector): Quaternion {
 
 /** The shortest turn from one direction to another; half a turn is about any axis. */
 export function swing(from: Vector, to: Vector): Quaternion {
-  const [start, end] = [unit(from), unit(to)];
+  const start = unit(from);
+  const end = unit(to);
   const cosine = dot(start, end);
   if (cosine >= -1 + 1e-6) return normalised([...cross(start, end), 1 + cosine]);
   const least = start.map(Math.abs).indexOf(Math.min(...start.map(Math.abs)));

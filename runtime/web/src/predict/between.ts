@@ -47,9 +47,11 @@ function putAt(frame: ArrayLike<number>, [x, z, facing]: Vector): Float64Array {
 
 /** Place and axes of the hips turned about the vertical axis. */
 function turned(frame: Float64Array, angle: number): Float64Array {
-  const [sin, cos] = [Math.sin(angle), Math.cos(angle)];
+  const sin = Math.sin(angle);
+  const cos = Math.cos(angle);
   for (const at of [0, PLACED.ROOT_PLACE, PLACED.ROOT_PLACE + 3]) {
-    const [x, z] = [frame[at]!, frame[at + 2]!];
+    const x = frame[at]!;
+    const z = frame[at + 2]!;
     frame[at] = x * cos + z * sin;
     frame[at + 2] = z * cos - x * sin;
   }
@@ -58,7 +60,8 @@ function turned(frame: Float64Array, angle: number): Float64Array {
 
 /** A plain way through a gap: joints turn at an even speed, the hips go on a cubic Hermite curve. */
 function bridge(past: Float64Array[], after: Float64Array[], frames: number): Float64Array[] {
-  const [start, end] = [past.at(-1)!, after[0]!];
+  const start = past.at(-1)!;
+  const end = after[0]!;
   const leaves = velocity(past.slice(-STEPS - 1));
   const arrives = velocity(after.slice(0, STEPS + 1));
   return Array.from({ length: frames }, (_, at) => {
@@ -104,7 +107,8 @@ function partOfTheWay(from: Rotation, to: Rotation, share: number): Rotation {
 
 /** A vector turned about a unit axis (Rodrigues). */
 function rotated(vector: Vector, axis: Vector, angle: number): Vector {
-  const [sin, cos] = [Math.sin(angle), Math.cos(angle)];
+  const sin = Math.sin(angle);
+  const cos = Math.cos(angle);
   const aside = cross(axis, vector);
   const along = dot(axis, vector) * (1 - cos);
   return [0, 1, 2].map((i) => vector[i]! * cos + aside[i]! * sin + axis[i]! * along) as Vector;

@@ -175,7 +175,8 @@ function facingOf(root: Quaternion[], fps: number): number[] {
   const doubled = root.map(([, y, , w]) => [w * w - y * y, 2 * w * y] as const);
   let last = 0;
   return root.map((_, at) => {
-    let [real, imaginary] = [0, 0];
+    let real = 0;
+    let imaginary = 0;
     for (let step = Math.max(-reach, -at); step <= reach && at + step < root.length; step++) {
       const weight = Math.exp(-0.5 * (step / deviation) ** 2);
       real += weight * doubled[at + step]![0];

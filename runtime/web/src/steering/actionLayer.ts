@@ -108,7 +108,8 @@ export function begin(
   const after = !request
     ? next(now!, goes)
     : request.act && entered(model, acting, request.act, request.upper, playback, goes);
-  [acting.playing, acting.request] = [after, null];
+  acting.playing = after;
+  acting.request = null;
   if (now?.whole && !after?.whole) {
     const { steerer } = model;
     steerer.matcher.follow(playback, target, gait, steerer.matcher.scaled(now.act.features[now.frame]!));
@@ -140,11 +141,15 @@ function entered(
       .scaled(playing.act.features[playing.frame]!)
       .forEach((value, i) => (playing.whole || i >= HANDS) && (isNow[i] = value));
   const entries = Math.min(Math.round(settings.entry * fps), Math.floor((act.height.length - 1) / 3)) + 1;
-  let [best, least] = [0, Infinity];
+  let best = 0;
+  let least = Infinity;
   for (let frame = 0; frame < entries; frame++) {
     const off = matcher.scaled(act.features[frame]!).map((value, i) => value - isNow[i]!);
     const cost = (whole ? off : off.slice(HANDS)).reduce((sum, value) => sum + value * value, 0);
-    if (cost < least) [best, least] = [frame, cost];
+    if (cost < least) {
+      best = frame;
+      least = cost;
+    }
   }
   return { act, frame: best + 1, age: 0, whole, yields: upper === undefined && !stays };
 }

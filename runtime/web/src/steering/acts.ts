@@ -75,13 +75,12 @@ export function actOf({ fps, acts: settings }: ActModel, name: string, numbers: 
       Math.max(...chunks(rate(places, at, frames, fps), 3).map((speed) => size(speed as Vector))) >
       settings.rest,
   );
-  const [first, last] = [fast.indexOf(true), fast.lastIndexOf(true)];
+  const first = fast.indexOf(true);
+  const last = fast.lastIndexOf(true);
   const within = <T>(all: T[]): T[] =>
     first >= 0 && last - first >= Math.round(settings.moves * fps) ? all.slice(first, last + 1) : all;
-  const [height, ground] = [
-    within(poses.map(({ height }) => height)),
-    within(poses.map(({ ground }) => ground)),
-  ];
+  const height = within(poses.map(({ height }) => height));
+  const ground = within(poses.map(({ ground }) => ground));
   const features = within(
     poseFeatures(
       world,
@@ -120,7 +119,8 @@ function byLegs(
 
 /** Metres from where an act begins to where it ends. */
 export function reachOf({ ground }: Act): number {
-  const [from, to] = [ground[0]!, ground.at(-1)!];
+  const from = ground[0]!;
+  const to = ground.at(-1)!;
   return Math.hypot(to[0] - from[0], to[1] - from[1]);
 }
 
@@ -157,7 +157,8 @@ export function motionOf(poses: Pick<Played, "ground" | "rotations" | "height">[
 
 /** How fast values change at a frame, a second: by those before and after it. */
 function rate(values: (at: number) => number[], at: number, frames: number, fps: number): number[] {
-  const [from, to] = [Math.max(at - 1, 0), Math.min(at + 1, frames - 1)];
+  const from = Math.max(at - 1, 0);
+  const to = Math.min(at + 1, frames - 1);
   const before = values(from);
   return values(to).map((value, i) => ((value - before[i]!) * fps) / (to - from));
 }
@@ -192,7 +193,8 @@ function footContacts(world: World, fps: number): [number, number][] {
 
 /** The move over the ground to a frame from the one before it, for a figure with a facing: x, z, turn. */
 export function stepOf({ ground }: Act, frame: number, facing: number): Ground {
-  const [before, after] = [ground[frame - 1]!, ground[frame]!];
+  const before = ground[frame - 1]!;
+  const after = ground[frame]!;
   const [x, , z] = rotated(about(Y, facing - before[2]), [after[0] - before[0], 0, after[1] - before[1]]);
   return [x, z, after[2] - before[2]];
 }

@@ -37,14 +37,17 @@ export function onward(
   halfLife: number,
 ): [x: number, z: number] {
   const { points, along } = going;
-  const [root, velocity] = [at2(playback.root), at2(playback.spring)];
+  const root = at2(playback.root);
+  const velocity = at2(playback.spring);
   const here = at(going, going.gone);
   const way = unit(minus(at(going, going.gone + 0.05), here));
   const gone = going.gone + clamp(dot(minus(root, here), way), 0, 0.5);
-  const [pace, whole] = [Math.hypot(...velocity), along.at(-1)!];
+  const pace = Math.hypot(...velocity);
+  const whole = along.at(-1)!;
   const ahead = gone + settings.ahead + settings.ahead_moving * pace;
   const off = minus(points.at(-1)!, root);
-  const [last, far] = [ahead >= whole, Math.hypot(...off)];
+  const last = ahead >= whole;
+  const far = Math.hypot(...off);
   const left = last ? far : Math.max(whole - gone, far);
   const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < settings.near);
   const stands = pace < settings.stands;
@@ -90,9 +93,11 @@ export function settle(
 function at({ points, along }: Going, gone: number): Point {
   const beyond = along.findIndex((metres) => metres > gone);
   const after = clamp(beyond < 0 ? along.length : beyond, 1, along.length - 1);
-  const [start, stop] = [along[after - 1]!, along[after]!];
+  const start = along[after - 1]!;
+  const stop = along[after]!;
   const part = clamp((gone - start) / Math.max(stop - start, 1e-9), 0, 1);
-  const [from, to] = [points[after - 1]!, points[after]!];
+  const from = points[after - 1]!;
+  const to = points[after]!;
   return [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])];
 }
 

@@ -16,13 +16,17 @@ export function keptApart(
   room: number,
   settings: Settings<typeof avoidanceSettings>,
 ): [x: number, z: number] {
-  let [changeX, changeZ] = [0, 0];
+  let changeX = 0;
+  let changeZ = 0;
   for (const other of others) {
-    const [x, z] = [figure.root[0] - other.root[0], figure.root[1] - other.root[1]];
+    const x = figure.root[0] - other.root[0];
+    const z = figure.root[1] - other.root[1];
     if (other === figure || Math.abs(x) >= settings.sight || Math.abs(z) >= settings.sight) continue;
-    const [u, v] = [figure.velocity[0]! - other.velocity[0]!, figure.velocity[1]! - other.velocity[1]!];
+    const u = figure.velocity[0]! - other.velocity[0]!;
+    const v = figure.velocity[1]! - other.velocity[1]!;
     const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), settings.soon);
-    const [nearX, nearZ] = [x + soon * u, z + soon * v];
+    const nearX = x + soon * u;
+    const nearZ = z + soon * v;
     if (nearX * nearX + nearZ * nearZ >= room * room) continue;
     const by =
       settings.strength *
@@ -43,7 +47,8 @@ export function aside(
   change: readonly number[],
   { waits }: Settings<typeof avoidanceSettings>,
 ): [x: number, z: number] {
-  const [u, v] = [x! + change[0]!, z! + change[1]!];
+  const u = x! + change[0]!;
+  const v = z! + change[1]!;
   const speed = Math.hypot(u, v);
   const share = speed > waits ? Math.min(1, Math.hypot(x!, z!) / speed) : 0;
   return [u * share, v * share];

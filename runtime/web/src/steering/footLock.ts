@@ -76,15 +76,14 @@ function shift(
 ): number {
   const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
   if (contact && Math.hypot(x, z) < settings.swings * dt && Math.hypot(...stay) < settings.farthest) {
-    [foot.shift, foot.drift] = [stay, [0, 0]];
+    foot.shift = stay;
+    foot.drift = [0, 0];
     return 0;
   }
   const damping = dampingOf(settings.fade);
   const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
   const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
-  [foot.shift, foot.drift] = [
-    [offX, offZ],
-    [rateX, rateZ],
-  ];
+  foot.shift = [offX, offZ];
+  foot.drift = [rateX, rateZ];
   return Math.hypot(offX - stay[0], offZ - stay[1]);
 }

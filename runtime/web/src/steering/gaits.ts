@@ -56,7 +56,8 @@ export class Gaits {
     if (Math.min(sideways, backwards) > 0 || !(x || z)) return [x, z, to];
     const near = (angle: number) =>
       facing + clamp(wrapped(angle - facing), -this.settings.ahead, this.settings.ahead);
-    const [direction, speed] = [near(Math.atan2(x, z)), Math.hypot(x, z)];
+    const direction = near(Math.atan2(x, z));
+    const speed = Math.hypot(x, z);
     return [speed * Math.sin(direction), speed * Math.cos(direction), near(to)];
   }
 

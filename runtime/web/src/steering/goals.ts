@@ -6,7 +6,8 @@ export const UNIT = 2 * MATCHING.STEPS ** 2;
 /** Consecutive goals that share a box, and a larger one: they follow each other in a recording, so they are alike. */
 const SIZES = [8, 32] as const;
 /** The two features of where a row leads at the last of the horizons. */
-const [LEFT, FORWARD] = [4, 5];
+const LEFT = 4;
+const FORWARD = 5;
 
 /** Of each box of rows the least and the largest of each feature. */
 interface Boxes {
@@ -33,12 +34,14 @@ export class Goals {
     rows.forEach((row, at) =>
       this.features.set(features.subarray(row * width, (row + 1) * width), at * width),
     );
-    [this.small, this.large] = [this.boxes(SIZES[0]), this.boxes(SIZES[1])];
+    this.small = this.boxes(SIZES[0]);
+    this.large = this.boxes(SIZES[1]);
   }
 
   private boxes(size: number): Boxes {
     const count = Math.ceil(this.rows.length / size) * this.width;
-    const [low, high] = [new Int16Array(count).fill(32767), new Int16Array(count).fill(-32768)];
+    const low = new Int16Array(count).fill(32767);
+    const high = new Int16Array(count).fill(-32768);
     this.features.forEach((value, at) => {
       const place = Math.floor(at / this.width / size) * this.width + (at % this.width);
       low[place] = Math.min(low[place]!, value);
@@ -73,7 +76,8 @@ export class Goals {
     const left = query[LEFT]! / MATCHING.STEPS / scale[LEFT]! + mean[LEFT]!;
     const forward = query[FORWARD]! / MATCHING.STEPS / scale[FORWARD]! + mean[FORWARD]!;
     const far = Math.hypot(left, forward);
-    const [x, z] = [(lag * left) / Math.max(far, 1e-6), (lag * forward) / Math.max(far, 1e-6)];
+    const x = (lag * left) / Math.max(far, 1e-6);
+    const z = (lag * forward) / Math.max(far, 1e-6);
     const half = (lag * far) / 2 - x * mean[LEFT]! - z * mean[FORWARD]!;
     return [
       2 * Math.round((MATCHING.STEPS * x) / scale[LEFT]!),
@@ -85,7 +89,8 @@ export class Goals {
   private least(query: Int16Array, bound: number): { at: number; cost: number } {
     const { width, features, small, large, rows } = this;
     const [left, forward, half] = this.way(query);
-    let [best, cost] = [-1, bound];
+    let best = -1;
+    let cost = bound;
     for (let first = 0, outer = 0; first < rows.length; first += SIZES[1], outer += width) {
       if (outside(query, large, outer, width, left, forward, half, cost) >= cost) continue;
       const last = Math.min(first + SIZES[1], rows.length);

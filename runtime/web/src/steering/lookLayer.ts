@@ -101,7 +101,8 @@ function inSpine({ ground: [x, z, facing], height, rotations }: Played, point: V
 
 /** Where the eyes are in the frame of the lower spine. */
 function eyes(bones: Quaternion[]): Vector {
-  let [place, above]: [Vector, Quaternion] = [[0, 0, 0], STILL];
+  let place: Vector = [0, 0, 0];
+  let above: Quaternion = STILL;
   bones.forEach((bone, i) => {
     place = plus(place, rotated(above, OFFSETS[SHARES[i]![0]]!));
     above = bone;
@@ -118,8 +119,10 @@ function angles([x, y, z]: Vector): [left: number, up: number] {
 function turned(bones: Quaternion[], gaze: number, [left, up]: number[]): Quaternion[] {
   return bones.map((bone, i) => {
     const share = SHARES[i]![1];
-    const [way, half] = [gaze + share * left!, (share * up!) / 2];
-    const [sine, cosine] = [Math.sin(half), Math.cos(half)];
+    const way = gaze + share * left!;
+    const half = (share * up!) / 2;
+    const sine = Math.sin(half);
+    const cosine = Math.cos(half);
     return product(
       [-Math.cos(way) * sine, 0, Math.sin(way) * sine, cosine],
       product(about(Y, share * left!), bone),

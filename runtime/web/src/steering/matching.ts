@@ -70,7 +70,8 @@ const SIGNS = COLUMNS.map((_, i) =>
 /** Of each row the angle from the facing to where its recording goes in the stride around it. */
 function waysOf({ moves, left }: Tables): Float64Array {
   const rows = left.length;
-  const [forward, aside] = [new Float64Array(rows + 1), new Float64Array(rows + 1)];
+  const forward = new Float64Array(rows + 1);
+  const aside = new Float64Array(rows + 1);
   for (let row = 0; row < rows; row++) {
     forward[row + 1] = forward[row]! + moves[6 * row]!;
     aside[row + 1] = aside[row]! + moves[6 * row + 1]!;
@@ -78,10 +79,8 @@ function waysOf({ moves, left }: Tables): Float64Array {
   let start = 0; // of the recording
   return Float64Array.from({ length: rows }, (_, row) => {
     if (row && row + left[row]! !== row - 1 + left[row - 1]!) start = row;
-    const [first, stop] = [
-      Math.max(start, row - MATCHING.STRIDE_ROWS),
-      Math.min(row + left[row]!, row + MATCHING.STRIDE_ROWS) + 1,
-    ];
+    const first = Math.max(start, row - MATCHING.STRIDE_ROWS);
+    const stop = Math.min(row + left[row]!, row + MATCHING.STRIDE_ROWS) + 1;
     return Math.atan2(aside[stop]! - aside[first]!, forward[stop]! - forward[first]!);
   });
 }
@@ -172,7 +171,8 @@ export class Matcher {
 
   /** A figure at a place that plays a row; with a phase it searches in its turn alone, first after so many ticks. */
   playing(row: number, [x, z, facing]: Ground = [0, 0, 0], phase?: number): Playback {
-    const [offset, offsetRate] = [new Float64Array(this.codes), new Float64Array(this.codes)];
+    const offset = new Float64Array(this.codes);
+    const offsetRate = new Float64Array(this.codes);
     const springs = { spring: [0, 0, facing] as Target, springRate: [0, 0, 0] as Target, offset, offsetRate };
     const turn = { ticksToSearch: phase ?? 0, inTurn: phase !== undefined };
     const legs = { warp: 0, warpRate: 0, stride: 1, strideRate: 0 };
@@ -237,19 +237,23 @@ export class Matcher {
 
   /** Where the springs lead, as features that are not yet scaled. */
   private trajectory({ root, spring, springRate }: Playback, target: Target, creeps: boolean): number[] {
-    const [toFacing, by] = [target[2], creeps ? this.hurry(spring[0], spring[1]) : 1];
+    const toFacing = target[2];
+    const by = creeps ? this.hurry(spring[0], spring[1]) : 1;
     const more = creeps ? this.hurry(target[0], target[1]) : 1;
-    const [toX, toZ, rateX, rateZ] = [
-      target[0] * more,
-      target[1] * more,
-      springRate[0] * by,
-      springRate[1] * by,
-    ];
+    const toX = target[0] * more;
+    const toZ = target[1] * more;
+    const rateX = springRate[0] * by;
+    const rateZ = springRate[1] * by;
     const { velocity, facing: halfLife, half_speed, horizon } = this.settings;
-    const [slow, calm] = [dampingOf(velocity), dampingOf(halfLife)];
-    const [cos, sin] = [Math.cos(root[2]), Math.sin(root[2])];
-    const [offX, offZ, off] = [spring[0] * by - toX, spring[1] * by - toZ, wrapped(spring[2] - toFacing)];
-    const [places, facings]: [number[], number[]] = [[], []];
+    const slow = dampingOf(velocity);
+    const calm = dampingOf(halfLife);
+    const cos = Math.cos(root[2]);
+    const sin = Math.sin(root[2]);
+    const offX = spring[0] * by - toX;
+    const offZ = spring[1] * by - toZ;
+    const off = wrapped(spring[2] - toFacing);
+    const places: number[] = [];
+    const facings: number[] = [];
     for (const time of [horizon / 3, (horizon * 2) / 3, horizon]) {
       const x = toX * time + dampedPath(offX, rateX, slow, time);
       const z = toZ * time + dampedPath(offZ, rateZ, slow, time);

@@ -158,7 +158,9 @@ function configOf(
   { config, motion: { channels } }: Manifest,
   codes: number,
 ): { names: string[]; speeds: Speeds[]; odd: number } {
-  const [names, speeds, odd] = [config.gaits as string[], config.speeds as Speeds[], config.odd as number];
+  const names = config.gaits as string[];
+  const speeds = config.speeds as Speeds[];
+  const odd = config.odd as number;
   if (!Array.isArray(names) || !names.length || !names.every((name) => typeof name === "string")) {
     throw new BundleError("manifest, config.gaits: must be names");
   }

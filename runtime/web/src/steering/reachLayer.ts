@@ -65,7 +65,8 @@ export function reached(
   const { upper, lower, gap } = arm(pose, side, shownBy(hand.aim) as Vector, settings);
   hand.beyond = !!hand.point && gap > settings.reached;
   const rotations = [...pose.rotations];
-  const [share, bones] = [shownBy(hand.weight)[0]!, ARMS[side]!];
+  const share = shownBy(hand.weight)[0]!;
+  const bones = ARMS[side]!;
   rotations[bones[1]!] = mixed(rotations[bones[1]!]!, upper, share);
   rotations[bones[2]!] = mixed(rotations[bones[2]!]!, lower, share);
   return { ...pose, rotations };
@@ -95,7 +96,8 @@ function arm(
   );
   const near = within(way, side, ready.longest, settings);
   const { thigh, shin } = ready.turns(near);
-  const [up, low] = [product(thigh, READY[side]![0]), product(shin, READY[side]![1])];
+  const up = product(thigh, READY[side]![0]);
+  const low = product(shin, READY[side]![1]);
   return {
     upper: product(inverse(shoulder), up),
     lower: product(inverse(up), low),
@@ -110,7 +112,8 @@ function out(side: number): number {
 
 /** A point in the frame of the upper chest. */
 function inChest({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
-  let [place, above]: [Vector, Quaternion] = [[x, height, z], product(about(Y, facing), rotations[0]!)];
+  let place: Vector = [x, height, z];
+  let above: Quaternion = product(about(Y, facing), rotations[0]!);
   for (const bone of TRUNK) {
     place = plus(place, rotated(above, OFFSETS[bone]!));
     above = product(above, rotations[bone]!);
@@ -144,15 +147,14 @@ function within(
   settings: Settings<typeof reachSettings>,
 ): Vector {
   const widest = Math.cos(settings.widest);
-  const [axis, far] = [unit([out(side), 0, 1]), size(way)];
+  const axis = unit([out(side), 0, 1]);
+  const far = size(way);
   const along = dot(way, axis);
   const aside = unit(minus(way, times(axis, along)));
   const edge = plus(times(axis, widest * far), times(aside, Math.sqrt(1 - widest * widest) * far));
-  const [nearest, straight, more] = [
-    settings.nearest * longest,
-    settings.straight * longest,
-    settings.stretched * longest,
-  ];
+  const nearest = settings.nearest * longest;
+  const straight = settings.straight * longest;
+  const more = settings.stretched * longest;
   const over = Math.max(far - straight, 0);
   const eased = over > 0 ? straight + more * (1 - Math.exp(-over / more)) : Math.max(far, nearest);
   return times(along >= widest * far ? way : edge, eased / Math.max(far, 1e-12));

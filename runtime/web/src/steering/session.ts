@@ -119,7 +119,8 @@ export class ControlSession {
   control({ gait, speed, direction, facing, velocity }: Told): void {
     const gaits = gait === undefined ? undefined : this.gaits(gait);
     const speeds = this.each("speed", speed);
-    const [directions, facings] = [this.each("direction", direction), this.each("facing", facing)];
+    const directions = this.each("direction", direction);
+    const facings = this.each("facing", facing);
     const moves = velocity === undefined ? undefined : this.rows("a velocity", velocity, ["x", "z"]);
     if (moves && (speeds || directions))
       throw new ControlError("give a velocity, or speed and direction, not both");
@@ -172,7 +173,8 @@ export class ControlSession {
       ]),
     );
     const acts = figures.map((at, i) => {
-      const [what, [x, z]] = [made.get(each[i]!)!, this.state.figures[at]!.target];
+      const what = made.get(each[i]!)!;
+      const [x, z] = this.state.figures[at]!.target;
       return typeof what === "string" ? this.model.take(what, !!(x || z)) : what;
     });
     figures.forEach((at, i) => (this.state.figures[at]!.acting.request = { act: acts[i]!, upper }));

@@ -89,7 +89,8 @@ export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, r
   const { playback, acting, command } = figure;
   const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
   const { steerer, idle: settings, fps } = model;
-  const [{ root }, dt] = [playback, 1 / fps];
+  const { root } = playback;
+  const dt = 1 / fps;
   const changed = begin(model, acting, playback, target, command.gait);
   const whole = acting.playing?.whole ?? false;
   const played = steerer.tick(playback, target, command.gait);

@@ -46,7 +46,8 @@ export class Steerer {
     this.warp(figure, moves[3]!);
     this.move(figure, moves, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
     this.fade(figure, dampingOf(settings.blend));
-    const [left, right] = [Math.fround(moves[4]!), Math.fround(moves[5]!)]; // so bounds are passed in the same ticks as in Python
+    const left = Math.fround(moves[4]!);
+    const right = Math.fround(moves[5]!); // so bounds are passed in the same ticks as in Python
     const contacts: [number, number] = figure.mirror ? [right, left] : [left, right];
     return { ground: figure.root, ...this.body(figure), contacts };
   }
@@ -64,7 +65,8 @@ export class Steerer {
     const { tables, dt, codes } = this.matcher;
     let ground: Ground = [0, 0, 0];
     return Array.from({ length: count }, (_, at) => {
-      const [row, move] = [first + at, (i: number) => tables.moves[6 * (first + at) + i]! * dt];
+      const row = first + at;
+      const move = (i: number) => tables.moves[6 * (first + at) + i]! * dt;
       if (at) ground = moved(ground, [move(0), move(1), move(2)]);
       this.codes.set(tables.codes.subarray(row * codes, (row + 1) * codes));
       const { rotations, height } = this.pose();
@@ -109,14 +111,18 @@ export class Steerer {
     const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : settings.idle);
     const stride = moving ? clamp(ratio / rate, creeps ? 0 : settings.shortest, settings.longest) : 1;
     const by = rate * dt * stride;
-    const [forward, left, turn] = [moves[0]! * by, side * moves[1]! * by, side * moves[2]! * rate * dt];
+    const forward = moves[0]! * by;
+    const left = side * moves[1]! * by;
+    const turn = side * moves[2]! * rate * dt;
     const error = wrapped(spring[2] - facing);
     const most =
       (settings.turn_still + settings.turn_moving * Math.min(pace, settings.turn_speed)) * dt +
       settings.turn_turning * Math.abs(turn);
     const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / settings.turn)), -most, most));
-    const [sin, cos] = [Math.sin(facing + figure.warp), Math.cos(facing + figure.warp)];
-    const [stepX, stepZ] = [sin * forward + cos * left, cos * forward - sin * left];
+    const sin = Math.sin(facing + figure.warp);
+    const cos = Math.cos(facing + figure.warp);
+    const stepX = sin * forward + cos * left;
+    const stepZ = cos * forward - sin * left;
     // turned towards the velocity by a small angle, where the two do not go apart
     const along = stepX * spring[0] + stepZ * spring[1];
     const across = stepZ * spring[0] - stepX * spring[1];
@@ -148,7 +154,10 @@ export class Steerer {
     const count = values.length;
     values.set(mean);
     for (let k = 0; k < codes.length; k += 4) {
-      const [a, b, c, d] = [codes[k]!, codes[k + 1]!, codes[k + 2]!, codes[k + 3]!];
+      const a = codes[k]!;
+      const b = codes[k + 1]!;
+      const c = codes[k + 2]!;
+      const d = codes[k + 3]!;
       for (let i = 0, at = k * count; i < count; i++, at++) {
         values[i]! +=
           a * basis[at]! + b * basis[at + count]! + c * basis[at + 2 * count]! + d * basis[at + 3 * count]!;
@@ -156,7 +165,10 @@ export class Steerer {
     }
     const rotations: Quaternion[] = [];
     for (let at = 0; at < count - 1; at += 4) {
-      const [x, y, z, w] = [values[at]!, values[at + 1]!, values[at + 2]!, values[at + 3]!];
+      const x = values[at]!;
+      const y = values[at + 1]!;
+      const z = values[at + 2]!;
+      const w = values[at + 3]!;
       const size = Math.sqrt(Math.max(x * x + y * y + z * z + w * w, 1e-12));
       rotations.push([x / size, y / size, z / size, w / size]);
     }

@@ -22,7 +22,8 @@ export function corrected(word: string, ...known: string[][]): string {
 
 /** How many letters are added, left out, changed, or swapped with the next one between two words. */
 function distance(first: string, second: string): number {
-  const [a, b] = [[...first], [...second]];
+  const a = [...first];
+  const b = [...second];
   let before: number[] = [];
   let last = Array.from({ length: b.length + 1 }, (_, at) => at);
   for (let i = 0; i < a.length; i++) {
@@ -32,7 +33,8 @@ function distance(first: string, second: string): number {
       if (i && j && a[i] === b[j - 1] && a[i - 1] === b[j]) best = Math.min(best, before[j - 1]! + 1);
       row.push(best);
     }
-    [before, last] = [last, row];
+    before = last;
+    last = row;
   }
   return last[b.length]!;
 }

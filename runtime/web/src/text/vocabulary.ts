@@ -4,7 +4,10 @@ import { stem } from "./clauses.js";
 import { BundleError, TextError } from "../errors.js";
 import { corrected } from "./spelling.js";
 
-const [PAD, SOS, EOS, UNK] = [0, 1, 2, 3];
+const PAD = 0;
+const SOS = 1;
+const EOS = 2;
+const UNK = 3;
 
 /** From a sentence to the words that a model knows, and back: docs/reference/bundle.md, "Text". */
 export class Vocabulary {
@@ -121,7 +124,8 @@ export class Vocabulary {
   private number(words: string[]): [number, number] {
     let [value, used] = this.belowHundred(words);
     if (words[used] !== this.rules.hundred) return [value, used];
-    [value, used] = [100 * (used ? value : 1), used + 1];
+    value = 100 * (used ? value : 1);
+    used = used + 1;
     const skipped = words[used] === this.rules.conjunction ? 1 : 0;
     const [more, length] = this.belowHundred(words.slice(used + skipped));
     return length ? [value + more, used + skipped + length] : [value, used];

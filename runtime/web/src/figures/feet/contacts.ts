@@ -52,7 +52,8 @@ export function velocityByFeet(points: Plane[], heights: number[][], fps: number
 
 /** How far a vote counts beside a velocity. */
 function agreement([x, z]: [number, number], [alongX, alongZ]: [number, number]): number {
-  const [offX, offZ] = [x - alongX, z - alongZ];
+  const offX = x - alongX;
+  const offZ = z - alongZ;
   const allowed = CONTACTS.ALLOWED[offX * alongX + offZ * alongZ > 0 ? 0 : 1];
   return (1 + (offX ** 2 + offZ ** 2) / allowed ** 2) ** -2;
 }
@@ -69,7 +70,9 @@ function led(votes: Plane[], weights: number[][], fps: number): Plane {
     Math.exp(-away / (CONTACTS.TOGETHER * fps)),
   );
   return sums.map((_, at) => {
-    let [total, x, z] = [1e-12, 0, 0]; // no vote within a second is none
+    let total = 1e-12;
+    let x = 0;
+    let z = 0; // no vote within a second is none
     for (let other = Math.max(0, at - reach); other <= Math.min(sums.length - 1, at + reach); other++) {
       const near = nearness[Math.abs(other - at)]!;
       total += near * sums[other]![0];
@@ -83,7 +86,8 @@ function led(votes: Plane[], weights: number[][], fps: number): Plane {
 /** Heights of the root in metres: those that put the feet on the ground, or more in flight, where it falls freely. */
 export function heightsByFeet(standing: number[], fps: number): number[][] {
   // a jump up forward in time is a fall backward: only frames on which both agree are flight
-  const [up, down] = [flown(standing, fps), flown([...standing].reverse(), fps).reverse()];
+  const up = flown(standing, fps);
+  const down = flown([...standing].reverse(), fps).reverse();
   return smoothed(
     up.map((value, at) => [Math.min(value, down[at]!)]),
     treadmillSettings.calm * fps,

@@ -124,7 +124,8 @@ function blended(
   let after = 1;
   return Array.from({ length: frames }, (_, frame) => {
     while (after < keys.length - 1 && keys[after]![0] <= frame) after++;
-    const [[start, from], [end, to]] = [keys[after - 1]!, keys[after]!];
+    const [start, from] = keys[after - 1]!;
+    const [end, to] = keys[after]!;
     const part = rise((frame - start) / (end - start), 0, 1);
     return from.map((value, axis) => value + part * (to[axis]! - value));
   });

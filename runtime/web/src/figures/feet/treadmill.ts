@@ -147,6 +147,7 @@ function average(values: number[]): number {
 
 /** The covariance of two rows. */
 function together(first: number[], other: number[]): number {
-  const [a, b] = [average(first), average(other)];
+  const a = average(first);
+  const b = average(other);
   return average(first.map((value, at) => (value - a) * (other[at]! - b)));
 }

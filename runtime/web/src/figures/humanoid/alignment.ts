@@ -53,7 +53,8 @@ export function nearAxes(turn: Quaternion, degrees: number): Quaternion {
 
 /** Left, up and forward of a pose that is a standing body, else null; exact, or taken to be axes that it is near. */
 export function bodyFrame(pose: Vector[], body: Body, exact = false): Quaternion | null {
-  const [across, up] = [body.toLeft(pose, "UpperLeg"), body.legsUp(pose)];
+  const across = body.toLeft(pose, "UpperLeg");
+  const up = body.legsUp(pose);
   if (!size(across) || Math.abs(dot(unit(across), up)) > 0.9) return null;
   const axes = frame(across, up);
   const bodyTurn = exact ? axes : nearAxes(axes, 15);
@@ -115,7 +116,8 @@ function foundTurns(body: Body, pose: Vector[], bodyTurn: Quaternion): Record<st
     let carried = bodyTurn;
     for (const bone of limb.filter((name) => body.map.joints[name] !== undefined)) {
       if (body.aimed(bone) && !bone.endsWith("Toes")) {
-        const [target, start] = [body.direction(pose, bone), rotated(carried, directionOf(bone))];
+        const target = body.direction(pose, bone);
+        const start = rotated(carried, directionOf(bone));
         if (bone.endsWith("Foot")) carried = footTurn(target, bodyTurn, carried);
         else if (!bone.endsWith("Hand") || dot(start, target) > 0.8)
           carried = product(swing(start, target), carried);

@@ -14,7 +14,8 @@ export class Body {
   ) {
     for (const limb of LIMBS) {
       limb.forEach((bone, at) => {
-        const [joint, after] = [map.joints[bone], map.joints[limb[at + 1] ?? ""]];
+        const joint = map.joints[bone];
+        const after = map.joints[limb[at + 1] ?? ""];
         if (joint !== undefined) this.aims[bone] = after === undefined ? this.ends(joint) : [after];
       });
     }
@@ -71,7 +72,8 @@ export class Body {
 
   /** The direction from the feet to the legs' joints, the mean of both sides. */
   legsUp(pose: Vector[]): Vector {
-    const [hips, feet] = [this.pair(pose, "UpperLeg"), this.pair(pose, "Foot")];
+    const hips = this.pair(pose, "UpperLeg");
+    const feet = this.pair(pose, "Foot");
     return unit(plus(unit(minus(hips[0]!, feet[0]!)), unit(minus(hips[1]!, feet[1]!))));
   }
 

@@ -96,7 +96,8 @@ class Calibration {
       this.settle(
         joint,
         places.map((pose) => {
-          const [legs, arms] = [unit(body.toLeft(pose, "UpperLeg")), unit(body.toLeft(pose, "UpperArm"))];
+          const legs = unit(body.toLeft(pose, "UpperLeg"));
+          const arms = unit(body.toLeft(pose, "UpperArm"));
           const left = i < chest ? plus(times(legs, 1 - i / chest), times(arms, i / chest)) : arms;
           const start = last
             ? pose[back[Math.max(i - 1, chest - 1)]!]!
@@ -113,7 +114,8 @@ class Calibration {
   /** Knees are hinges that bend backwards; feet and toes have the hinge's axis. */
   leg(bones: string[]): void {
     const { joints } = this.body.map;
-    const [thigh, shin] = [this.directions(bones[0]!), this.directions(bones[1]!)];
+    const thigh = this.directions(bones[0]!);
+    const shin = this.directions(bones[1]!);
     const hips = this.turned(joints.hips!);
     const hinge = thigh.map((along, at) =>
       plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), ALIGNMENT.HINGE)),

@@ -65,7 +65,8 @@ function bendFingers(
     const start = finger === THUMB ? pointing[0]! : along;
     const axis = cross(start, finger === THUMB ? plus(palm, across) : palm);
     chain.slice(0, Math.min(pointing.length, RETARGET.FINGER_BENDS.length)).forEach((joint, at) => {
-      const [before, bone] = [at ? pointing[at - 1]! : start, pointing[at]!];
+      const before = at ? pointing[at - 1]! : start;
+      const bone = pointing[at]!;
       const aside = unit(minus(axis, times(bone, dot(axis, bone))));
       const now = Math.atan2(
         dot(cross(before, bone), aside),

@@ -98,11 +98,10 @@ function bothSides(ofLeft: Record<string, Vector>, signs: Vector): Record<string
   const axes: Record<string, Vector> = {};
   for (const [bone, direction] of Object.entries(ofLeft)) {
     if (UNSIDED.includes(bone)) axes[bone] = direction;
-    else
-      [axes[`left${bone}`], axes[`right${bone}`]] = [
-        direction,
-        direction.map((value, axis) => signs[axis]! * value) as Vector,
-      ];
+    else {
+      axes[`left${bone}`] = direction;
+      axes[`right${bone}`] = direction.map((value, axis) => signs[axis]! * value) as Vector;
+    }
   }
   return axes;
 }
@@ -146,7 +145,8 @@ function match(convention: Convention, skeleton: Skeleton, written: string[]) {
       .map((name) => names.indexOf(name))
       .filter((at) => at >= 0)
       .sort((a, b) => a - b);
-  const [spine, neck] = [chain("spine"), chain("neck")];
+  const spine = chain("spine");
+  const neck = chain("neck");
   const hips = names.flatMap((name, at) =>
     name === convention.names.hips![0] && skeleton.children[at]!.length >= 3 ? [at] : [],
   );

@@ -130,7 +130,8 @@ function fittedInFrames(body: Body, world: World, leg: number, known: boolean, m
     ? "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees"
     : `the rest pose is not a standing body: how the joints stand was ${known ? "known by the convention" : "found from the frames"}`;
   const aligned = calibrated(body, world, known || !moving);
-  const [hips, carrier] = [body.map.joints.hips!, carrierOf(body.map, body.skeleton)];
+  const hips = body.map.joints.hips!;
+  const carrier = carrierOf(body.map, body.skeleton);
   aligned[carrier] = product(product(inverse(turns[0]![carrier]!), turns[0]![hips]!), aligned[hips]!);
   const confidence = guessed ? 0.7 : known ? 0.95 : 0.85;
   return {
@@ -238,11 +239,13 @@ function checkStance(body: Body, places: Vector[][]): void {
 /** Refuse frames that no human's body goes through; hinges: of each side the knee's axis, to the left, by frame. */
 export function checkFrames(body: Body, places: Vector[][], hinges: Record<string, Vector[]>): void {
   const toes: number[] = [];
-  let [wrong, bent] = [0, 0];
+  let wrong = 0;
+  let bent = 0;
   for (const [side, hinge] of Object.entries(hinges)) {
     const [thigh, shin, foot] = LEG.slice(0, 3).map((part) => side + part) as [string, string, string];
     places.forEach((pose, at) => {
-      const [upper, lower] = [body.direction(pose, thigh), body.direction(pose, shin)];
+      const upper = body.direction(pose, thigh);
+      const lower = body.direction(pose, shin);
       if (body.aimed(foot)) toes.push(dot(cross(hinge[at]!, times(lower, -1)), body.direction(pose, foot)));
       const bend = cross(upper, lower);
       if (size(bend) <= 0.3) return; // the sine of the knee's angle
