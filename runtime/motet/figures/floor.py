@@ -22,7 +22,7 @@ THICKNESS = {
 """Metres from a joint to the skin, less than most people's: nobody who touches the floor is to float over it."""
 
 LIMBS = ("LowerArm", "Hand", "Foot", "Toes", "Hand_end", "Toes_end")
-"""What is turned upwards about the joint before it; the rest of the body is lifted as a whole."""
+"""Ends of the names of joints that are turned upwards about the joint before; the rest is lifted as a whole."""
 
 TOLERATED = 0.015
 """Metres that a wrist, an elbow or an ankle may be under the floor: to lift the wrist of an arm that stands on it bends
@@ -40,27 +40,46 @@ def above_floor(motion: Motion) -> Motion:
     Nothing changes where nothing is under the floor. Recordings need it where hands and toes have no joint of
     their own, or the performer was larger than the skeleton.
     """
-    turned, places = global_transforms(motion)
-    turned = np.array(turned)
+    rotations, places = global_transforms(motion)
+    turned = np.array(rotations)
     places = np.array(places)
     reach = SOFT * motion.fps
-    thick = np.array([THICKNESS.get(name.removeprefix("left").removeprefix("right"), 0.0) for name in HUMANOID.names])
-    thick -= [TOLERATED * name.endswith(LIMBS[:4]) for name in HUMANOID.names]
+    thickness = _thickness()
     limbs = [joint for joint, name in enumerate(HUMANOID.names) if name.endswith(LIMBS)]
-    body = np.setdiff1d(np.arange(len(thick)), limbs)
-    places[..., 1] += lift((thick[body] - places[:, body, 1]).max(axis=1), reach)[:, None]
+
+    # the whole body rises until all but the limbs is above the floor
+    body = np.setdiff1d(np.arange(len(thickness)), limbs)
+    depth = (thickness[body] - places[:, body, 1]).max(axis=1)
+    places[..., 1] += lift(depth, reach)[:, None]
+
+    # then each limb that is still under it turns upwards
     for joint in limbs:
-        parent = HUMANOID.joints[joint].parent
-        bone = places[:, joint] - places[:, parent]
-        # straight down, a shin goes forward, a hand or foot the way its back faces
-        side = turned[:, parent, :, 2 if HUMANOID.names[joint].endswith("Foot") else 1]
-        raised = _raised(bone, side, lift(thick[joint] - places[:, joint, 1], reach))
-        turn = swing(bone, raised)[:, None]
-        hanging = list(HUMANOID.subtree(HUMANOID.names[parent]))
-        places[:, hanging] = places[:, [parent]] + rotated(turn, places[:, hanging] - places[:, [parent]])
-        turned[:, hanging] = product(turn, turned[:, hanging])
+        height = lift(thickness[joint] - places[:, joint, 1], reach)
+        _raise_limb(joint, height, turned, places)
     lifted = motion_of(HUMANOID, turned, {0: places[:, 0]}, motion.fps)
     return replace(motion, values=lifted.select(motion.channels, motion.units).values)
+
+
+def _thickness() -> Array:
+    """Metres (J,) from each of the humanoid's joints to the skin, less what may be under the floor."""
+    thickness = []
+    for name in HUMANOID.names:
+        skin = THICKNESS.get(name.removeprefix("left").removeprefix("right"), 0.0)
+        thickness.append(skin - TOLERATED if name.endswith(LIMBS[:4]) else skin)
+    return np.array(thickness)
+
+
+def _raise_limb(joint: int, height: Array, turned: Array, places: Array) -> None:
+    """Raise a joint by heights (T,): turn the bone to it, with all that hangs on that, in rotations (T, J, 3, 3) and
+    positions (T, J, 3) of all joints."""
+    parent = HUMANOID.joints[joint].parent
+    bone = places[:, joint] - places[:, parent]
+    # straight down, a shin goes forward, a hand or foot the way its back faces
+    side = turned[:, parent, :, 2 if HUMANOID.names[joint].endswith("Foot") else 1]
+    turn = swing(bone, _raised(bone, side, height))[:, None]
+    hanging = list(HUMANOID.subtree(HUMANOID.names[parent]))
+    places[:, hanging] = places[:, [parent]] + rotated(turn, places[:, hanging] - places[:, [parent]])
+    turned[:, hanging] = product(turn, turned[:, hanging])
 
 
 def _raised(bone: Array, side: Array, height: Array) -> Array:

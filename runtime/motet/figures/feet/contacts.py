@@ -34,30 +34,46 @@ VOTING_HEIGHT = 0.07
 """Metres above the ground from which on a point has no vote on where the root goes."""
 
 TOGETHER = 0.05
+"""Seconds by which votes apart in time count e times less for each other."""
 REACH = 1.0
-"""Seconds over which votes are brought together, and beyond which they do not reach."""
+"""Seconds beyond which votes do not count for each other."""
 
 ALLOWED = (3 * 0.2, 0.2)
-"""Metres a second by which a vote may be off, one that is faster and one that is slower."""
+"""Metres a second by which a vote may be off before it counts a quarter: one that is too fast, one that is too slow."""
 
-ADULT_HEIGHT = 1.7  # m: assumed if the skeleton's length unit is unknown
+REWEIGHTINGS = 10
+"""Rounds of reweighting: later ones change nothing that is seen."""
+
+TREMBLE = 0.015
+"""Seconds, the standard deviation of the window that removes the noise of recorded feet."""
+
+GENERATED_TREMBLE = 0.06
+"""The same for feet of models that output only joint angles, which tremble more."""
+
+ADULT_HEIGHT = 1.7
+"""Metres of a figure whose length unit is unknown: those of an adult."""
 
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """Up to the first bound a point surely stands, from the second it does not at all; equal bounds are a threshold.
-
-    heights: metres above the ground. speeds: metres a second over it. calm: seconds, the standard deviation of the
-    window that a speed is smoothed by.
-    """
+    """Up to the first bound a point surely stands, from the second it does not at all; equal bounds are a threshold."""
 
     heights: tuple[float, float] = (0.02, 0.05)
+    """Metres above the ground."""
+
     speeds: tuple[float, float] = (0.3, 0.9)
-    calm: float = 0.015
+    """Metres a second over the ground."""
+
+    calm: float = TREMBLE
+    """Seconds, the standard deviation of the window that a speed is smoothed by."""
 
 
 SOLES = ContactSettings()
 """For the points of soles."""
+
+TREMBLING = ContactSettings(speeds=(0.7, 3.0), calm=GENERATED_TREMBLE)
+"""For soles that tremble and slide, as of models that output only joint angles: contact is measured over a longer time,
+and may slide faster."""
 
 
 def contacts(heights: Array, speeds: Array | None, settings: ContactSettings) -> Array:
@@ -69,8 +85,8 @@ def contacts(heights: Array, speeds: Array | None, settings: ContactSettings) ->
 
 def standing(heights: Array, speeds: Array | None, settings: ContactSettings) -> NDArray[np.bool_]:
     """Which points surely stand, as in :func:`contacts`."""
-    found: NDArray[np.bool_] = contacts(heights, speeds, settings) == 1
-    return found
+    stands: NDArray[np.bool_] = contacts(heights, speeds, settings) == 1
+    return stands
 
 
 def contacts_of(points: Array, fps: float, settings: ContactSettings = SOLES) -> Array:
@@ -81,8 +97,8 @@ def contacts_of(points: Array, fps: float, settings: ContactSettings = SOLES) ->
 
 def ground_speeds(points: Array, fps: float) -> Array:
     """Speeds (..., T - 1, K) over the ground of points (..., T, K, 3), per frame."""
-    found: Array = np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps
-    return found
+    speeds: Array = np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps
+    return speeds
 
 
 def rise(values: Array, start: float, end: float) -> Array:
@@ -98,8 +114,9 @@ def smoothed(points: Array, calm: float, fps: float) -> Array:
         return points
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (calm * fps)) ** 2)
     padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
-    found: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(window / window.sum()))
-    return found
+    weights = window / window.sum()
+    smooth: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(weights))
+    return smooth
 
 
 def feet_of(skeleton: Skeleton) -> list[int]:
@@ -129,9 +146,9 @@ def ground_of(heights: Array) -> float:
 def lay_root_path(
     motion: Motion,
     feet: tuple[Sequence[str], Sequence[str]] | None = None,
-    tremble: float = 0.015,
+    tremble: float = TREMBLE,
 ) -> Motion:
-    """The motion with root channels tx, ty, tz in "length" units, found from the feet's contact with the ground.
+    """The motion with root channels tx, ty, tz in "length" units, derived from the feet's contact with the ground.
 
     The path begins at x = z = 0; y is such that the lowest joint of the feet touches the ground, y = 0, within
     millimetres, but in flight. A translation that the motion has already is replaced.
@@ -146,16 +163,25 @@ def lay_root_path(
     joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
     metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
     places = positions(motion)
-    points = (places[:, joints] - places[:, :1]) * metres
-    standing = -points[..., 1].min(axis=1)
-    # a jump up forward in time is a fall backward: only frames on which both agree are flight
-    flight = np.minimum(_with_flight(standing, motion.fps), _with_flight(standing[::-1], motion.fps)[::-1])
-    height = smoothed(flight[:, None, None], 0.015, motion.fps)[:, 0, 0]
-    plane = smoothed(points[..., [0, 2]], tremble, motion.fps)
+    points_from_root = (places[:, joints] - places[:, :1]) * metres
+
+    # the height of the root puts the lowest joint on the ground, but in jumps
+    height = _height_with_flight(-points_from_root[..., 1].min(axis=1), motion.fps)
+
+    # over the ground, the root moves against the feet that stand
+    plane = smoothed(points_from_root[..., [0, 2]], tremble, motion.fps)
     velocity = np.zeros((0, 2))
     if len(motion) > 1:
-        velocity = velocity_by_feet(plane, points[..., 1] + height[:, None], motion.fps)
+        velocity = velocity_by_feet(plane, points_from_root[..., 1] + height[:, None], motion.fps)
     return led_along(motion, velocity, height, metres)
+
+
+def _height_with_flight(standing: Array, fps: float) -> Array:
+    """Heights (T,) of the root in metres, smoothed, from those (T,) at which the feet are on the ground."""
+    # a jump up forward in time is a fall backward: only frames on which both agree are flight
+    forward = _with_flight(standing, fps)
+    backward = _with_flight(standing[::-1], fps)[::-1]
+    return smoothed(np.minimum(forward, backward)[:, None, None], TREMBLE, fps)[:, 0, 0]
 
 
 def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
@@ -169,11 +195,10 @@ def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> 
 
 def _with_flight(standing: Array, fps: float) -> Array:
     """Heights (T,) of the root in metres, from those at which the feet are on the ground, where it falls freely."""
-    # the upward velocity is measured over .05 s
     heights = standing.tolist()
     speed = 0.0
-    span = max(1, round(0.05 * fps))
-    gravity = 9.81
+    span = max(1, round(0.05 * fps))  # the upward velocity is measured over .05 s
+    gravity = 9.81  # m/s^2
     for t in range(1, len(heights)):
         falling = heights[t - 1] + speed / fps - 0.5 * gravity / fps**2
         if falling > heights[t]:
@@ -192,21 +217,31 @@ def velocity_by_feet(
 
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
     """
-    # a vote counts less the higher its point is
-    near = contacts((above[1:] + above[:-1]) / 2, None, ContactSettings(heights=(0.0, VOTING_HEIGHT)))
+    # each point votes for the velocity that keeps it in place; a vote counts less the higher its point is
     votes = -np.diff(points, axis=0) * fps
+    heights = (above[1:] + above[:-1]) / 2
+    nearness = contacts(heights, None, ContactSettings(heights=(0.0, VOTING_HEIGHT)))
+
+    # and votes count less for each other the farther apart in time they are
     reach = round(REACH * fps)
-    nearness = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (TOGETHER * fps))
-    weights = near
-    velocity = np.zeros(votes[:, 0].shape)
-    for attempt in range(11):
-        if attempt:
-            off = votes - velocity[:, None]
-            faster = (off * velocity[:, None]).sum(axis=-1) > 0
-            allowed = np.where(faster, *ALLOWED)
-            weights = near / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2
-        columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
-        total, x, z = (np.convolve(column, nearness)[reach : reach + len(votes)] for column in columns)
-        # without any vote within a second: the guess
-        velocity = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
+    window = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (TOGETHER * fps))
+
+    # the mean of all votes first, then means in which votes count less that disagree with the mean before
+    velocity = _mean_vote(votes, nearness, window, trust, guess)
+    for _ in range(REWEIGHTINGS):
+        off = votes - velocity[:, None]
+        is_faster = (off * velocity[:, None]).sum(axis=-1) > 0
+        allowed = np.where(is_faster, *ALLOWED)
+        weights = nearness / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2
+        velocity = _mean_vote(votes, weights, window, trust, guess)
     return velocity
+
+
+def _mean_vote(votes: Array, weights: Array, window: Array, trust: float, guess: Array | float) -> Array:
+    """The mean (T, 2) over points and a window in time of votes (T, K, 2) with weights (T, K); without any vote within
+    reach, the guess."""
+    reach = len(window) // 2
+    columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
+    total, x, z = (np.convolve(column, window)[reach : reach + len(votes)] for column in columns)
+    mean: Array = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
+    return mean

@@ -11,7 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from motet.errors import MotionError, TravelWarning, warn
-from motet.figures.feet.contacts import ADULT_HEIGHT, feet_of, has_feet, lay_root_path, smoothed, velocity_by_feet
+from motet.figures.feet.contacts import (
+    ADULT_HEIGHT,
+    TREMBLE,
+    feet_of,
+    has_feet,
+    lay_root_path,
+    smoothed,
+    velocity_by_feet,
+)
 from motet.figures.humanoid import HUMANOID, ground_under, is_mmm, leg_length, sole_points, to_humanoid, with_figure
 from motet.motion.kinematics import AXES, global_transforms, local_translations, positions, skeleton_of, with_channels
 from motet.motion.motion import Motion
@@ -23,30 +31,38 @@ IMPLIED = "the feet stride while the root stays: models take it with the path th
 
 @dataclass(frozen=True)
 class TreadmillSettings:
-    """What a clip in place is, in metres of the humanoid.
-
-    room: the root stays within it. share: of the way of the feet that the root goes itself, at most. speed: metres a
-    second that the feet go, at least. stride: the least standard deviation of how far one foot is ahead of the other.
-    hips: their least mean height over the feet; who lies or crawls has less. span: seconds over which velocities are
-    averaged, since feet that twist or shuffle go nowhere. calm: seconds, the deviation of the window that feet are
-    smoothed by. fps: faster clips are looked at in so many frames a second.
-    """
+    """What makes a clip one in place, on the humanoid."""
 
     room: float = 0.5
+    """Metres within which the root stays."""
+
     share: float = 0.25
+    """Largest share of the way of the feet that the root goes itself."""
+
     speed: float = 0.3
+    """Least mean speed of the feet, metres a second."""
+
     stride: float = 0.15
+    """Least standard deviation, in metres, of how far one foot is ahead of the other."""
+
     hips: float = 0.3
+    """Least mean height of the hips over the feet, in metres; a body that lies or crawls has less."""
+
     span: float = 1.0
-    calm: float = 0.015
+    """Seconds over which velocities are averaged, since feet that twist or shuffle go nowhere."""
+
+    calm: float = TREMBLE
+    """Seconds, the standard deviation of the window that feet are smoothed by."""
+
     fps: float = 30.0
+    """Frames a second at most: faster clips are examined at this rate."""
 
 
 STANDARD = TreadmillSettings()
 
 
 def travelling(motion: Motion) -> Motion:
-    """The motion, or if it is a clip in place the motion :func:`with_travel`, of which a TravelWarning tells."""
+    """The motion, or if it is a clip in place the motion :func:`with_travel` with a TravelWarning."""
     if not is_in_place(motion):
         return motion
     warn(IMPLIED, TravelWarning)
@@ -55,7 +71,7 @@ def travelling(motion: Motion) -> Motion:
 
 def is_in_place(motion: Motion, settings: TreadmillSettings = STANDARD) -> bool:
     """Whether the feet of a human figure stride while its root stays; False for a figure that is not human, and for a
-    motion that does not say where its root is."""
+    motion without a root translation."""
     skeleton = motion.skeleton
     if skeleton is None or not any(name.endswith(".tx") for name in motion.channels):
         return False
@@ -63,10 +79,10 @@ def is_in_place(motion: Motion, settings: TreadmillSettings = STANDARD) -> bool:
     try:
         if len(motion) < 3 or not _may_be(motion, skeleton, settings):
             return False
-        found = _on_humanoid(motion)[0]
+        on_humanoid = _on_humanoid(motion)[0]
     except MotionError:
         return False
-    return _stays(found, settings) and _strides(found, settings)
+    return _stays(on_humanoid, settings) and _strides(on_humanoid, settings)
 
 
 def with_travel(motion: Motion) -> Motion:
@@ -77,19 +93,20 @@ def with_travel(motion: Motion) -> Motion:
     is not human.
     """
     motion = with_figure(motion) if is_mmm(motion) else motion
-    found, to_file = _on_humanoid(motion)
-    was, laid = (local_translations(each)[:, 0] for each in (found, lay_root_path(found)))
-    path = (laid - was + was[:1]) * [1, 0, 1]
-    moved = local_translations(motion)[:, 0] + path @ to_file
+    on_humanoid, to_file = _on_humanoid(motion)
+    root = local_translations(on_humanoid)[:, 0]
+    laid_root = local_translations(lay_root_path(on_humanoid))[:, 0]
+    path = (laid_root - root + root[:1]) * [1, 0, 1]
+    root_in_file = local_translations(motion)[:, 0] + path @ to_file
     names = tuple(f"{skeleton_of(motion).names[0]}.t{axis}" for axis in AXES)
-    return with_channels(motion, names, moved, ("length",) * 3)
+    return with_channels(motion, names, root_in_file, ("length",) * 3)
 
 
 def _may_be(motion: Motion, skeleton: Skeleton, settings: TreadmillSettings) -> bool:
     """Whether a first look, before the figure is measured, leaves it open: most recordings end here."""
     unit = skeleton.height / ADULT_HEIGHT
-    moved = np.ptp(local_translations(motion), axis=0)
-    moving = moved[moved.max(axis=1) > 0]
+    extents = np.ptp(local_translations(motion), axis=0)
+    moving = extents[extents.max(axis=1) > 0]
     if len(moving) and np.hypot(*moving[0, [0, 2]]) > 1.5 * settings.room * unit:  # with y up
         return False
     if not has_feet(skeleton):
@@ -102,8 +119,8 @@ def _on_humanoid(motion: Motion) -> tuple[Motion, Array]:
     """The motion on the humanoid, and the matrix (3, 3) that brings its paths to the file's world, as path @ matrix."""
     if motion.skeleton == HUMANOID:
         return motion, np.eye(3)
-    found = to_humanoid(motion)
-    return found.motion, found.figure.turn * (found.figure.fitted.leg / leg_length())
+    humanoid = to_humanoid(motion)
+    return humanoid.motion, humanoid.figure.turn * (humanoid.figure.fitted.leg / leg_length())
 
 
 def _stays(motion: Motion, settings: TreadmillSettings) -> bool:
@@ -116,19 +133,37 @@ def _strides(motion: Motion, settings: TreadmillSettings) -> bool:
     """Whether the feet of the humanoid, which stands, stride further than its root goes."""
     points = sole_points(*global_transforms(motion))
     root = local_translations(motion)[:, 0]
-    slid = _averaged(_slid(motion, points, settings), settings.span * motion.fps)
-    went = _averaged(np.diff(root[:, [0, 2]], axis=0) * motion.fps, settings.span * motion.fps)
-    speeds = np.linalg.norm(slid, axis=1)
-    ahead = slid / np.maximum(speeds, 1e-9)[:, None]
-    feet = (points - root[:, None])[1:].reshape(-1, 2, len(points[0]) // 2, 3).mean(axis=2)[..., [0, 2]]
-    left, right = np.einsum("tfa,ta->ft", feet, ahead)
-    return bool(
-        speeds.mean() >= settings.speed
-        and np.linalg.norm(went, axis=1).sum() <= settings.share * speeds.sum()
-        and (left - right).std() >= settings.stride
-        and (left - left.mean()) @ (right - right.mean()) < 0
-        and root[:, 1].mean() - points[..., 1].mean() >= settings.hips
-    )
+
+    # the feet are fast, and the root goes less far than they do
+    span = settings.span * motion.fps
+    foot_velocity = _averaged(_slid(motion, points, settings), span)
+    foot_speed = np.linalg.norm(foot_velocity, axis=1)
+    root_velocity = _averaged(np.diff(root[:, [0, 2]], axis=0) * motion.fps, span)
+    if foot_speed.mean() < settings.speed:
+        return False
+    if np.linalg.norm(root_velocity, axis=1).sum() > settings.share * foot_speed.sum():
+        return False
+
+    # by turns one foot is ahead of the other, and the body stands
+    direction = foot_velocity / np.maximum(foot_speed, 1e-9)[:, None]
+    left, right = np.einsum("tfa,ta->ft", _feet_from_root(points, root), direction)
+    is_upright = root[:, 1].mean() - points[..., 1].mean() >= settings.hips
+    return bool(_swing_by_turns(left, right, settings) and is_upright)
+
+
+def _swing_by_turns(left: Array, right: Array, settings: TreadmillSettings) -> bool:
+    """Whether feet that are ``left`` and ``right`` (T,) metres ahead of the root stride widely, each while the other
+    goes back."""
+    is_wide = (left - right).std() >= settings.stride
+    is_opposite = (left - left.mean()) @ (right - right.mean()) < 0
+    return bool(is_wide and is_opposite)
+
+
+def _feet_from_root(points: Array, root: Array) -> Array:
+    """Where feet are over the ground (T - 1, 2, 2), seen from the root (T, 3), from the second frame on: the means of
+    points (T, P, 3) of both soles."""
+    by_foot = (points - root[:, None])[1:].reshape(-1, 2, len(points[0]) // 2, 3)
+    return np.asarray(by_foot.mean(axis=2)[..., [0, 2]])
 
 
 def _slid(motion: Motion, points: Array, settings: TreadmillSettings) -> Array:
@@ -138,7 +173,7 @@ def _slid(motion: Motion, points: Array, settings: TreadmillSettings) -> Array:
 
 
 def _averaged(velocity: Array, frames: float) -> Array:
-    """Velocities (T, 2), each the mean of so many frames around it, of fewer at the ends."""
+    """Velocities (T, 2), each the mean over a window of that many frames around it, cut off at the ends."""
     window = np.ones(max(1, min(round(frames), len(velocity))))
     count = np.convolve(np.ones(len(velocity)), window, "same")
     return np.stack([np.convolve(column, window, "same") / count for column in velocity.T], axis=1)

@@ -8,10 +8,11 @@ of the legs and laid so that the feet are on the ground.
 
 import logging
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,28 +63,31 @@ from motet.motion.skeleton import END_SUFFIX, Skeleton
 log = logging.getLogger(__name__)
 
 SURE_OF_JOINTS = 0.75
-"""Confidence from which on what was found needs no warning: less has a skeleton whose names do not even tell sides."""
+"""Least confidence without a warning: skeletons whose names do not even show sides have less."""
 
 HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A skeleton measured against the humanoid once, for any number of its motions.
-
-    first: one frame of it. turn: (3, 3) stands the world of its files upright. ground: how high the ground of its files
-    is in the humanoid's world, in metres; None where each motion's feet tell.
-    """
+    """A skeleton measured against the humanoid once, for any number of its motions."""
 
     fitted: Fitted
+    """The skeleton's joints, axes and leg length."""
+
     first: Motion
+    """One frame of a motion of the skeleton."""
+
     turn: Array
+    """The rotation (3, 3) that stands the world of its files upright."""
+
     ground: float | None = None
+    """The height of its files' ground in the humanoid's world, in metres; None where each motion's feet decide."""
 
     @staticmethod
     def of(like: Motion | Skeleton, joint_map: JointMap | None = None) -> "Figure":
-        """The figure of a skeleton, or of a motion where the rest pose is not a standing body, whose frames then tell
-        how its joints stand; MotionError, with the reason, where it is no human's."""
+        """The figure of a skeleton, or of a motion where the rest pose is not a standing body, whose frames then show
+        how its joints stand; MotionError, with the reason, where it is not human."""
         example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), 1.0, like)
         transforms = global_transforms(example)
         fitted = fit(skeleton_of(example), joint_map or map_of(example), *transforms)
@@ -96,27 +100,34 @@ class Figure:
 
     def _retargeted(self, rotations: Array, places: Array, fps: float) -> tuple[Motion, "Figure"]:
         """The humanoid's motion of rotations (T, J, 3, 3) in the world and positions (T, J, 3), laid on the ground, and
-        the figure that knows how high that is."""
+        the figure with the height of that ground."""
+        # the humanoid's bones turn in the world as the figure's do
         turned = product(self.turn, _humanoid_rotations(rotations, places, self.fitted))
+
+        # the middle between its hip joints takes the figure's path, scaled by the lengths of the legs
         legs = self.fitted.body.middle(places, "UpperLeg") @ self.turn.T * (leg_length() / self.fitted.leg)
-        found = places_of(HUMANOID, turned)
-        found += (legs - found[:, HIPS].mean(axis=1))[:, None]
-        ground = bones.ground_under(bones.sole_points(turned, found)) if self.ground is None else self.ground
-        root = found[:, 0] - (0.0, ground, 0.0)
+        joints = places_of(HUMANOID, turned)
+        joints += (legs - joints[:, HIPS].mean(axis=1))[:, None]
+
+        # the ground goes to y = 0
+        ground = bones.ground_under(bones.sole_points(turned, joints)) if self.ground is None else self.ground
+        root = joints[:, 0] - (0.0, ground, 0.0)
         return motion_of(HUMANOID, turned, {0: root}, fps), replace(self, ground=ground)
 
     @cached_property
     def posture(self) -> tuple[Skeleton, Array]:
         """The skeleton with its unit, where that is known, and local rotations (J, 3, 3) of joints that are no bones:
-        at rest, or as in the first frame, but for fingers, which bend as in a relaxed hand."""
+        at rest, or as in the first frame, except fingers, which bend as in a relaxed hand."""
         skeleton = skeleton_of(self.first)
         still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
         if self.fitted.up is None:  # measured in frames, not at rest
             still = local_rotations(self.first)[0]
             offsets = local_translations(self.first)[0].tolist()
             offsets[0] = skeleton.joints[0].offset
-            zipped = zip(skeleton.joints, offsets, strict=True)
-            skeleton = replace(skeleton, joints=tuple(replace(joint, offset=tuple(at)) for joint, at in zipped))
+            joints = []
+            for joint, offset in zip(skeleton.joints, offsets, strict=True):
+                joints.append(replace(joint, offset=tuple(offset)))
+            skeleton = replace(skeleton, joints=tuple(joints))
         if skeleton.metres_per_unit is None:
             skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, self.fitted.leg).metres)
         return skeleton, relaxed(skeleton, still, self.fitted.body.joints)
@@ -124,37 +135,43 @@ class Figure:
 
 @dataclass(frozen=True)
 class Humanoid:
-    """A motion on the humanoid, and what was found on the way.
-
-    motion: on :data:`motet.motion.HUMANOID`, at the file's frame rate, root translation in metres.
-    joints: bone -> the names of the joints that it was taken from.
-    convention: the convention of the joints' names, "by the tree", or the name of the user's map.
-    confidence: from 0 to 1, how sure it is that every joint was taken for what it is.
-    unit: metres of one unit of the file's lengths, as it says or as the legs tell; None where it is not known.
-    leg: metres of the figure's thigh and shin together, None where its unit is not known.
-    height: about how tall the figure stands, in metres, None where its unit is not known.
-    notes: sentences about what was assumed.
-    figure: the skeleton as it was measured.
-    """
+    """A motion on the humanoid, and the findings on the way there."""
 
     motion: Motion
+    """The motion on :data:`motet.motion.HUMANOID`, at the file's frame rate, root translation in metres."""
+
     joints: dict[str, tuple[str, ...]]
+    """For each bone the names of the joints that it was taken from."""
+
     convention: str
+    """The convention of the joints' names, "by the tree", or the name of the user's map."""
+
     confidence: float
+    """From 0 to 1, how certain the assignment of joints to bones is."""
+
     unit: float | None
+    """Metres of one unit of the file's lengths, as stated or as the legs suggest; None where it is not known."""
+
     leg: float | None
+    """Metres of the figure's thigh and shin together, None where its unit is not known."""
+
     height: float | None
+    """About how tall the figure stands, in metres, None where its unit is not known."""
+
     notes: tuple[str, ...]
+    """Sentences about the assumptions made."""
+
     figure: Figure
+    """The skeleton as it was measured."""
 
     @property
     def summary(self) -> str:
         """The findings in one line: convention, confidence and notes."""
-        found = "found by the tree" if self.convention == BY_THE_TREE else f"of {self.convention}"
-        return "; ".join((f"joints {found}, confidence {self.confidence:.2f}", *self.notes))
+        source = "found by the tree" if self.convention == BY_THE_TREE else f"of {self.convention}"
+        return "; ".join((f"joints {source}, confidence {self.confidence:.2f}", *self.notes))
 
     def logged(self) -> "Humanoid":
-        """The same, which is logged."""
+        """The same, after a line in the log: a warning where the joints are uncertain."""
         level = logging.INFO if self.confidence >= SURE_OF_JOINTS else logging.WARNING
         log.log(level, "brought to the humanoid: %s", self.summary)
         return self
@@ -163,35 +180,48 @@ class Humanoid:
 def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     """Retarget a motion of any human skeleton to the humanoid.
 
-    joint_map: which joint is which bone, as :func:`motet.motion.read_map` reads it; found where not given.
+    joint_map: which joint is which bone, as :func:`motet.motion.read_map` reads it; worked out where not given.
     The path is scaled by the ratio of the legs' lengths, and the soles' lowest points are laid on y = 0 at their 5th
     percentile. A file with z up, or whose frames alone have it, is turned upright. MotionError, with the reason, for a
-    figure that is no human's.
+    figure that is not human.
     """
     motion = with_figure(motion) if is_mmm(motion) else motion
     skeleton = skeleton_of(motion)
     if not len(motion):
         raise MotionError("this motion has no frames to put on the humanoid")
     joint_map = joint_map or map_of(motion)
+
+    # the figure is measured, and refused where its knees bend the wrong way about the thighs' axes
     rotations, places = global_transforms(motion)
     fitted = fit(skeleton, joint_map, rotations, places)
-    # knees bend about the axis of the thigh
-    thighs = {side: joint_map.joints[sided(side, "UpperLeg")] for side in LEFT_RIGHT}
-    hinges = {side: rotated(rotations[:, i], fitted.aligned[i][:, 0]) for side, i in thighs.items()}
-    check_frames(fitted.body, places, hinges)
-    unit, (turn, note) = unit_of(skeleton, fitted.leg), upright(fitted, places)
-    found, figure = Figure(fitted, motion[:1], turn)._retargeted(rotations, places, motion.fps)
-    notes = [text for text in (*fitted.notes, unit.note, note) if text]
-    if joint_map.joints["hips"]:
-        notes.append(f"the joint {skeleton.names[0]!r} above the hips is folded in")
-    confidence = round(joint_map.confidence * fitted.confidence, 2)
-    leg = height = None
-    if unit.metres is not None:
-        leg = fitted.leg * unit.metres
-        height = height_of(fitted) * unit.metres
-    joints = joint_map.names(skeleton)
-    convention = joint_map.convention
-    return Humanoid(found, joints, convention, confidence, unit.metres, leg, height, tuple(notes), figure)
+    check_frames(fitted.body, places, _knee_hinges(rotations, fitted))
+
+    length_unit = unit_of(skeleton, fitted.leg)
+    turn, turn_note = upright(fitted, places)
+    retargeted, figure = Figure(fitted, motion[:1], turn)._retargeted(rotations, places, motion.fps)
+    folded_note = f"the joint {skeleton.names[0]!r} above the hips is folded in" if joint_map.joints["hips"] else None
+    notes = (*fitted.notes, length_unit.note, turn_note, folded_note)
+    metres = length_unit.metres
+    return Humanoid(
+        motion=retargeted,
+        joints=joint_map.names(skeleton),
+        convention=joint_map.convention,
+        confidence=round(joint_map.confidence * fitted.confidence, 2),
+        unit=metres,
+        leg=None if metres is None else fitted.leg * metres,
+        height=None if metres is None else height_of(fitted) * metres,
+        notes=tuple(note for note in notes if note),
+        figure=figure,
+    )
+
+
+def _knee_hinges(rotations: Array, fitted: Fitted) -> dict[str, Array]:
+    """For each side the axis (T, 3) in the world about which the knee bends: that of the thigh to the left."""
+    hinges = {}
+    for side in LEFT_RIGHT:
+        thigh = fitted.joint_map.joints[sided(side, "UpperLeg")]
+        hinges[side] = rotated(rotations[:, thigh], fitted.aligned[thigh][:, 0])
+    return hinges
 
 
 def on_humanoid(motion: Motion) -> Motion:
@@ -214,18 +244,32 @@ def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Arra
     """Rotations in the world (T, J, 3, 3) of the humanoid's joints, from those (T, J, 3, 3) and the positions
     (T, J, 3) of the figure's."""
     joint_map = fitted.joint_map
-    own = product(rotations, fitted.aligned)
-    turned = {bone: own[:, joint] for bone, joint in joint_map.joints.items()}
+
+    # bones of limbs have the rotation of their joint, times the constant of its rest pose
+    aligned = product(rotations, fitted.aligned)
+    turned = {bone: aligned[:, joint] for bone, joint in joint_map.joints.items()}
     if not fitted.pelvis:
         to_legs = swing(turned["hips"][:, :, 0], fitted.body.to_left(places, "UpperLeg"))
         turned["hips"] = product(to_legs, turned["hips"])
-    spine, neck = ([own[:, joint] for joint in chain] for chain in (joint_map.spine, joint_map.neck))
-    neck += [turned["head"]] if "head" in turned else []
-    turned |= dict(zip(SPINE, _spread([turned["hips"], *spine], len(SPINE)), strict=True))
-    turned |= dict(zip(NECK, _spread([spine[-1], *neck], len(NECK)), strict=True)) if neck else {}
+
+    # back and neck share out the turns of as many joints as the figure has there
+    spine = [aligned[:, joint] for joint in joint_map.spine]
+    neck = [aligned[:, joint] for joint in joint_map.neck]
+    turned |= _shared(SPINE, [turned["hips"], *spine])
+    if "head" in turned:
+        neck.append(turned["head"])
+    if neck:
+        turned |= _shared(NECK, [spine[-1], *neck])
+
+    # bones that the figure lacks, and tips, go with their parents
     for bone, parent in PARENTS.items():
         turned.setdefault(bone, turned[parent])
     return side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], len(rotations))
+
+
+def _shared(bones_of_chain: Sequence[str], chain: list[Array]) -> dict[str, Array]:
+    """World rotations (T, 3, 3) of a chain of bones that share out those of a chain of joints, as :func:`_spread`."""
+    return dict(zip(bones_of_chain, _spread(chain, len(bones_of_chain)), strict=True))
 
 
 def _spread(chain: list[Array], count: int) -> list[Array]:
@@ -235,9 +279,10 @@ def _spread(chain: list[Array], count: int) -> list[Array]:
     chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
     """
     stacked = side_by_side(chain, len(chain[0]))
-    places = np.arange(1, count + 1) * (len(chain) - 1) / max(count, 1)
-    below = np.ceil(places).astype(int) - 1
-    part = places - below
+    # where the new joints are on the old chain: after which joint, and by which part of the way to the next
+    up_chain = np.arange(1, count + 1) * (len(chain) - 1) / max(count, 1)
+    below = np.ceil(up_chain).astype(int) - 1
+    part = up_chain - below
     shared: Array = stacked[:, below + 1]
     inner = np.flatnonzero(part < 1)
     if len(inner):
@@ -257,38 +302,50 @@ def from_humanoid(
 ) -> Motion:
     """Retarget a motion of the humanoid to another human skeleton, with its names, rest pose and proportions.
 
-    like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then tell how its
+    like: the skeleton; where its rest pose is not a standing body, a motion of it, whose frames then show how its
         joints stand; or it as it was measured already (:attr:`Humanoid.figure`).
-    joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest, but fingers bend as in a relaxed
-    hand. The path is scaled by the ratio of the legs' lengths and the feet stay on the ground. Returns the translation
-    of the hips in "length" and three angles in "deg" for each joint; the skeleton knows its unit where it did, of
-    whatever size it is, or where the legs' length tells it.
+    joint_map: as for :func:`to_humanoid`. Joints that are no bones keep their rest, except fingers, which bend as in a
+    relaxed hand. The path is scaled by the ratio of the legs' lengths and the feet stay on the ground. Returns the
+    translation of the hips in "length" and three angles in "deg" for each joint. The skeleton keeps its stated unit,
+    whatever its size, or gets the one that the legs' length suggests.
     skin: joint -> points (P, 3) of the figure's mesh, from the joint where every angle is 0. It stands on those of its
         feet, and hands and head stay above the ground (:mod:`motet.figures.humanoid.soles`).
-    ahead: the motion's z becomes the way that the figure faces at rest.
-    MotionError for a motion that is not the humanoid's, or a skeleton that is no human's.
+    ahead: the motion's z becomes the direction that the figure faces at rest.
+    MotionError for a motion that is not the humanoid's, or a skeleton that is not human.
     """
     if motion.skeleton != HUMANOID:
         raise MotionError("this motion is not on the humanoid: convert it with to_humanoid first")
     figure = like if isinstance(like, Figure) else Figure.of(like, joint_map)
-    fitted, (skeleton, still) = figure.fitted, figure.posture
-    source, places = global_transforms(motion)
-    x, _, z = fitted.aligned[fitted.body.joints["hips"]][:, 2]
-    if ahead and np.hypot(x, z) > 0.5:  # it faces neither up nor down
-        front = axis_to_rotmat("y", angle_of(x, z))
-        source = product(front, source)
-        places = rotated(front, places)
+    fitted = figure.fitted
+    skeleton, still = figure.posture
+    source, places = _facing_as_figure(motion, fitted) if ahead else global_transforms(motion)
+
+    # the figure's joints turn in the world as the humanoid's bones do, and the path is scaled by the legs' lengths
     turned = _figure_rotations(source, fitted, skeleton, still)
     scale = fitted.leg / leg_length()
-    path = places[:, HIPS].mean(axis=1) * scale - fitted.body.middle(places_of(skeleton, turned), "UpperLeg")
+    path = places[:, HIPS].mean(axis=1) * scale
+    path -= fitted.body.middle(places_of(skeleton, turned), "UpperLeg")
+
+    # the body is raised onto its soles, as those of its mesh are or as the humanoid's
     mesh = Mesh(fitted.body, skin or {})
     if mesh.has_soles() and len(motion):
-        turned, raised = on_own_soles(mesh, (source, places), turned, path, scale, motion.fps)
-        path[:, 1] += raised
+        turned, rise = on_own_soles(mesh, (source, places), turned, path, scale, motion.fps)
+        path[:, 1] += rise
     else:
         path[:, 1] += _rise_of_joints(fitted, (source, places), turned, path)
-    moved = _from_parent(fitted, skeleton, turned, path)
-    return motion_of(skeleton, turned, {fitted.joint_map.carrier(skeleton): moved}, motion.fps)
+    translations = {fitted.joint_map.carrier(skeleton): _from_parent(fitted, skeleton, turned, path)}
+    return motion_of(skeleton, turned, translations, motion.fps)
+
+
+def _facing_as_figure(motion: Motion, fitted: Fitted) -> tuple[Array, Array]:
+    """Rotations (T, J, 3, 3) and positions (T, J, 3) of a motion of the humanoid, turned so that its z becomes the
+    direction that a figure faces at rest."""
+    rotations, places = global_transforms(motion)
+    x, _, z = fitted.aligned[fitted.body.joints["hips"]][:, 2]
+    if np.hypot(x, z) <= 0.5:  # at rest it faces up or down
+        return rotations, places
+    front = axis_to_rotmat("y", angle_of(x, z))
+    return product(front, rotations), rotated(front, places)
 
 
 def _rise_of_joints(fitted: Fitted, source: tuple[Array, Array], turned: Array, path: Array) -> float:
@@ -317,69 +374,117 @@ def _from_parent(fitted: Fitted, skeleton: Skeleton, turned: Array, path: Array)
 def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: Array) -> Array:
     """Rotations in the world (T, J, 3, 3) of a figure's joints, from those of the humanoid's."""
     joint_map = fitted.joint_map
-    wanted = {joint: source[:, HUMANOID.index(bone)] for bone, joint in joint_map.joints.items()}
-    back, neck = (
-        [source[:, HUMANOID.index(bone)] for bone in chain] for chain in (("hips", *SPINE), (SPINE[-1], *NECK))
-    )
-    wanted |= dict(zip(joint_map.spine, _spread(back, len(joint_map.spine)), strict=True))
-    # the head is the last of the chain, whether the figure has a joint for it or not
-    shared = _spread(neck, len(joint_map.neck) + ("head" in joint_map.joints))
-    wanted |= dict(zip(joint_map.neck, shared, strict=False))
+    wanted = _bone_rotations(source, joint_map)
     wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
-    # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
-    hands = {joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT} - {None}
+
+    # joints that are bones turn as these, times the constant of their rest pose
     turned = frames_last((len(source), len(skeleton.joints), 3, 3))
     known = list(wanted)
     turned[:, known] = product(side_by_side(list(wanted.values()), len(source)), inverse(fitted.aligned[known]))
+
+    # all others keep their local rotation
+    hands = [joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT]
     for i, joint in enumerate(skeleton.joints):
         if i not in wanted:
             turned[:, i] = product(turned[:, joint.parent], still[i]) if i else still[0]
-            hand = next((k for k in skeleton.children[i] if k in hands), None)
+            # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
+            hand = next((child for child in skeleton.children[i] if child in hands), None)
             if hand is not None:
                 to_hand = product(inverse(turned[:, i]), turned[:, hand])
                 turned[:, i] = product(turned[:, i], twist(to_hand, skeleton.offsets[hand]))
     return turned
 
 
+def _bone_rotations(source: Array, joint_map: JointMap) -> dict[int, Array]:
+    """Joint -> rotations (T, 3, 3) of its bone, from those of the humanoid's joints (T, J, 3, 3): back and neck share
+    out the turns of the humanoid's among as many joints as the figure has there."""
+    wanted = {joint: source[:, HUMANOID.index(bone)] for bone, joint in joint_map.joints.items()}
+    back = [source[:, HUMANOID.index(bone)] for bone in ("hips", *SPINE)]
+    neck = [source[:, HUMANOID.index(bone)] for bone in (SPINE[-1], *NECK)]
+    wanted |= dict(zip(joint_map.spine, _spread(back, len(joint_map.spine)), strict=True))
+    # the head is the last of the chain, whether the figure has a joint for it or not
+    shared = _spread(neck, len(joint_map.neck) + ("head" in joint_map.joints))
+    wanted |= dict(zip(joint_map.neck, shared, strict=False))
+    return wanted
+
+
 FINGER_BENDS = (15.0, 25.0, 15.0)
-"""Degrees by which the bones of a finger of a hand at rest bend, each against the one before."""
+"""Degrees by which the bones of a finger of a hand at rest bend, each against the bone before."""
 
 FINGER_SHARES = {"thumb": 0.5, "index": 0.8, "mid": 1.0, "ring": 1.15, "pinky|little": 1.3}
-"""What the names of a finger's joints hold, and how far it is bent in a relaxed hand, times a finger's bend."""
+"""Pattern of the names of a finger's joints -> how far it bends in a relaxed hand, as a factor of FINGER_BENDS."""
 
 
 def relaxed(skeleton: Skeleton, still: Array, joints: Mapping[str, int]) -> Array:
-    """Local rotations (J, 3, 3) of a pose with its hands relaxed; those of hands without such fingers stay.
+    """Local rotations (J, 3, 3) of a pose with its hands relaxed; hands without such fingers do not change.
 
     joints: of the humanoid's bones; "leftHand" and "rightHand" count. Fingers bend a little, more from index to little
-    finger, in the plane of themselves and the palm's normal, the thumb towards the other fingers, too; the side of the
-    palm is told by where the knuckles of index and other fingers lie. What is bent at rest already counts.
+    finger, in the plane of themselves and the palm's normal, the thumb towards the other fingers, too. The knuckles of
+    index and other fingers show on which side the palm is. Bends at rest count.
     """
-    turns, places = chained(skeleton, still[None].copy(), skeleton.offsets[None].copy())
+    rotations, places = chained(skeleton, still[None].copy(), skeleton.offsets[None].copy())
     bent = still.copy()
     for side, sign in zip(LEFT_RIGHT, (-1.0, 1.0), strict=True):
         hand = joints.get(sided(side, "Hand"))
-        fingers = {} if hand is None else _fingers(skeleton, hand)
-        knuckles = {finger: places[0, chain[0]] for finger, chain in fingers.items() if finger != "thumb"}
-        if hand is None or "index" not in knuckles or len(knuckles) < 2:
+        if hand is None:
             continue
-        along = unit(np.mean(list(knuckles.values()), axis=0) - places[0, hand])
-        across = unit(knuckles[list(knuckles)[-1]] - knuckles["index"])
-        palm = unit(sign * np.cross(along, across))
+        fingers = _fingers(skeleton, hand)
+        directions = _hand_directions(fingers, places[0], hand, sign)
+        if directions is None:
+            continue
         for finger, chain in fingers.items():
-            pointing = [unit(places[0, after] - places[0, joint]) for joint, after in pairwise(chain)]
-            # the last joint, where it has no tip, points where the one before it does
-            pointing = [*pointing, *pointing[-1:]] or [np.zeros(3)]
-            thumb = finger == "thumb"
-            start = pointing[0] if thumb else along
-            axis = np.cross(start, palm + across if thumb else palm)
-            # each bone bends against the one before, about the part of the axis that is across it
-            for joint, before, bone, bend in zip(chain, [start, *pointing], pointing, FINGER_BENDS, strict=False):
-                aside = unit(axis - (axis @ bone) * bone)
-                now = np.arctan2(np.cross(before, bone) @ aside, before @ bone - (before @ aside) * (bone @ aside))
-                turn = max(0.0, np.radians(bend) * FINGER_SHARES[finger] - float(now)) * aside
-                bent[joint] = bent[joint] @ rotvec_to_rotmat(turns[0, joint].T @ turn)
+            start = None if finger == "thumb" else directions.along
+            inwards = directions.palm + directions.across if finger == "thumb" else directions.palm
+            for joint, turn in _finger_turns(places[0], chain, start, inwards, FINGER_SHARES[finger]):
+                bent[joint] = bent[joint] @ rotvec_to_rotmat(rotations[0, joint].T @ turn)
     return bent
+
+
+class HandDirections(NamedTuple):
+    """Directions (3,) of a hand in the world."""
+
+    along: Array
+    """From the wrist to the knuckles."""
+
+    across: Array
+    """From the index to the little finger."""
+
+    palm: Array
+    """Out of the palm."""
+
+
+def _hand_directions(fingers: Mapping[str, list[int]], places: Array, hand: int, sign: float) -> HandDirections | None:
+    """Directions of a hand with fingers, from positions (J, 3) of all joints; None where the index finger or all others
+    are missing. sign: 1 for the right hand, -1 for the left."""
+    knuckles = {finger: places[chain[0]] for finger, chain in fingers.items() if finger != "thumb"}
+    if "index" not in knuckles or len(knuckles) < 2:
+        return None
+    along = unit(np.mean(list(knuckles.values()), axis=0) - places[hand])
+    across = unit(knuckles[list(knuckles)[-1]] - knuckles["index"])
+    return HandDirections(along, across, unit(sign * np.cross(along, across)))
+
+
+def _finger_turns(
+    places: Array, chain: list[int], start: Array | None, inwards: Array, share: float
+) -> Iterator[tuple[int, Array]]:
+    """The joints of a finger and the rotation vectors (3,) in the world by which they bend further.
+
+    places: positions (J, 3) of all joints. start: the direction (3,) against which the first bone bends, None for its
+    own. inwards: the direction (3,) that the finger bends to. share: of the bends of a middle finger.
+    """
+    pointing = [unit(places[after] - places[joint]) for joint, after in pairwise(chain)]
+    # the last joint, where it has no tip, points where the joint before it does
+    pointing = [*pointing, *pointing[-1:]] or [np.zeros(3)]
+    before = pointing[0] if start is None else start
+    axis = np.cross(before, inwards)
+    for joint, bone, bend in zip(chain, pointing, FINGER_BENDS, strict=False):
+        # each bone bends against the bone before, about the part of the axis that is across it
+        aside = unit(axis - (axis @ bone) * bone)
+        sine = np.cross(before, bone) @ aside
+        cosine = before @ bone - (before @ aside) * (bone @ aside)
+        present = float(np.arctan2(sine, cosine))
+        yield joint, max(0.0, np.radians(bend) * share - present) * aside
+        before = bone
 
 
 def _fingers(skeleton: Skeleton, hand: int) -> dict[str, list[int]]:
