@@ -1,14 +1,14 @@
 """How a skeleton's joints stand against the humanoid: from a pose that is a standing body, or from frames.
 
-For every joint that is a bone a constant rotation A is found, so that the bone's rotation on the humanoid is G A with G
+Every joint that is a bone gets a constant rotation A, so that the bone's rotation on the humanoid is G A with G
 the joint's rotation in the world. Where the rest pose of a skeleton is a body that stands (T, A, arms down; facing
 anywhere), A turns the humanoid's T-pose into it: trunk and shoulders as a whole, the bones of limbs by the shortest
 turn to where they point, each carried along by the one before it, so that no twist is added; feet by their heading
 alone, as soles are flat in a rest pose whatever the slope of the line from ankle to toes.
 
-Many files rest with all bones in one line instead, each along an axis of its own joint. What bodies do then tells: legs
+Many files rest with all bones in one line instead, each along an axis of its own joint. Frames then show it: legs
 and arms hang at the sides of the trunk, knees and elbows are hinges. All is averaged in the frame of each joint over
-all frames; what comes near axes is taken to be just these, so that every take of a skeleton gets the same alignment.
+all frames; results near axes are taken to be exactly these, so that every take of a skeleton gets the same alignment.
 """
 
 from itertools import permutations
@@ -19,21 +19,29 @@ from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
 from motet.figures.humanoid.joint_map import LIMB_BONES, Body, humanoid_direction
 from motet.motion.rotations import Array, frames_last, product, rotvec_to_rotmat, swing, unit
 
-AXES_TURNS = np.array(
-    [
-        np.stack([x, y, np.cross(x, y)], axis=1)
-        for x, y in permutations(np.kron(np.eye(3), [[1.0], [-1.0]]), 2)
-        if not np.dot(x, y)
-    ]
-)
+
+def _axes_turns() -> Array:
+    """The rotations (24, 3, 3) that turn coordinate axes into coordinate axes."""
+    directions = np.kron(np.eye(3), [[1.0], [-1.0]])
+    turns = []
+    for x, y in permutations(directions, 2):
+        if not np.dot(x, y):
+            turns.append(np.stack([x, y, np.cross(x, y)], axis=1))
+    return np.array(turns)
+
+
+AXES_TURNS = _axes_turns()
 """The rotations (24, 3, 3) that turn coordinate axes into coordinate axes."""
 
 
 def frame(left: Array, up: Array, upright: bool = True) -> Array:
-    """Rotations (..., 3, 3) whose columns are left, up and forward: up as given, or left, the other square to it."""
-    given, other = (unit(up), left) if upright else (unit(left), up)
-    other = unit(other - np.sum(other * given, axis=-1, keepdims=True) * given)
-    left, up = (other, given) if upright else (given, other)
+    """Rotations (..., 3, 3) whose columns are left, up and forward: up as passed, or left, the other square to it."""
+    if upright:
+        up = unit(up)
+        left = _square_to(left, up)
+    else:
+        left = unit(left)
+        up = _square_to(up, left)
     rotations = frames_last((*up.shape, 3))
     rotations[..., 0] = left
     rotations[..., 1] = up
@@ -41,71 +49,93 @@ def frame(left: Array, up: Array, upright: bool = True) -> Array:
     return rotations
 
 
+def _square_to(vectors: Array, axis: Array) -> Array:
+    """The directions (..., 3) of vectors' parts at right angles to unit vectors (..., 3)."""
+    return unit(vectors - np.sum(vectors * axis, axis=-1, keepdims=True) * axis)
+
+
 def body_frame(pose: Array, body: Body, exact: bool = False) -> Array | None:
     """Left, up and forward (3, 3) of a pose (J, 3) that is a standing body, else None.
 
     A body stands where both legs point one way and the trunk the other, feet forward, and left is left. Axes near
-    those of the coordinates, as they are in every rest pose that somebody made, are taken to be just these.
+    those of the coordinates, as they are in every rest pose that somebody made, are taken to be exactly these.
     """
     across = body.to_left(pose, "UpperLeg")
     up = body.legs_up(pose)
     if not np.linalg.norm(across) or abs(float(np.dot(unit(across), up))) > 0.9:
         return None
-    own = frame(across, up)
-    own = own if exact else _near_axes(own, 15)
-    legs = [own.T @ body.direction(pose, sided(side, part)) for side in LEFT_RIGHT for part in LEG[:2]]
-    feet = [own.T @ body.direction(pose, foot) for side in LEFT_RIGHT if body.aims[foot := sided(side, "Foot")]]
-    arms = [float((own.T @ body.to_left(pose, part))[0]) for part in ("UpperArm", "LowerArm")]
-    stands = all(leg[1] < -0.75 for leg in legs) and float(body.trunk_up(pose) @ own[:, 1]) > 0.85
-    return own if stands and all(foot[2] > 0.2 for foot in feet) and min(arms) > 0 else None
+    axes = frame(across, up)
+    if not exact:
+        axes = _near_axes(axes, 15)
+    return axes if _stands(pose, body, axes) else None
+
+
+def _stands(pose: Array, body: Body, axes: Array) -> bool:
+    """Whether a pose (J, 3) stands, seen from axes (3, 3) left, up and forward: legs down, trunk up, feet forward, and
+    the left arm on the left."""
+    for side in LEFT_RIGHT:
+        for part in LEG[:2]:
+            if not (axes.T @ body.direction(pose, sided(side, part)))[1] < -0.75:
+                return False
+        foot = sided(side, "Foot")
+        if body.aims[foot] and not (axes.T @ body.direction(pose, foot))[2] > 0.2:
+            return False
+    if not float(body.trunk_up(pose) @ axes[:, 1]) > 0.85:
+        return False
+    return all(float((axes.T @ body.to_left(pose, part))[0]) > 0 for part in ("UpperArm", "LowerArm"))
 
 
 def rests_in_motion(body: Body) -> bool:
     """Whether the rest pose is one out of a motion: limbs of left and right differ, and are not along axes."""
     rest = body.skeleton.rest_positions
-    own = frame(body.to_left(rest, "UpperLeg"), body.trunk_up(rest))
+    axes = frame(body.to_left(rest, "UpperLeg"), body.trunk_up(rest))
     parts = [part for part in (*LEG[:2], *ARM[1:3]) if body.aims[sided("left", part)]]
-    left, right = (np.array([body.direction(rest, sided(side, part)) for part in parts]) for side in LEFT_RIGHT)
-    alike = np.sum((left @ own) * (right @ own) * [-1.0, 1.0, 1.0], axis=-1)
+    left = np.array([body.direction(rest, sided("left", part)) for part in parts])
+    right = np.array([body.direction(rest, sided("right", part)) for part in parts])
+    mirrored_cosine = np.sum((left @ axes) * (right @ axes) * [-1.0, 1.0, 1.0], axis=-1)
     along = np.abs([left, right]).max(axis=-1)
     # limbs that rest mirror each other within 6 degrees; bones within 18 of axes are in line as nobody has posed them
-    return bool(alike.min() < np.cos(np.radians(6)) and along.min() < np.cos(np.radians(18)))
+    return bool(mirrored_cosine.min() < np.cos(np.radians(6)) and along.min() < np.cos(np.radians(18)))
 
 
 def _near_axes(rotation: Array, degrees: float) -> Array:
-    """The nearest of :data:`AXES_TURNS` to a rotation (3, 3) if it is within some degrees of it, else the rotation."""
+    """The nearest of :data:`AXES_TURNS` to a rotation (3, 3) if it is within ``degrees`` of it, else the rotation."""
     nearest: Array = AXES_TURNS[int(np.argmax(np.sum(AXES_TURNS * rotation, axis=(1, 2))))]
-    apart = np.arccos(np.clip((np.sum(rotation * nearest) - 1) / 2, -1, 1))
-    return nearest if np.degrees(apart) < degrees else rotation
+    angle = np.arccos(np.clip((np.sum(rotation * nearest) - 1) / 2, -1, 1))
+    return nearest if np.degrees(angle) < degrees else rotation
 
 
-def alignments_of_pose(body: Body, rotations: Array, pose: Array, own: Array) -> Array:
+def alignments_of_pose(body: Body, rotations: Array, pose: Array, axes: Array) -> Array:
     """A (J, 3, 3) for all joints that are bones, the identity for others, from a pose that is a standing body.
 
-    rotations: (J, 3, 3) and pose: positions (J, 3) of the joints in that pose; own: its frame.
+    rotations: (J, 3, 3) and pose: positions (J, 3) of the joints in that pose; axes: its left, up and forward (3, 3).
     """
+    # how the humanoid's bones are turned in that pose: known of the convention, or as the limbs point
     joint_map = body.joint_map
-    carrier = body.joint_map.carrier(body.skeleton)
     if joint_map.rest is None:
-        turns = _found_turns(body, pose, own)
+        turns = _turns_of_pose(body, pose, axes)
     else:
-        known = joint_map.rest
-        bones = (*joint_map.joints, "spine", "neck")
-        turns = {bone: own @ rotvec_to_rotmat(np.radians(known.get(bone, (0.0, 0.0, 0.0)))) for bone in bones}
-    wanted = {joint: turns[bone] for bone, joint in joint_map.joints.items()} | {carrier: turns["hips"]}
-    wanted |= {joint: turns.get("spine", own) for joint in joint_map.spine}
-    wanted |= {joint: turns.get("neck", own) for joint in joint_map.neck}
+        turns = {}
+        for bone in (*joint_map.joints, "spine", "neck"):
+            known = joint_map.rest.get(bone, (0.0, 0.0, 0.0))
+            turns[bone] = axes @ rotvec_to_rotmat(np.radians(known))
+
+    # A is what is left between a joint's rotation and its bone's
+    wanted = {joint: turns[bone] for bone, joint in joint_map.joints.items()}
+    wanted[joint_map.carrier(body.skeleton)] = turns["hips"]
+    wanted |= dict.fromkeys(joint_map.spine, turns.get("spine", axes))
+    wanted |= dict.fromkeys(joint_map.neck, turns.get("neck", axes))
     aligned = np.tile(np.eye(3), (len(pose), 1, 1))
     for joint, turn in wanted.items():
         aligned[joint] = rotations[joint].T @ turn
     return aligned
 
 
-def _found_turns(body: Body, pose: Array, own: Array) -> dict[str, Array]:
+def _turns_of_pose(body: Body, pose: Array, axes: Array) -> dict[str, Array]:
     """Rotations (3, 3) of the humanoid's bones that make its limbs point where those of the pose do."""
-    turns = dict.fromkeys(("hips", "head", *(sided(side, "Shoulder") for side in LEFT_RIGHT)), own)
+    turns = dict.fromkeys(("hips", "head", *(sided(side, "Shoulder") for side in LEFT_RIGHT)), axes)
     for limb in LIMB_BONES:
-        carried = own  # the rotation of the bone before
+        carried = axes  # the rotation of the bone before
         for bone in limb:
             if bone not in body.joints:
                 continue
@@ -113,7 +143,7 @@ def _found_turns(body: Body, pose: Array, own: Array) -> dict[str, Array]:
                 target = body.direction(pose, bone)
                 start = carried @ humanoid_direction(bone)
                 if bone.endswith("Foot"):
-                    carried = _foot_turn(target, own, carried)
+                    carried = _foot_turn(target, axes, carried)
                 elif not bone.endswith("Hand") or float(start @ target) > 0.8:
                     carried = swing(start, target) @ carried
             turns[bone] = carried
@@ -134,21 +164,27 @@ def _foot_turn(target: Array, body: Array, leg: Array) -> Array:
 
 
 def axes_agree(body: Body, rotations: Array, positions: Array) -> bool:
-    """Whether the axes that a convention says fit a skeleton: bones of limbs point along them, and left is left.
+    """Whether a skeleton has the axes that its convention states: bones of limbs point along them, and left is left.
 
     Other skeletons can have the same names. rotations (T, J, 3, 3) and positions (T, J, 3) are those of frames.
     """
     joint_map = body.joint_map
-    bones = [bone for bone, ends in body.aims.items() if ends]
-    # joint -> where the humanoid's bone points, and where the joint's does
-    seen = {body.joints[bone]: (humanoid_direction(bone), body.along(positions, bone)) for bone in bones}
-    for joint, part in ((body.joints["hips"], "UpperLeg"), (joint_map.spine[-1], "UpperArm")):
-        seen[joint] = np.array([1.0, 0.0, 0.0]), body.to_left(positions, part)
-    known = [joint for joint in seen if joint in joint_map.axes]
-    return bool(known) and all(
-        _mean_direction(rotations[:, joint], seen[joint][1]) @ _known_axes(joint_map.axes[joint]) @ seen[joint][0] > 0.7
-        for joint in known
-    )
+    # for each joint a direction of the humanoid's bone, and the same of the figure's in all frames
+    directions: dict[int, tuple[Array, Array]] = {}
+    for bone, ends in body.aims.items():
+        if ends:
+            directions[body.joints[bone]] = (humanoid_direction(bone), body.along(positions, bone))
+    to_left = np.array([1.0, 0.0, 0.0])
+    directions[body.joints["hips"]] = (to_left, body.to_left(positions, "UpperLeg"))
+    directions[joint_map.spine[-1]] = (to_left, body.to_left(positions, "UpperArm"))
+
+    known = [joint for joint in directions if joint in joint_map.axes]
+    for joint in known:
+        of_humanoid, in_frames = directions[joint]
+        in_joint = _mean_direction(rotations[:, joint], in_frames)
+        if not in_joint @ _known_axes(joint_map.axes[joint]) @ of_humanoid > 0.7:
+            return False
+    return bool(known)
 
 
 def _mean_direction(rotations: Array, along: Array) -> Array:
@@ -158,8 +194,8 @@ def _mean_direction(rotations: Array, along: Array) -> Array:
 
 def _known_axes(axes: str) -> Array:
     """The rotation (3, 3) with columns such as "-z x -y": the joint's axes that are left, up and forward."""
-    words = axes.split()
-    return np.stack([np.eye(3)["xyz".index(word[-1])] * (-1 if word[0] == "-" else 1) for word in words], axis=1)
+    columns = [np.eye(3)["xyz".index(word[-1])] * (-1 if word[0] == "-" else 1) for word in axes.split()]
+    return np.stack(columns, axis=1)
 
 
 class Calibration:
@@ -178,25 +214,33 @@ class Calibration:
         self.positions = positions
         self.along_axes = along_axes
         self.aligned = np.tile(np.eye(3), (rotations.shape[1], 1, 1))
+        # each stage builds on the joints settled before: trunk, then legs from the hips, and arms from the chest
         self._trunk()
         for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
             self._leg([sided(side, part) for part in LEG])
             self._arm([sided(side, part) for part in ARM], sign)
 
     def _turns(self, joint: int) -> Array:
-        """Rotations (T, 3, 3) of the humanoid's bone for a joint whose A is found."""
+        """Rotations (T, 3, 3) of the humanoid's bone for a joint whose A is settled."""
         return product(self.rotations[:, joint], self.aligned[joint])
 
+    def _direction(self, bone: str) -> Array:
+        """Directions (T, 3) in which a bone points."""
+        return self.body.direction(self.positions, bone)
+
     def _settle(self, joint: int, turns: Array) -> None:
-        """A of a joint from estimates (T, 3, 3) of its bone's rotation: what the convention says, or near the axes."""
+        """Set A of a joint from estimates (T, 3, 3) of its bone's rotation: as its convention states, or near axes."""
         known = self.body.joint_map.axes.get(joint)
+        if known:
+            self.aligned[joint] = _known_axes(known)
+            return
         # the rotation nearest to all from the joint's to its bone's
         u, _, v = np.linalg.svd(np.einsum("tji,tjk->ik", self.rotations[:, joint], turns))
         mean: Array = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
-        self.aligned[joint] = _known_axes(known) if known else _near_axes(mean, 30) if self.along_axes else mean
+        self.aligned[joint] = _near_axes(mean, 30) if self.along_axes else mean
 
     def _settle_limb(self, bone: str, along: Array, turns: Array) -> None:
-        """The same for a bone of a limb, which then also points where it really does, along (T, 3)."""
+        """The same for a bone of a limb, which then also points along its real direction (T, 3)."""
         joint = self.body.joints[bone]
         self._settle(joint, turns)
         local = _mean_direction(self.rotations[:, joint], along)
@@ -208,56 +252,70 @@ class Calibration:
     def _trunk(self) -> None:
         """Hips and back: up towards the arms, the joint that carries the arms and those above: up towards the head."""
         body = self.body
-        positions = self.positions
-        spine = self.body.joint_map.spine
-        legs, arms = (unit(body.to_left(positions, part)) for part in ("UpperLeg", "UpperArm"))
-        above = [*body.joint_map.neck, *([body.joints["head"]] if "head" in body.joints else [])]
-        back = [body.joints["hips"], *spine, *above]
+        spine = body.joint_map.spine
+        back = [body.joints["hips"], *spine, *body.joint_map.neck]
+        if "head" in body.joints:
+            back.append(body.joints["head"])
         chest = len(spine)
-        shoulders = body.middle(positions, "UpperArm")
+        legs_left = unit(body.to_left(self.positions, "UpperLeg"))
+        arms_left = unit(body.to_left(self.positions, "UpperArm"))
         for i, joint in enumerate(back):
-            left = legs * (1 - i / chest) + arms * (i / chest) if i < chest else arms
-            start = body.middle(positions, "UpperLeg") if i == 0 else positions[:, joint]
-            end = shoulders if i < chest else positions[:, back[-1]]
-            if i == len(back) - 1:
-                start = positions[:, back[max(i - 1, chest - 1)]]
-                end = positions[:, joint]
-            self._settle(joint, frame(left, end - start))
+            # left goes over from that of the legs to that of the arms
+            left = legs_left * (1 - i / chest) + arms_left * (i / chest) if i < chest else arms_left
+            self._settle(joint, frame(left, self._up(i, back, chest)))
+
+    def _up(self, i: int, back: list[int], chest: int) -> Array:
+        """Vectors (T, 3) up from the i-th joint of the back; from the joint below to the last."""
+        positions = self.positions
+        if i == len(back) - 1:
+            return np.asarray(positions[:, back[i]] - positions[:, back[max(i - 1, chest - 1)]])
+        start = self.body.middle(positions, "UpperLeg") if i == 0 else positions[:, back[i]]
+        end = self.body.middle(positions, "UpperArm") if i < chest else positions[:, back[-1]]
+        return np.asarray(end - start)
 
     def _leg(self, bones: list[str]) -> None:
         """Knees are hinges that bend backwards; feet and toes have the hinge's axis."""
         joints = self.body.joints
-        thigh, shin = (self.body.direction(self.positions, bone) for bone in bones[:2])
+        thigh = self._direction(bones[0])
+        shin = self._direction(bones[1])
         hinge = np.cross(thigh, shin) + self.HINGE * self._turns(joints["hips"])[:, :, 0]
         self._settle_limb(bones[0], thigh, frame(hinge, -thigh))
         self._settle_limb(bones[1], shin, frame(hinge, -shin))
-        shins = self._turns(joints[bones[1]])
-        for bone in (bone for bone in bones[2:] if bone in joints):
-            if not self.body.aims[bone]:
-                self._settle(joints[bone], shins)
-                continue
-            along = self.body.direction(self.positions, bone)
-            level = frame(shins[:, :, 0], np.cross(along, shins[:, :, 0]))
-            slope = swing(np.array([0.0, 0.0, 1.0]), humanoid_direction(bone))
-            self._settle_limb(bone, along, level @ slope.T)
+
+        # feet and toes slope against the level as the humanoid's do
+        shin_turns = self._turns(joints[bones[1]])
+        to_left = shin_turns[:, :, 0]
+        for bone in bones[2:]:
+            if bone in joints and not self.body.aims[bone]:
+                self._settle(joints[bone], shin_turns)
+            elif bone in joints:
+                along = self._direction(bone)
+                level = frame(to_left, np.cross(along, to_left))
+                slope = swing(np.array([0.0, 0.0, 1.0]), humanoid_direction(bone))
+                self._settle_limb(bone, along, level @ slope.T)
 
     def _arm(self, bones: list[str], sign: float) -> None:
         """Elbows are hinges that bend forwards with the arms out to the sides; hands are in line with the forearms."""
         joints = self.body.joints
-        body = self.body
-        chest = self._turns(self.body.joint_map.spine[-1])
-        if bones[0] in joints:
-            self._settle(joints[bones[0]], chest)
-        upper = body.direction(self.positions, bones[1])
-        lower = body.direction(self.positions, bones[2]) if body.aims[bones[2]] else upper
-        plain = swing(chest @ humanoid_direction(bones[1]), upper) @ chest
-        up = -sign * np.cross(upper, lower) + self.HINGE * plain[:, :, 1]
-        self._settle_limb(bones[1], upper, frame(sign * upper, up, upright=False))
-        self._settle_limb(bones[2], lower, frame(sign * lower, up, upright=False))
-        if bones[3] in joints:
-            forearm = self._turns(joints[bones[2]])
-            if body.aims[bones[3]]:
-                along = body.direction(self.positions, bones[3])
-                self._settle_limb(bones[3], along, frame(sign * along, forearm[:, :, 1], upright=False))
-            else:
-                self._settle(joints[bones[3]], forearm)
+        shoulder, upper_arm, forearm, hand = bones
+        chest_turns = self._turns(self.body.joint_map.spine[-1])
+        if shoulder in joints:
+            self._settle(joints[shoulder], chest_turns)
+
+        # up is the hinge's axis, and where the arm is straight that of the shortest turn from the chest
+        upper = self._direction(upper_arm)
+        lower = self._direction(forearm) if self.body.aims[forearm] else upper
+        shortest = swing(chest_turns @ humanoid_direction(upper_arm), upper) @ chest_turns
+        up = -sign * np.cross(upper, lower) + self.HINGE * shortest[:, :, 1]
+        self._settle_limb(upper_arm, upper, frame(sign * upper, up, upright=False))
+        self._settle_limb(forearm, lower, frame(sign * lower, up, upright=False))
+        if hand in joints:
+            self._hand(hand, self._turns(joints[forearm]), sign)
+
+    def _hand(self, hand: str, forearm_turns: Array, sign: float) -> None:
+        """A hand without fingers turns with the forearm (T, 3, 3); another points along its fingers."""
+        if not self.body.aims[hand]:
+            self._settle(self.body.joints[hand], forearm_turns)
+            return
+        along = self._direction(hand)
+        self._settle_limb(hand, along, frame(sign * along, forearm_turns[:, :, 1], upright=False))

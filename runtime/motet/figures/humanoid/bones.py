@@ -2,12 +2,12 @@
 
 The humanoid's bones have the names of the VRM 1.0 humanoid. At rest (every angle 0) it stands in a T-pose: y up, facing
 +z, the left at +x, palms down, soles at y = 0 where the root is at its offset; lengths are metres. Every joint's frame
-is that of the world at rest, so a joint's rotation says the same on every figure.
+is that of the world at rest, so a rotation of a joint means the same on every figure.
 
 Proportions: an adult of 1.70 m. Heights of knee, hip, shoulder and chin are the fractions of stature of Drillis and
 Contini (1966), as in Winter, "Biomechanics and Motor Control of Human Movement", figure 4.1, rounded to centimetres;
 the joint of the upper arm lies inside the shoulder's width, the ankle at the height of the joint's centre. The figures
-are in humanoid.json, for readers in other languages, too: of the trunk, and of the left side, which the right mirrors,
+are in humanoid.json for readers in other languages: of the trunk, and of the left side, which the right mirrors,
 each joint's parent, offset and Euler order.
 """
 
@@ -15,6 +15,7 @@ import json
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -51,10 +52,11 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
         for part, (parent, (x, y, z), order) in left.items():
             places[side + part] = (side + parent if parent in left else parent, (sign * x, y, z), order)
     names = list(places)
-    return tuple(
-        Joint(name, names.index(parent) if parent else -1, (scale * x, scale * y, scale * z), order)
-        for name, (parent, (x, y, z), order) in places.items()
-    )
+    joints = []
+    for name, (parent, (x, y, z), order) in places.items():
+        index = names.index(parent) if parent else -1
+        joints.append(Joint(name, index, (scale * x, scale * y, scale * z), order))
+    return tuple(joints)
 
 
 _TABLES = json.loads((files("motet.figures.humanoid") / "humanoid.json").read_text("utf-8"))
@@ -128,7 +130,7 @@ MMM_SKELETON = Skeleton(
             "W_end": ("W", (0.0, -0.108, 0.0), "xyz"),
         },
         ("L", "R"),
-        scale=1.7,  # metres of the body, which the angles do not tell
+        scale=1.7,  # metres: the height of the body, which the file does not state
     ),
     metres_per_unit=1.0,
 )
@@ -162,6 +164,7 @@ def with_figure(motion: Motion) -> Motion:
 
 
 RIGS = ("mixamo", "rigify", "unity", "unreal")
+"""Names of well-known rigs."""
 
 
 @cache
@@ -170,41 +173,81 @@ def rig(name: str) -> Skeleton:
 
     It has the joints' names and the unit of a well-known rig, with the humanoid's proportions, in a T-pose, for
     programs that know figures by these names and retarget from their T-pose, as engines do. Its convention's table
-    (:mod:`motet.figures.humanoid.joint_map`) has each bone's name first, back and neck all of them; "rig" says the
+    (:mod:`motet.figures.humanoid.joint_map`) has each bone's name first, back and neck all of them; "rig" has the
     "unit" in metres, and where there is one the "prefix" of all names and the "root" at the floor that the hips hang
     on.
     """
     if name not in RIGS:
         raise MotionError(f"there is no rig {name!r}; expected one of {', '.join(RIGS)}")
     content = json.loads((files("motet.figures.humanoid") / "conventions" / f"{name}.json").read_text("utf-8"))
-    known = content["joints"]
     rig = content["rig"]
-    place = dict(zip(HUMANOID.names, T_POSE, strict=True))
-    back = _shared_out([place[bone] for bone in ("hips", *SPINE)], len(known["spine"]))
-    neck = _shared_out([place[bone] for bone in (SPINE[-1], *NECK)], len(known["neck"]) + 1)[:-1]
-    trunk = [known["hips"][0], *known["spine"], *known["neck"]]
-    # joint -> the one that it hangs on, "" for none, and its place (3,) in metres
-    tree: dict[str, tuple[str, Array]] = {rig["root"]: ("", np.zeros(3))} if "root" in rig else {}
-    above = [rig.get("root", ""), *trunk[:-1]]
-    tree |= dict(zip(trunk, zip(above, [place["hips"], *back, *neck], strict=True), strict=True))
-    called = {"hips": trunk[0], "upperChest": known["spine"][-1], "neck": known["neck"][-1], "head": known["head"][0]}
-    for side, word in zip(LEFT_RIGHT, content["sides"][0], strict=True):
-        called |= {sided(side, part): known[part][0].replace("{s}", word) for part in (*LEG, *ARM)}
-    called |= {bone + END_SUFFIX: name + END_SUFFIX for bone, name in called.items()}
-    for joint in HUMANOID.joints[1:]:
-        if joint.name not in (*SPINE, "neck"):
-            tree[called[joint.name]] = (called[HUMANOID.names[joint.parent]], place[joint.name])
+    tree = _rig_tree(content)
+    names = list(tree)
     joints = []
-    for own, (parent, at) in tree.items():
-        x, y, z = ((at - tree[parent][1] if parent else at) / rig["unit"]).tolist()
-        joints.append(Joint(rig.get("prefix", "") + own, list(tree).index(parent) if parent else -1, (x, y, z)))
+    for joint, (parent, position) in tree.items():
+        offset = (position - tree[parent][1] if parent else position) / rig["unit"]
+        x, y, z = offset.tolist()
+        joints.append(Joint(rig.get("prefix", "") + joint, names.index(parent) if parent else -1, (x, y, z)))
     return Skeleton(tuple(joints), rig["unit"])
 
 
+Tree = dict[str, tuple[str, Array]]
+"""Joint -> its parent, "" for none, and its position (3,) in metres, parents first."""
+
+
+def _rig_tree(content: dict[str, Any]) -> Tree:
+    """The joints of a rig with the humanoid's proportions, from its convention's table."""
+    tree: Tree = {}
+    parent = ""
+    if "root" in content["rig"]:
+        parent = content["rig"]["root"]
+        tree[parent] = ("", np.zeros(3))
+
+    # hips, back and neck hang on each other
+    for joint, position in _rig_trunk(content["joints"]):
+        tree[joint] = (parent, position)
+        parent = joint
+
+    # the other joints are the humanoid's
+    positions = dict(zip(HUMANOID.names, T_POSE, strict=True))
+    names = _rig_names(content)
+    for humanoid_joint in HUMANOID.joints[1:]:
+        bone = humanoid_joint.name
+        if bone not in (*SPINE, "neck"):
+            tree[names[bone]] = (names[HUMANOID.names[humanoid_joint.parent]], positions[bone])
+    return tree
+
+
+def _rig_trunk(names: dict[str, list[str]]) -> list[tuple[str, Array]]:
+    """The joints of a rig's hips, back and neck, upwards, with their positions (3,), from the names of its bones."""
+    positions = dict(zip(HUMANOID.names, T_POSE, strict=True))
+    back = _shared_out([positions[bone] for bone in ("hips", *SPINE)], len(names["spine"]))
+    neck = _shared_out([positions[bone] for bone in (SPINE[-1], *NECK)], len(names["neck"]) + 1)[:-1]
+    joints = [names["hips"][0], *names["spine"], *names["neck"]]
+    return list(zip(joints, [positions["hips"], *back, *neck], strict=True))
+
+
+def _rig_names(content: dict[str, Any]) -> dict[str, str]:
+    """For bones of the humanoid, and for tips, the names of a rig's joints."""
+    known = content["joints"]
+    names = {
+        "hips": known["hips"][0],
+        "upperChest": known["spine"][-1],
+        "neck": known["neck"][-1],
+        "head": known["head"][0],
+    }
+    for side, word in zip(LEFT_RIGHT, content["sides"][0], strict=True):
+        for part in (*LEG, *ARM):
+            names[sided(side, part)] = known[part][0].replace("{s}", word)
+    tips = {bone + END_SUFFIX: name + END_SUFFIX for bone, name in names.items()}
+    return names | tips
+
+
 def _shared_out(chain: list[Array], count: int) -> list[Array]:
-    """Places (3,) of the joints of another chain, as far up as retargeting shares turns out."""
-    up = np.arange(1, count + 1) * (len(chain) - 1) / count
-    return list(np.stack([np.interp(up, range(len(chain)), along) for along in np.transpose(chain)], axis=1))
+    """Positions (3,) of ``count`` joints along a chain, as far up as retargeting shares turns out."""
+    up_chain = np.arange(1, count + 1) * (len(chain) - 1) / count
+    coordinates = [np.interp(up_chain, range(len(chain)), along) for along in np.transpose(chain)]
+    return list(np.stack(coordinates, axis=1))
 
 
 MIXAMO = rig("mixamo")

@@ -31,23 +31,31 @@ LENGTH_UNITS = {
 
 @dataclass(frozen=True)
 class Fitted:
-    """A figure measured against the humanoid.
-
-    aligned: A (J, 3, 3): a bone of the humanoid has the rotation G A where its joint has G in the world.
-    leg: length of thigh and shin in the skeleton's unit.
-    heights: of the joints of feet and toes over the sole, in the skeleton's unit.
-    up: where y points (3,) in the rest pose, every angle 0; None where A does not come from that.
-    pelvis: whether the joint of the hips turns with the legs' joints; else these tell how the pelvis is turned.
-    """
+    """A figure measured against the humanoid."""
 
     body: Body
+    """The skeleton and which of its joints are bones."""
+
     aligned: Array
+    """A (J, 3, 3): a bone of the humanoid has the rotation G A where its joint has G in the world."""
+
     leg: float
+    """Length of thigh and shin in the skeleton's unit."""
+
     heights: dict[str, float]
+    """Heights of the joints of feet and toes over the sole, in the skeleton's unit."""
+
     up: Array | None
+    """The direction (3,) of y in the rest pose, every angle 0; None where A does not come from that pose."""
+
     confidence: float
+    """From 0 to 1, how certain A is."""
+
     notes: tuple[str, ...]
+    """Sentences about the assumptions made."""
+
     pelvis: bool = True
+    """Whether the joint of the hips turns with the legs' joints; else these decide how the pelvis is turned."""
 
     @property
     def joint_map(self) -> JointMap:
@@ -71,11 +79,12 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
     fitted = _fit(Body(skeleton, joint_map), rotations, places)
     if not len(places):
         return fitted
+    # in most frames, the left of the hips' joint has to be where the left leg is
     hips = joint_map.joints["hips"]
     left = rotated(rotations[:, hips], fitted.aligned[hips][:, 0])
     cosine = np.sum(left * unit(fitted.body.to_left(places, "UpperLeg")), axis=-1)
     apart = float(np.degrees(np.arccos(np.clip(np.median(cosine), -1, 1))))
-    if apart <= 30:  # degrees: more, and the hips' joint does not tell how the pelvis is turned
+    if apart <= 30:  # degrees: more, and the hips' joint does not show how the pelvis is turned
         return fitted
     name = skeleton.names[hips]
     note = f"the legs' joints lie {apart:.0f} degrees off the turn of {name!r}: the pelvis is turned as they lie"
@@ -83,38 +92,74 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
 
 
 def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
-    skeleton = body.skeleton
-    joint_map = body.joint_map
+    # from the rest pose, where that is a standing body
     rest = body.skeleton.rest_positions
     leg = leg_of(body, places[0] if len(places) else rest)
-    stands = body_frame(rest, body)
+    frame_at_rest = body_frame(rest, body)
     moving = len(places) > 1 and rests_in_motion(body)
-    if stands is not None and not moving:
-        points = {bone: unit(np.array(at)) for bone, at in joint_map.points.items()}
-        known = joint_map.rest is not None and _agreement(body, rest, stands, points) > np.cos(np.radians(4))
-        body = body if known or joint_map.rest is None else Body(skeleton, replace(joint_map, rest=None))
-        aligned = alignments_of_pose(body, np.tile(np.eye(3), (len(rest), 1, 1)), rest, stands)
-        notes = ("the rest pose is one that the convention knows, which was made up for",) if known else ()
-        up = stands[:, 1]
-        return Fitted(body, aligned, leg, _heights(body, leg, rest @ up), up, 1.0, notes)
+    if frame_at_rest is not None and not moving:
+        return _fit_at_rest(body, leg, frame_at_rest)
+
+    # else from the axes of its joints, where the convention is known to have some
     known = bool(len(places)) and axes_agree(body, rotations, places)
-    body = body if known or not joint_map.axes else Body(skeleton, replace(joint_map, axes={}))
-    first = body_frame(places[0], body, exact=True) if len(places) and not known else None
-    limbs = {bone: humanoid_direction(bone) for limb in LIMB_BONES for bone in limb[:2] if body.aims[bone]}
-    # a T-pose is within 16 degrees of the humanoid's
-    t_pose = first is not None and min(_agreement(body, places[0], first, limbs), float(first[1, 1])) > 0.96
-    if first is not None and (len(places) == 1 or t_pose):
-        aligned = alignments_of_pose(body, rotations[0], places[0], first)
-        note = "the rest pose is not a standing body: the first frame's pose was used in its place"
-        return Fitted(body, aligned, leg, _heights(body, leg, places[0] @ first[:, 1]), None, 0.95, (note,))
+    if not known and body.joint_map.axes:
+        body = Body(body.skeleton, replace(body.joint_map, axes={}))
+
+    # else from the first frame, where that is a T-pose or all there is, or from what bodies do in all frames
+    if not known and len(places):
+        first = body_frame(places[0], body, exact=True)
+        if first is not None and (len(places) == 1 or _is_t_pose(body, places[0], first)):
+            return _fit_in_first_frame(body, leg, rotations[0], places[0], first)
     if not known:
         if len(places) < 2:
             remedy = "use a file of this figure that rests in a T-pose (to read a motion, as its rest=, --rest)"
             raise MotionError(f"the rest pose is not a standing body: {remedy}")
         check_stance(body, places)
         check_frames(body, places, dict.fromkeys(LEFT_RIGHT, unit(body.to_left(places, "UpperLeg"))))
-    how, confidence = ("known by the convention", 0.95) if known else ("found from the frames", 0.85)
-    note = f"the rest pose is not a standing body: how the joints stand was {how}"
+    return _fit_in_frames(body, leg, rotations, places, known=known, moving=moving)
+
+
+def _fit_at_rest(body: Body, leg: float, frame: Array) -> Fitted:
+    """A figure whose rest pose is a standing body with axes (3, 3) left, up and forward."""
+    rest = body.skeleton.rest_positions
+    joint_map = body.joint_map
+    notes: tuple[str, ...] = ()
+    if joint_map.rest is not None:
+        points = {bone: unit(np.array(point)) for bone, point in joint_map.points.items()}
+        if _agreement(body, rest, frame, points) > np.cos(np.radians(4)):
+            notes = ("the rest pose is one that the convention knows, which was made up for",)
+        else:
+            body = Body(body.skeleton, replace(joint_map, rest=None))
+    aligned = alignments_of_pose(body, np.tile(np.eye(3), (len(rest), 1, 1)), rest, frame)
+    up = frame[:, 1]
+    return Fitted(body, aligned, leg, _heights(body, leg, rest @ up), up, 1.0, notes)
+
+
+def _is_t_pose(body: Body, pose: Array, frame: Array) -> bool:
+    """Whether limbs in a pose (J, 3), seen in its frame, point within 16 degrees of the humanoid's, and up is up."""
+    points = {}
+    for limb in LIMB_BONES:
+        for bone in limb[:2]:
+            if body.aims[bone]:
+                points[bone] = humanoid_direction(bone)
+    return min(_agreement(body, pose, frame, points), float(frame[1, 1])) > 0.96
+
+
+def _fit_in_first_frame(body: Body, leg: float, rotations: Array, pose: Array, frame: Array) -> Fitted:
+    """A figure whose first frame, rotations (J, 3, 3) and positions (J, 3), is used as a rest pose."""
+    aligned = alignments_of_pose(body, rotations, pose, frame)
+    note = "the rest pose is not a standing body: the first frame's pose was used in its place"
+    return Fitted(body, aligned, leg, _heights(body, leg, pose @ frame[:, 1]), None, 0.95, (note,))
+
+
+def _fit_in_frames(body: Body, leg: float, rotations: Array, places: Array, *, known: bool, moving: bool) -> Fitted:
+    """A figure by the movements of its frames, or by the axes of joints where its convention's are known to fit.
+
+    moving: whether the rest pose is out of a motion, so that joints have no axes along bones.
+    """
+    source = "known by the convention" if known else "found from the frames"
+    confidence = 0.95 if known else 0.85
+    note = f"the rest pose is not a standing body: how the joints stand was {source}"
     if moving and not known:
         note = (
             "the rest pose is out of a motion: how the joints stand was guessed from the frames, to 10 or 20 degrees; "
@@ -122,27 +167,33 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
         )
         confidence = 0.7
     aligned = Calibration(body, rotations, places, along_axes=known or not moving).aligned
-    hips = joint_map.joints["hips"]
-    carrier = joint_map.carrier(skeleton)
+    # the joint that carries legs and back turns with the hips
+    hips = body.joints["hips"]
+    carrier = body.joint_map.carrier(body.skeleton)
     aligned[carrier] = rotations[0, carrier].T @ rotations[0, hips] @ aligned[hips]
     return Fitted(body, aligned, leg, _heights(body, leg, None), None, confidence, (note,))
 
 
 def _agreement(body: Body, pose: Array, frame: Array, points: dict[str, Array]) -> float:
-    """The least cosine between where bones point in a pose (J, 3), seen in a frame, and where they are said to."""
-    return min((float(body.direction(pose, bone) @ frame @ along) for bone, along in points.items()), default=1.0)
+    """The least cosine between the directions of bones in a pose (J, 3), seen in a frame, and expected ones."""
+    cosines = [float(body.direction(pose, bone) @ frame @ along) for bone, along in points.items()]
+    return min(cosines, default=1.0)
 
 
 def _heights(body: Body, leg: float, rise: Array | None) -> dict[str, float]:
     """Heights of feet and toes over the sole: over the lowest joint at rest (rise (J)), else as the humanoid's."""
     scale = leg / leg_length()
     heights = {}
-    for bone in (bone for side in LEFT_RIGHT for part in SOLE if (bone := sided(side, part)) in body.joints):
-        joint = body.joints[bone]
-        usual = -SOLE[part_of(bone)][0][1] * scale
-        hanging = list(body.skeleton.subtree(body.skeleton.names[joint]))
-        below = 0.0 if rise is None else float(rise[joint] - rise[hanging].min())
-        heights[bone] = below if below > 0.3 * usual or bone.endswith("Toes") else usual
+    for side in LEFT_RIGHT:
+        for part in SOLE:
+            bone = sided(side, part)
+            if bone not in body.joints:
+                continue
+            joint = body.joints[bone]
+            usual = -SOLE[part][0][1] * scale
+            hanging = list(body.skeleton.subtree(body.skeleton.names[joint]))
+            below = 0.0 if rise is None else float(rise[joint] - rise[hanging].min())
+            heights[bone] = below if below > 0.3 * usual or part == "Toes" else usual
     return heights
 
 
@@ -159,19 +210,31 @@ def leg_of(body: Body, pose: Array) -> float:
 
 
 class Unit(NamedTuple):
-    """A length unit in metres, None where it is not known, and what there is to say about it."""
+    """A length unit in metres, None where it is not known, and a note about how it was determined."""
 
     metres: float | None
     note: str | None
 
 
+ADULT_LEG = 0.82
+"""Metres of an adult's thigh and shin."""
+
+LIKELY_LEGS = (0.55, 1.1)
+"""Metres between which thigh and shin are long in a unit that is guessed."""
+
+POSSIBLE_LEGS = (0.2, 1.6)
+"""Metres between which thigh and shin of any human are long."""
+
+
 def unit_of(skeleton: Skeleton, leg: float) -> Unit:
-    """The skeleton's unit as it says, or else as the length of its legs tells; MotionError for giants and dwarfs."""
-    # the unit in which legs are nearest to an adult's 0.82 m, of those in which they are 0.55 to 1.1 m
-    likely = [name for name, metres in LENGTH_UNITS.items() if 0.55 < leg * metres < 1.1]
-    guess = min(likely, key=lambda name: abs(np.log(leg * LENGTH_UNITS[name] / 0.82)), default=None)
-    stated, (shortest, longest) = skeleton.metres_per_unit, (0.2, 1.6)  # metres of a human's thigh and shin
+    """The skeleton's unit as stated, or else as the length of its legs suggests; MotionError for giants and dwarfs."""
+    # of the units that make likely legs the one that makes those nearest to an adult's
+    shortest, longest = LIKELY_LEGS
+    likely = [name for name, metres in LENGTH_UNITS.items() if shortest < leg * metres < longest]
+    guess = min(likely, key=lambda name: abs(np.log(leg * LENGTH_UNITS[name] / ADULT_LEG)), default=None)
+    stated = skeleton.metres_per_unit
     if stated is not None:
+        shortest, longest = POSSIBLE_LEGS
         if shortest < leg * stated < longest:
             return Unit(stated, None)
         looks = f"; its lengths look like {guess}" if guess else ""
@@ -190,24 +253,25 @@ def unit_by_legs(motion: Motion) -> Unit:
 
 
 def height_of(fitted: Fitted) -> float:
-    """Height of a figure that stands straight, in the skeleton's unit: of legs and back as they are long, and of what
-    joints do not tell, soles and crown, as the humanoid's."""
-
-    def back(skeleton: Skeleton, hips: int, joint: int) -> float:
-        chain = skeleton.ancestors(joint)
-        return sum(float(np.linalg.norm(skeleton.offsets[i])) for i in chain[: chain.index(hips)])
-
+    """Height of a figure that stands straight, in the skeleton's unit: its legs and back are measured, its soles and
+    crown are the humanoid's."""
     joint_map = fitted.joint_map
     skeleton = fitted.body.skeleton
     top = "head" if "head" in joint_map.joints else "neck" if joint_map.neck else SPINE[-1]
     joint = joint_map.joints.get("head", (*joint_map.spine, *joint_map.neck)[-1])
-    usual = back(HUMANOID, 0, HUMANOID.index(top))
-    rest = (float(T_POSE[:, 1].max()) - leg_length() - usual) * fitted.leg / leg_length()
-    return fitted.leg + back(skeleton, joint_map.carrier(skeleton), joint) + rest
+    humanoid_back = _back_length(HUMANOID, 0, HUMANOID.index(top))
+    rest = (float(T_POSE[:, 1].max()) - leg_length() - humanoid_back) * fitted.leg / leg_length()
+    return fitted.leg + _back_length(skeleton, joint_map.carrier(skeleton), joint) + rest
+
+
+def _back_length(skeleton: Skeleton, hips: int, joint: int) -> float:
+    """Length of the bones from the hips up to a joint."""
+    chain = skeleton.ancestors(joint)
+    return sum(float(np.linalg.norm(skeleton.offsets[i])) for i in chain[: chain.index(hips)])
 
 
 def check_stance(body: Body, positions: Array) -> None:
-    """Refuse frames (T, J, 3) of a figure on four legs: asked where its rest pose is not a standing body.
+    """Refuse frames (T, J, 3) of a figure on four legs; called where its rest pose is not a standing body.
 
     A human who sits has the trunk beside the legs, too; known names tell one who sits upright from an animal.
     """
@@ -225,21 +289,25 @@ def check_frames(body: Body, positions: Array, hinges: dict[str, Array]) -> None
     """Refuse frames (T, J, 3) that no human's body goes through: inside out, with feet or knees the other way.
 
     hinges: of each side the axis (T, 3) about which the knee bends, to the left, however the thigh is turned. A knee
-    bends the wrong way where the pelvis says so, too: recorded thighs can be twisted by much.
+    bends the wrong way only where the pelvis agrees: recorded thighs can be twisted by much.
     """
-    toes = []
+    forward_of_toes = []
     wrong = 0
     bent = 0
     left = body.to_left(positions, "UpperLeg")
     for side, hinge in hinges.items():
-        bones = [bone for bone in (sided(side, part) for part in LEG[:3]) if body.aims[bone]]
-        thigh, shin, *foot = (body.direction(positions, bone) for bone in bones)
-        toes += [np.sum(np.cross(hinge, -shin) * along, axis=-1) for along in foot]
+        thigh = body.direction(positions, sided(side, "UpperLeg"))
+        shin = body.direction(positions, sided(side, "LowerLeg"))
+        foot = sided(side, "Foot")
+        if body.aims[foot]:
+            forward = np.cross(hinge, -shin)
+            forward_of_toes.append(np.sum(forward * body.direction(positions, foot), axis=-1))
         bend = np.cross(thigh, shin)
         is_bent = np.linalg.norm(bend, axis=-1) > 0.3  # the sine of the knee's angle
+        is_forward = (np.sum(bend * hinge, axis=-1) < 0) & (np.sum(bend * left, axis=-1) < 0)
         bent += int(is_bent.sum())
-        wrong += int((is_bent & (np.sum(bend * hinge, axis=-1) < 0) & (np.sum(bend * left, axis=-1) < 0)).sum())
-    if toes and np.median(toes) < -0.3:
+        wrong += int((is_bent & is_forward).sum())
+    if forward_of_toes and np.median(forward_of_toes) < -0.3:
         raise MotionError(
             "the feet point backwards: left and right are swapped, or the frames turn inside out: name the joints in a "
             "map, or export the file anew"
@@ -251,32 +319,47 @@ def check_frames(body: Body, positions: Array, hinges: dict[str, Array]) -> None
         )
 
 
-def upright(fitted: Fitted, places: Array) -> tuple[Array, str | None]:
-    """The rotation (3, 3) of the world that makes y point up, and what there is to say about it.
+ALONG = 0.82
+"""Cosine from which on a body stands along an axis: within 35 degrees."""
 
-    The identity where y points up, or nothing tells. A figure stands along another axis where its rest pose and most
-    of its frames (T, J, 3) say so, or where the frames alone do and it walks about: a body that lies down does not.
+
+def upright(fitted: Fitted, places: Array) -> tuple[Array, str | None]:
+    """The rotation (3, 3) of the world that makes y point up, and a note about why it is turned or lies, or None.
+
+    The identity where y points up, or nothing else is evident. A figure stands along another axis where its rest pose
+    and most of its frames (T, J, 3) do, or where the frames alone do and it walks about: a body that lies down does
+    not.
     """
     still = np.eye(3)
     if not len(places):
         return still, None
     trunk = fitted.body.trunk_up(places)
     if fitted.up is not None and fitted.up[1] <= 0.5:
-        stands = float(np.median(trunk @ fitted.up)) > 0.7
-        return (swing(fitted.up, UP), "turned upright: the figure does not stand along y") if stands else (still, None)
+        if float(np.median(trunk @ fitted.up)) > 0.7:
+            return swing(fitted.up, UP), "turned upright: the figure does not stand along y"
+        return still, None
+    up = _up_of_frames(fitted, trunk, places)
+    if up is None:
+        return still, None
+    name = "xyz"[int(np.argmax(np.abs(up)))]
+    if _walks_across(fitted, up, places[trunk @ up > ALONG]):
+        return swing(up, UP), f"turned upright: the frames stand along {name}, the rest pose along y"
+    return still, f"the body lies along {name} in most frames: if it stands there, export the file with y up"
+
+
+def _up_of_frames(fitted: Fitted, trunk: Array, places: Array) -> Array | None:
+    """The direction (3,) along x or z in which trunks (T, 3) and legs point in most frames; None where y is up."""
     mean = np.median(trunk, axis=0)
     axis = int(np.argmax(np.abs(mean)))
-    up = np.sign(mean[axis]) * np.eye(3)[axis]
-    along = 0.82  # the cosine from which on a body stands along an axis
-    standing = trunk @ up > along
-    if axis == 1 or np.mean(standing) < 0.5 or np.mean(trunk[:, 1] > along) > 0.1:
-        return still, None
-    if np.median(fitted.body.legs_up(places) @ up) < along:
-        return still, None
-    # a figure walks that goes its leg's length and more across that direction, and not along it
-    path = fitted.body.middle(places[standing], "UpperLeg")
+    up: Array = np.sign(mean[axis]) * np.eye(3)[axis]
+    if axis == 1 or np.mean(trunk @ up > ALONG) < 0.5 or np.mean(trunk[:, 1] > ALONG) > 0.1:
+        return None
+    return None if np.median(fitted.body.legs_up(places) @ up) < ALONG else up
+
+
+def _walks_across(fitted: Fitted, up: Array, places: Array) -> bool:
+    """Whether a figure walks: it goes its leg's length and more across ``up``, and not along it."""
+    path = fitted.body.middle(places, "UpperLeg")
     rise = float(np.ptp(path @ up))
-    if np.linalg.norm(np.ptp(path - (path @ up)[:, None] * up, axis=0)) > max(fitted.leg, 2 * rise):
-        return swing(up, UP), f"turned upright: the frames stand along {'xyz'[axis]}, the rest pose along y"
-    name = "xyz"[axis]
-    return still, f"the body lies along {name} in most frames: if it stands there, export the file with y up"
+    extent = np.linalg.norm(np.ptp(path - (path @ up)[:, None] * up, axis=0))
+    return bool(extent > max(fitted.leg, 2 * rise))
