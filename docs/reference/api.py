@@ -7,6 +7,7 @@ import re
 import textwrap
 from collections.abc import Iterator
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, is_typeddict
 
@@ -38,7 +39,7 @@ def entry(name: str, member: Any, first: dict[Any, str]) -> str:
     """
     if inspect.isclass(member):
         code = "\n".join([f"class {name}", *fields(member)])
-        return f"### {name}\n\n{described(code, member)}{''.join(members(member, first))}"
+        return f"### {name}\n\n{described(code, member)}{field_notes(member)}{''.join(members(member, first))}"
     if inspect.isfunction(member):
         return f"### {name}\n\n{described(signature(member, name), member)}"
     text = prose(inspect.getdoc(member)) if inspect.ismodule(member) else f"A {type(member).__name__}."
@@ -53,6 +54,17 @@ def fields(kind: type) -> Iterator[str]:
         text = ast.unparse(node)
         if isinstance(node, ast.AnnAssign) and not text.startswith("_") and "ClassVar" not in text:
             yield f"    {text}"
+
+
+def field_notes(kind: type) -> str:
+    """A list of the public fields that have a docstring below them."""
+    lines = []
+    body = tree(kind).body
+    for node, below in pairwise(body):
+        is_docstring = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+        if isinstance(node, ast.AnnAssign) and is_docstring and not node.target.id.startswith("_"):
+            lines.append(f"{node.target.id}: {inspect.cleandoc(below.value.value)}")
+    return prose("\n".join(lines)) + "\n" if lines else ""
 
 
 def members(kind: type, first: dict[Any, str]) -> Iterator[str]:
