@@ -62,7 +62,8 @@ def field_notes(kind: type) -> str:
     body = tree(kind).body
     for node, below in pairwise(body):
         is_docstring = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
-        if isinstance(node, ast.AnnAssign) and is_docstring and not node.target.id.startswith("_"):
+        is_field = isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation)
+        if is_field and is_docstring and not node.target.id.startswith("_"):
             lines.append(f"{node.target.id}: {inspect.cleandoc(below.value.value)}")
     return prose("\n".join(lines)) + "\n" if lines else ""
 

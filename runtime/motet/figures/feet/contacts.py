@@ -154,8 +154,8 @@ def lay_root_path(
     millimetres, but in flight. A translation that the motion has already is replaced.
     feet: the names of the joints of each foot, toes included; by default the lowest left-right pairs of joints.
         MotionError for a motion without skeleton or without such joints.
-    tremble: seconds over which the feet are smoothed, by default 0.015; recorded motions need little, generated ones 0.06 s, and 0
-        smooths nothing.
+    tremble: seconds over which the feet are smoothed, by default 0.015 s; recorded motions need little, generated ones
+        0.06 s, and 0 smooths nothing.
     """
     if not 0 <= tremble < np.inf:
         raise MotionError(f"the smoothing time of feet must be 0 or more seconds, not {tremble}")
