@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 276
+MOST_LARGE_FUNCTIONS = 265
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 522
-MOST_TUPLE_ASSIGNMENTS = 156
-MOST_NESTED_COMPREHENSIONS = 155
+MOST_BANNED_NAMES = 500
+MOST_TUPLE_ASSIGNMENTS = 151
+MOST_NESTED_COMPREHENSIONS = 145
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -91,7 +91,7 @@ CEILINGS = {
     "motet.corpus": 9_200,
     "motet.decode": 3_900,
     "motet.draw": 12_000,
-    "motet.figures": 30_400,
+    "motet.figures": 31_700,
     "motet.formats": 37_100,
     "motet.generate": 26_000,
     "motet.live": 5_700,
