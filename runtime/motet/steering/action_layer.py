@@ -9,6 +9,7 @@ Letters in shapes as in :mod:`motet.steering.matching`; and J bones.
 """
 
 from dataclasses import dataclass, replace
+from itertools import product, starmap
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -23,7 +24,7 @@ from motet.steering.matching import TRAJECTORY, Flags, Matcher, Playback, Rows
 from motet.steering.pose import Pose
 from motet.steering.step import PoseCodes, body
 
-_LOWER = ("hips", *(sided(side, part) for side in LEFT_RIGHT for part in LEG))
+_LOWER = ("hips", *starmap(sided, product(LEFT_RIGHT, LEG)))
 UPPER = np.array([bone not in _LOWER for bone in BONES])
 """Which bones (J,) are of the upper body."""
 
@@ -185,11 +186,9 @@ class ActionLayer:
                 continue
             after = self._next(figure, playback, bool(goes[figure]))
             self.playing[figure] = after
-            # the pose jumps where another act is played, or by another part of the body
-            if ordered or not after or not before or after.whole != before.whole:
+            if ordered or _jumps(before, after):
                 changed.append(figure)
-            # legs that an act has led so far are free
-            if before and before.whole and not (after and after.whole):
+            if before and _frees_legs(before, after):
                 freed.append(figure)
                 freed_features.append(before.act.features[before.frame])
         self.orders = {}
@@ -247,16 +246,8 @@ class ActionLayer:
         trajectory = matcher.desired_trajectory(playback, target, slow_walk, figures)
         trajectory = (trajectory - table.mean[:TRAJECTORY]) * table.scale[:TRAJECTORY]
         desired = np.concatenate([trajectory, self._scaled(features)], axis=1).astype(np.float32)
-        playback.row[figures], playback.mirror[figures], _ = matcher.best(matcher.query(desired), gait[figures])
-        # play that row as it is recorded
-        playback.part[figures] = 0
-        playback.rate[figures] = 1
-        playback.offset[figures] = 0
-        playback.offset_rate[figures] = 0
-        playback.warp[figures] = 0
-        playback.warp_rate[figures] = 0
-        playback.stride[figures] = 1
-        playback.stride_rate[figures] = 0
+        row, mirror, _ = matcher.best(matcher.query(desired), gait[figures])
+        playback.restart(figures, row, mirror)
         played, _ = table.at(playback, figures)
         self.base = self.base.put(figures, Body(*self.codes.decode(played[:, : table.codes])))
 
@@ -270,8 +261,7 @@ class ActionLayer:
         self.base = Body(pose.rotations, pose.height)
         step = playback.root - root
         step[:, 2] = wrapped(step[:, 2])
-        # without any act or offset the pose stays as it is
-        if not (len(changed) or self.acts or self.led.any() or self.offset.any()):
+        if not len(changed) and self._rests:
             self._show(self.base, step / dt)
             return pose
         # acts of the whole body lead it over the ground
@@ -281,8 +271,7 @@ class ActionLayer:
             self._transition(base_before, step / dt, changed)
         self.led = self.whole
         # acts and offsets are laid over the pose
-        acts = np.array([playing is not None for playing in self.playing])
-        figures = np.flatnonzero(acts | (np.abs(self.offset).max(axis=1) > 0))
+        figures = self._active()
         if not len(figures):
             self._show(self.base, step / dt)
             return pose
@@ -290,13 +279,19 @@ class ActionLayer:
         acted = self._played(self.base, figures, 0).plus(self.offset[figures])
         self._show(self.base.put(figures, acted), step / dt + self.velocity_offset)
         self._drift(playback, dt)
-        return replace(
-            pose,
-            ground=playback.root,
-            rotations=self.shown.rotations.astype(np.float32),
-            height=self.shown.height.astype(np.float32),
-            contacts=contacts,
-        )
+        rotations = self.shown.rotations.astype(np.float32)
+        height = self.shown.height.astype(np.float32)
+        return replace(pose, ground=playback.root, rotations=rotations, height=height, contacts=contacts)
+
+    @property
+    def _rests(self) -> bool:
+        """Whether there is no act or offset, and poses stay as they are."""
+        return not (self.acts or self.led.any() or self.offset.any())
+
+    def _active(self) -> Rows:
+        """The figures (n,) with an act or an offset."""
+        acts = np.array([playing is not None for playing in self.playing])
+        return np.flatnonzero(acts | (np.abs(self.offset).max(axis=1) > 0))
 
     def _show(self, shown: Body, velocity: Array) -> None:
         """Remember what is shown in this tick."""
@@ -320,31 +315,37 @@ class ActionLayer:
 
         base_before: bodies of the last tick without acts.
         """
-        # the offset that makes what is now played what was shown; and a tick later, if that had gone on
-        shown = self.shown.at(figures)
-        offset_before = shown.since(self._played(base_before, figures, 1))
-        expected = shown.plus(shown.since(self.shown_before.at(figures)))
-        offset_now = expected.since(self._played(self.base, figures, 0))
-        both = np.stack([offset_before, offset_now])
-        vectors = both[..., :-1].reshape(2, -1, 3)
-        both[..., :-1] = continuous_rotvec(vectors).reshape(2, len(figures), -1)
-        offset = both[0]
-        offset_rate = (both[1] - both[0]) * self.matcher.fps
+        offset, offset_rate = self._jump(base_before, figures)
         # legs that play no act keep their offset
         leads = (self.led | self.whole)[figures]
         keeps = ~leads[:, None] & BELOW
         offset = np.where(keeps, self.offset[figures], offset)
         offset_rate = np.where(keeps, self.offset_rate[figures], offset_rate)
-        # large jumps fade more slowly
-        angles = np.linalg.norm(offset[:, :-1].reshape(len(figures), -1, 3), axis=2).max(axis=1)
-        distance = np.maximum(angles, self.settings.height_weight * np.abs(offset[:, -1]))
-        stretch = (distance / self.settings.far).clip(1, self.settings.longest)
         self.offset = _with(self.offset, figures, offset)
         self.offset_rate = _with(self.offset_rate, figures, offset_rate)
-        self.stretch = _with(self.stretch, figures, stretch[:, None])
+        self.stretch = _with(self.stretch, figures, self._stretch(offset)[:, None])
         # the jump in velocity
         led = figures[leads]
         self.velocity_offset = _with(self.velocity_offset, led, self.velocity[led] - velocity[led])
+
+    def _jump(self, base_before: Body, figures: Rows) -> tuple[Array, Array]:
+        """The jump (n, 3 J + 1) from what figures (n,) now play to what was shown, and how fast it changes."""
+        # in the last tick; and in this one, if what was shown had gone on
+        shown = self.shown.at(figures)
+        jump_before = shown.since(self._played(base_before, figures, 1))
+        expected = shown.plus(shown.since(self.shown_before.at(figures)))
+        jump_now = expected.since(self._played(self.base, figures, 0))
+        jumps = np.stack([jump_before, jump_now])
+        vectors = jumps[..., :-1].reshape(2, -1, 3)
+        jumps[..., :-1] = continuous_rotvec(vectors).reshape(2, len(figures), -1)
+        return jumps[0], (jumps[1] - jumps[0]) * self.matcher.fps
+
+    def _stretch(self, offset: Array) -> Array:
+        """How many times as long as usual offsets (n, 3 J + 1) take to fade (n,): large jumps fade more slowly."""
+        angles = np.linalg.norm(offset[:, :-1].reshape(len(offset), -1, 3), axis=2).max(axis=1)
+        distance = np.maximum(angles, self.settings.height_weight * np.abs(offset[:, -1]))
+        stretch: Array = (distance / self.settings.far).clip(1, self.settings.longest)
+        return stretch
 
     def _fade(self, dt: float) -> None:
         """The offsets a tick later, dropped once they are invisible."""
@@ -380,6 +381,16 @@ class ActionLayer:
                 spine_from_facing = quat_product(acted[0], acted[SPINE])
                 rotations[n, SPINE] = quat_product(conjugate(rotations[n, 0]), spine_from_facing)
         return Body(rotations, height)
+
+
+def _jumps(before: Playing | None, after: Playing | None) -> bool:
+    """Whether a pose jumps, as an act ends or goes on by another part of the body."""
+    return not after or not before or after.whole != before.whole
+
+
+def _frees_legs(before: Playing, after: Playing | None) -> bool:
+    """Whether legs that an act has led so far are free."""
+    return before.whole and not (after and after.whole)
 
 
 def _with(values: Array, figures: Rows, changed: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from motet.bundle.graph import Floats
 from motet.errors import ControlError
 from motet.figures.feet.contacts import SOLES, ContactSettings, contacts_of
-from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
+from motet.figures.humanoid import BONES, HUMANOID, ground_under, sole_points
 from motet.motion.rotations import Array, quat_to_rotmat
 from motet.settings import Range, Settings
 from motet.steering.pose import Pose
@@ -81,13 +81,8 @@ class Act:
     def of(name: str, numbers: Floats, fps: float, settings: ActSettings) -> "Act":
         """The act of frames (T, :data:`WIDTH`), without the rest at both ends. ControlError for fewer than
         :data:`SHORTEST` frames, and for numbers that are not finite or too large."""
-        if numbers.ndim != 2 or numbers.shape[1] != WIDTH or len(numbers) < SHORTEST:
-            raise ControlError(f"an act needs {SHORTEST} or more frames of {WIDTH} numbers, not {numbers.shape}")
-        if not (np.abs(numbers) <= LARGEST).all():
-            raise ControlError(f"an act must be finite numbers, no larger than {LARGEST:g}")
-        values = numbers.astype(np.float64)
-        quats = values[:, :-4].reshape(len(values), -1, 4)
-        quats = quats / np.maximum(np.linalg.norm(quats, axis=2, keepdims=True), 1e-6)
+        values = _checked(numbers)
+        quats = _unit_quats(values[:, :-4].reshape(len(values), -1, 4))
         ground = values[:, -4:-1]
         height = values[:, -1]
         # where joints are, and what follows from that
@@ -98,15 +93,8 @@ class Act:
         features = pose_features(places, ground, fps)
         # without the rest at both ends
         kept = _moving_part(places, fps, settings)
-        return Act(
-            name,
-            quats[kept],
-            height[kept],
-            ground[kept],
-            contacts[kept],
-            features[kept],
-            legs=_uses_legs(height[kept], ground[kept], features[kept], settings),
-        )
+        legs = _uses_legs(height[kept], ground[kept], features[kept], settings)
+        return Act(name, quats[kept], height[kept], ground[kept], contacts[kept], features[kept], legs)
 
     def __len__(self) -> int:
         """T."""
@@ -136,6 +124,21 @@ class Act:
         return np.array([cos * x + sin * z, cos * z - sin * x, turn])
 
 
+def _checked(numbers: Floats) -> Array:
+    """Frames (T, :data:`WIDTH`) in float64; ControlError for those that are none."""
+    if numbers.ndim != 2 or numbers.shape[1] != WIDTH or len(numbers) < SHORTEST:
+        raise ControlError(f"an act needs {SHORTEST} or more frames of {WIDTH} numbers, not {numbers.shape}")
+    if not (np.abs(numbers) <= LARGEST).all():
+        raise ControlError(f"an act must be finite numbers, no larger than {LARGEST:g}")
+    return numbers.astype(np.float64)
+
+
+def _unit_quats(quats: Array) -> Array:
+    """Quaternions (T, J, 4) of length 1."""
+    units: Array = quats / np.maximum(np.linalg.norm(quats, axis=2, keepdims=True), 1e-6)
+    return units
+
+
 def _moving_part(places: Array, fps: float, settings: ActSettings) -> slice:
     """The frames (T, J', 3) of an act without the rest at both ends."""
     speeds = np.linalg.norm(np.gradient(places, axis=0), axis=2).max(axis=1) * fps
@@ -153,7 +156,7 @@ def _uses_legs(height: Array, ground: Array, features: Array, settings: ActSetti
     return bool(bends or raises or turns)
 
 
-_TRACKED = ["hips", *(sided(side, part) for part in ("Toes", "Hand") for side in LEFT_RIGHT)]
+_TRACKED = ("hips", "leftToes", "rightToes", "leftHand", "rightHand")
 
 
 def pose_features(places: Array, way: Array, fps: float) -> Array:

@@ -157,9 +157,7 @@ class Going:
         speed_now = np.hypot(*playback.spring[:, :2].T)
         lengths = self.paths.lengths
         # how far they have come along their paths, and the point that they aim at
-        here = self.paths.at(self.gone)
-        way = _unit(self.paths.at(self.gone + 0.05) - here)
-        gone = self.gone + ((root - here) * way).sum(axis=1).clip(0, 0.5)
+        gone = self._progress(root)
         aim = gone + settings.ahead + settings.ahead_moving * speed_now
         # how far it is to the end
         to_end = self.paths.ends - root
@@ -169,18 +167,29 @@ class Going:
         # stop where the springs roll on to the end; go again if that was too far from it
         passes_end = (_rolling_distance(playback, steering) * to_end).sum(axis=1) >= distance**2
         near = distance < settings.near
-        arrives = on_last_stretch & (passes_end | near)
         stands = speed_now < settings.stands
         too_far = stands & (distance > settings.glides_from)
-        stops = np.where(self.stops & ~too_far, True, arrives)
+        stops = np.where(self.stops & ~too_far, True, on_last_stretch & (passes_end | near))
         # arrived: standing there, facing as wanted
-        turned = np.isnan(self.facing) | (np.abs(wrapped(playback.root[:, 2] - self.facing)) < settings.faces)
+        turned = self._is_turned(playback.root[:, 2], settings)
         arrived = self.goes & stops & (self.arrived | (stands & near & turned))
         # towards the aim, braking evenly
         speed = np.where(stops, 0.0, np.minimum(self.speed, np.sqrt(2 * settings.brakes * left)))
         velocity = _unit(self.paths.at(aim) - root) * speed[:, None]
         going = replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=arrived)
         return going, velocity
+
+    def _progress(self, root: Array) -> Array:
+        """How far (B,) figures at roots (B, 2) have come along their paths, metres."""
+        here = self.paths.at(self.gone)
+        way = _unit(self.paths.at(self.gone + 0.05) - here)
+        progress: Array = self.gone + ((root - here) * way).sum(axis=1).clip(0, 0.5)
+        return progress
+
+    def _is_turned(self, facing: Array, settings: ArrivalSettings) -> Flags:
+        """Whether facings (B,) are those that figures are to have at the end."""
+        turned: Flags = np.isnan(self.facing) | (np.abs(wrapped(facing - self.facing)) < settings.faces)
+        return turned
 
     def faces(self, playback: Playback, velocity: Array, settings: ArrivalSettings) -> Array:
         """The facings (B,), in radians, of figures that go at velocities (B, 2): where they go; near the end as they

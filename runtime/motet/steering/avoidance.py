@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.motion.rotations import Array
 from motet.settings import Settings
@@ -33,18 +34,11 @@ class AvoidanceSettings(Settings):
 
 def kept_apart(places: Array, velocities: Array, room: float, settings: AvoidanceSettings) -> Array:
     """Changes (B, 2) of velocities (B, 2) in m/s of figures at places (B, 2) that keep ``room`` metres."""
-    # all pairs of figures that see each other
-    x, z = places.T
-    near_x = np.abs(x[:, None] - x) < settings.sight
-    near_z = np.abs(z[:, None] - z) < settings.sight
-    sees = near_x & near_z
-    np.fill_diagonal(sees, val=False)
-    figure, other = np.nonzero(sees)
+    figure, other = _pairs(places, settings.sight)
     # when they are nearest, and how near
     gap = places[figure] - places[other]
     closing = velocities[figure] - velocities[other]
-    squared_speed = np.maximum((closing * closing).sum(axis=1), 1e-6)
-    seconds = (-(gap * closing).sum(axis=1) / squared_speed).clip(0, settings.soon)
+    seconds = _seconds_to_nearest(gap, closing).clip(0, settings.soon)
     nearest = gap + seconds[:, None] * closing
     # away from there; head on there is no way away from the other: to the right of the way there
     right = np.stack([gap[:, 1], -gap[:, 0]], axis=1)
@@ -54,6 +48,24 @@ def kept_apart(places: Array, velocities: Array, room: float, settings: Avoidanc
     changes = np.zeros_like(places)
     np.add.at(changes, figure, away * strength[:, None])
     return changes
+
+
+def _pairs(places: Array, sight: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All pairs (n,), (n,) of figures at places (B, 2) that see each other."""
+    x, z = places.T
+    near_x = np.abs(x[:, None] - x) < sight
+    near_z = np.abs(z[:, None] - z) < sight
+    sees = near_x & near_z
+    np.fill_diagonal(sees, val=False)
+    figure, other = np.nonzero(sees)
+    return figure, other
+
+
+def _seconds_to_nearest(gap: Array, closing: Array) -> Array:
+    """When pairs (n,) are nearest, with gaps (n, 2) that change by velocities (n, 2)."""
+    squared_speed = np.maximum((closing * closing).sum(axis=1), 1e-6)
+    seconds: Array = -(gap * closing).sum(axis=1) / squared_speed
+    return seconds
 
 
 def _unit(vectors: Array) -> Array:

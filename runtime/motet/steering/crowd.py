@@ -52,7 +52,10 @@ def picked(states: "Sequence[SteerSnapshot]", characters: Rows) -> "SteerSnapsho
 
 def _arrays(states: Sequence[Any], names: Sequence[str], characters: Rows) -> dict[str, NDArray[Any]]:
     """Fields that are arrays (B, ...), of the characters that are picked (n, ...)."""
-    return {name: np.concatenate([getattr(state, name) for state in states])[characters] for name in names}
+    arrays = dict[str, NDArray[Any]]()
+    for name in names:
+        arrays[name] = np.concatenate([getattr(state, name) for state in states])[characters]
+    return arrays
 
 
 def _whole(states: Sequence[Any], characters: Rows) -> Any:

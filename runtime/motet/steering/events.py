@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 Happening = Literal["left foot", "right foot", "take-off", "landing", "gait", "arrived", "act ended", "act begun"]
 
-DOWN, UP = 0.5, 0.2
-"""A foot comes down where its contact rises above the first, once it has been below the second."""
+DOWN = 0.5
+"""A foot comes down where its contact rises above this, once it has been below UP."""
+
+UP = 0.2
+"""A foot is up where its contact is below this."""
 
 FLIES = 2
 """Ticks without a foot on the ground after which a figure has taken off."""
@@ -18,9 +21,9 @@ FLIES = 2
 
 class Event(NamedTuple):
     """What happened to a character (its number) in a tick: a foot came down, both feet left the ground ("take-off",
-    also between the steps of a run), one came down again ("landing"), the figure now moves in another gait ("gait",
-    whose name is told), it has arrived where it was to go, or an act, whose name is told, was begun or is over: played
-    to its end, ended or replaced."""
+    also between the steps of a run), a foot came down again ("landing"), the figure now moves in another gait ("gait",
+    by name), it has arrived where it was sent, or an act, by name, was begun or is over: played to its end, ended or
+    replaced."""
 
     kind: Happening
     character: int
@@ -28,7 +31,7 @@ class Event(NamedTuple):
 
 
 class Done(NamedTuple):
-    """What a figure does: the name of an act, and the ticks since it was begun."""
+    """The act of a figure: its name, and the ticks since it was begun."""
 
     name: str
     age: int
@@ -36,21 +39,29 @@ class Done(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Happenings:
-    """Of B figures in a tick; replaced, never written into. down: (B, 2) whether the left and the right foot is down.
-    air: (B,) ticks since one was, -1 before the first tick. gait: (B,) numbers. arrived: (B,) whether they are where
-    they were to go. done: B acts."""
+    """The state of B figures in a tick, from which events follow; replaced, never written into."""
 
     down: NDArray[np.bool_]
+    """(B, 2) whether the left and the right foot is down."""
     air: NDArray[np.int64]
+    """(B,) ticks since a foot was down, -1 before the first tick."""
     gait: NDArray[np.int64]
+    """(B,) numbers."""
     arrived: NDArray[np.bool_]
+    """(B,) whether they are where they were sent."""
     done: tuple[Done | None, ...]
+    """B acts."""
 
     @staticmethod
     def none(figures: int) -> "Happenings":
         """Before the first tick."""
-        none, count = np.zeros(figures, dtype=bool), np.zeros(figures, dtype=np.int64)
-        return Happenings(np.zeros((figures, 2), dtype=bool), count - 1, count, none, (None,) * figures)
+        return Happenings(
+            down=np.zeros((figures, 2), dtype=bool),
+            air=np.full(figures, -1, dtype=np.int64),
+            gait=np.zeros(figures, dtype=np.int64),
+            arrived=np.zeros(figures, dtype=bool),
+            done=(None,) * figures,
+        )
 
     def after(
         self,
@@ -60,8 +71,7 @@ class Happenings:
         arrived: NDArray[np.bool_],
         done: tuple[Done | None, ...],
     ) -> "Happenings":
-        """Those of the next tick, of contacts (B, 2) and gaits (B,) that are asked for; shows: (B,) whether these are
-        played."""
+        """A tick later, with contacts (B, 2), ordered gaits (B,), and whether these are played (B,)."""
         down = contacts > DOWN
         down |= self.down & (contacts >= UP)
         begins = self.air < 0
@@ -69,7 +79,7 @@ class Happenings:
         return Happenings(down, air, np.where(shows | begins, gait, self.gait), arrived, done)
 
     def events(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
-        """What has happened since the tick before; ``gaits`` are the names of all."""
+        """The events since the tick before. gaits: the names of all."""
         unseen = before.air < 0
         if unseen.any():
             before = before._as(self, unseen)
@@ -84,7 +94,7 @@ class Happenings:
                 yield Event("act begun", character, new.name)
 
     def _as(self, other: "Happenings", which: NDArray[np.bool_]) -> "Happenings":
-        """With feet, gaits and ways of others in place of those of some figures (B,)."""
+        """With another state of feet, gaits and ways for some figures (B,)."""
         return Happenings(
             np.where(which[:, None], other.down, self.down),
             np.where(which, other.air, self.air),
@@ -95,7 +105,8 @@ class Happenings:
 
     def _moved(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
         """Of steps, flights, gaits and ways."""
-        flies, flew = self.air >= FLIES, before.air >= FLIES
+        flies = self.air >= FLIES
+        flew = before.air >= FLIES
         flags: dict[Happening, NDArray[np.bool_]] = {
             "left foot": self.down[:, 0] > before.down[:, 0],
             "right foot": self.down[:, 1] > before.down[:, 1],

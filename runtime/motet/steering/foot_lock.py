@@ -6,6 +6,7 @@ correction fades. Hip, knee and ankle follow (:class:`motet.figures.two_bones.Tw
 how long a foot will stand, is :mod:`motet.figures.feet.hold`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -54,7 +55,9 @@ class FootLockSettings(Settings):
     """Half-life in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
 
 
-POINTS = [(LEG.index(part), point) for part, points in SOLE.items() for point in points]
+HEEL, BALL = SOLE[LEG[2]]
+(TIP,) = SOLE[LEG[3]]
+POINTS = [(2, HEEL), (2, BALL), (3, TIP)]
 """Points of a sole, heel, ball and tip, and which joint of a leg carries each."""
 
 Pair = tuple[Part, Part]
@@ -89,9 +92,7 @@ class FootLock:
 
     def held(self, pose: Pose) -> Pose:
         """The next pose, one tick later, with standing feet held in place and above ground."""
-        half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
-        sine, cosine = parts(np.array([np.sin(half_facing), np.cos(half_facing)]).T)
-        hips = yawed(parts(pose.rotations[:, 0]), sine, cosine)
+        hips = _hips(pose)
         x, z, _ = parts(pose.ground)
         (height,) = parts(pose.height[:, None])
         feet = list[Foot]()
@@ -107,7 +108,7 @@ class FootLock:
     def _stood(self, foot: Foot, limb: Limb, hips: Quaternion, place: Vector) -> tuple[Foot, list[Quaternion]]:
         """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
         turned, places = joints_of(limb, hips, place)
-        soles = tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
+        soles = _soles(turned, places)
         foot_after, lift = self._shifted(foot, soles, limb.contact)
         played = limb.local[:3]
         shift_x, shift_z = foot_after.shift
@@ -143,15 +144,19 @@ class FootLock:
         drift_x = where(stands, 0.0, fade_rate_x)
         drift_z = where(stands, 0.0, fade_rate_z)
 
-        # a foot that moves over the ground while it is marked as a contact steps, higher the faster it moves
-        speed_over_ground = _length(shift_x - held_x, shift_z - held_z)
-        step_goal = contact * smaller(speed_over_ground * (settings.steps / swing_step), settings.steps)
-        lift = Inertializer(settings.lifts)
-        height_error, height_rate = lift.update(foot.height[0] - step_goal, foot.height[1], self.dt)
-        height = step_goal + height_error
-        foot_after = Foot((shift_x, shift_z), (drift_x, drift_z), (height, height_rate), soles)
+        # a foot that moves over the ground while it is marked as a contact steps
+        moved = _length(shift_x - held_x, shift_z - held_z)
+        height = self._step_height(foot, moved, contact)
+        foot_after = Foot((shift_x, shift_z), (drift_x, drift_z), height, soles)
         # no point of the sole is below the ground
-        return foot_after, larger(height - lowest, 0.0)
+        return foot_after, larger(height[0] - lowest, 0.0)
+
+    def _step_height(self, foot: Foot, moved: Part, contact: Part) -> Pair:
+        """How high a foot steps that has moved over the ground, higher the faster, and how fast that changes."""
+        settings = self.settings
+        goal = contact * smaller(moved * (settings.steps / (settings.swings * self.dt)), settings.steps)
+        error, rate = Inertializer(settings.lifts).update(foot.height[0] - goal, foot.height[1], self.dt)
+        return goal + error, rate
 
     def _sole_move(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Part, Part, Part]:
         """How far the point that bears a foot has moved over the ground since the last tick, along x and z; and the
@@ -178,6 +183,18 @@ class FootLock:
         if self.new is None:
             return foot.soles
         return tuple(_chosen(self.new, *pair) for pair in zip(soles, foot.soles, strict=True))
+
+
+def _hips(pose: Pose) -> Quaternion:
+    """Rotation of the hips in the world."""
+    half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
+    sine, cosine = parts(np.array([np.sin(half_facing), np.cos(half_facing)]).T)
+    return yawed(parts(pose.rotations[:, 0]), sine, cosine)
+
+
+def _soles(turned: Sequence[Quaternion], places: Sequence[Vector]) -> tuple[Vector, ...]:
+    """Where the points of a sole are, of rotations and places of a leg's joints."""
+    return tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
 
 
 def _length(x: Part, z: Part) -> Part:

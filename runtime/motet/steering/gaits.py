@@ -52,16 +52,18 @@ class Gaits:
         """A command's velocity along x and z, m/s, and its facing, radians, (B, 3), within limits; and gait and message
         for each figure whose command exceeds them."""
         moving = command.speed > 0
+        # the facing that the gait allows, and then the speed in that direction
         facing = np.where(moving, self._facing(command), command.facing)
         lowest, highest = self._speed_limits(command, facing)
         speed = np.where(moving, np.clip(command.speed, lowest, highest), 0.0)
         x = speed * np.sin(command.direction)
         z = speed * np.cos(command.direction)
+        # what is out of range
         exceeding = list[tuple[str, str]]()
         for figure in np.flatnonzero(np.abs(speed - command.speed) > 1e-6).tolist():
             name = self.names[command.gait[figure]]
-            limits = f"0 or {lowest[figure]:g}-{highest[figure]:g} m/s in this direction"
-            exceeding.append((name, f"{name!r} allows {limits}, not {command.speed[figure]:g}"))
+            limits = lowest[figure], highest[figure]
+            exceeding.append((name, _exceeds(name, limits, command.speed[figure])))
         return np.stack([x, z, wrapped(facing)], axis=1), exceeding
 
     def _facing(self, command: "Command") -> Array:
@@ -96,6 +98,12 @@ class Gaits:
     def _near(self, angle: Array) -> Array:
         near: Array = np.clip(wrapped(angle), -self.settings.ahead, self.settings.ahead)
         return near
+
+
+def _exceeds(name: str, limits: tuple[float, float], speed: float) -> str:
+    """The message about a gait's speed that is out of its limits."""
+    lowest, highest = limits
+    return f"{name!r} allows 0 or {lowest:g}-{highest:g} m/s in this direction, not {speed:g}"
 
 
 @dataclass(frozen=True, eq=False)

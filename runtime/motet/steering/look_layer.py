@@ -104,10 +104,7 @@ class LookLayer:
         # from the eyes, as they were turned a tick ago
         from_eyes = minus(points, _eyes(_turned(bones, played_gaze[:, 0], self.turn.shown)))
         wanted = _angles(from_eyes)
-        # a point behind: over the shoulder over which they look
-        behind = np.abs(wanted[:, 0]) > settings.behind
-        gaze_before = played_gaze[:, 0] + self.turn.wanted[:, 0]
-        wanted[:, 0] = np.where(behind, np.copysign(wanted[:, 0], gaze_before), wanted[:, 0])
+        wanted[:, 0] = self._over_shoulder(wanted[:, 0], played_gaze[:, 0], settings.behind)
         # a point above or below: hardly aside
         x, y, z = np.broadcast_arrays(*from_eyes)
         wanted[:, 0] *= np.minimum(np.hypot(x, z) / settings.under, 1)
@@ -116,6 +113,11 @@ class LookLayer:
         far = np.atleast_1d(distance > settings.near)
         largest = np.array([settings.aside, settings.up])
         return np.where(far[:, None], wanted.clip(-largest, largest) - played_gaze, 0.0)
+
+    def _over_shoulder(self, wanted: Array, played: Array, behind: float) -> Array:
+        """Angles to the left (B,), those to points behind over the shoulder over which figures look already."""
+        gaze_before = played + self.turn.wanted[:, 0]
+        return np.where(np.abs(wanted) > behind, np.copysign(wanted, gaze_before), wanted)
 
 
 def _in_spine(pose: Pose, points: Array) -> tuple[list[Quaternion], Vector]:

@@ -31,11 +31,15 @@ def matched(matcher: Matcher, playback: Playback, target: Array, gait: Rows) -> 
     query = matcher.query(matcher.desired_features(trajectory, row, mirror))
     squares = query.features[:, :-1].astype(np.float64) ** 2
     cost = matcher.cost_at(query, row, mirror) + squares.sum(axis=1) / 2
-    # the desired places in the world
+    return Matched(row, mirror > 0, cost, _path(trajectory, playback.root))
+
+
+def _path(trajectory: Array, root: Array) -> Array:
+    """The desired places (B, 3, 2) in the world of trajectories (B, TRAJECTORY) seen from roots (B, 3)."""
     left, forward = trajectory[:, : 2 * HORIZONS].reshape(-1, HORIZONS, 2).swapaxes(0, 2)
-    sin = np.sin(playback.root[:, 2])
-    cos = np.cos(playback.root[:, 2])
+    sin = np.sin(root[:, 2])
+    cos = np.cos(root[:, 2])
     x = cos * left + sin * forward
     z = cos * forward - sin * left
-    path = playback.root[:, None, :2] + np.stack([x, z], axis=-1).swapaxes(0, 1)
-    return Matched(row, mirror > 0, cost, path)
+    path: Array = root[:, None, :2] + np.stack([x, z], axis=-1).swapaxes(0, 1)
+    return path

@@ -86,6 +86,19 @@ class Playback:
         )
         return playback.copy()
 
+    def restart(self, figures: Rows, row: Rows, mirror: Rows) -> None:
+        """Let figures (n,) play rows (n,) and mirror images (n,) as they are recorded."""
+        self.row[figures] = row
+        self.mirror[figures] = mirror
+        self.part[figures] = 0
+        self.rate[figures] = 1
+        self.offset[figures] = 0
+        self.offset_rate[figures] = 0
+        self.warp[figures] = 0
+        self.warp_rate[figures] = 0
+        self.stride[figures] = 1
+        self.stride_rate[figures] = 0
+
     def hasten(self, changed: Flags) -> None:
         """Let figures (B,) search in the next tick, unless they search in their turn alone."""
         self.ticks_to_search[changed & ~self.in_turn] = 0
@@ -289,15 +302,23 @@ class Matcher:
         # slow walks: a gait with slow recordings needs no time-stretching
         speed = table.frames[0, :, -3]
         self.stretched = np.array([is_faster(speed[shows], settings) for shows in table.shows.T], dtype=np.bool_)
+        self.goals = self._goals()
+
+    def _goals(self) -> list[Goals]:
+        """The rows of each gait that may be jumped to."""
+        table = self.table
+        settings = self.settings
+        speed = table.frames[0, :, -3]
         # rows just before take-off are no entry points: the arm swing would be cut
         flies_soon = np.convolve(self.flies, np.ones(settings.prepares + 1))[settings.prepares :] > 0
         leaps = (speed == 0) & flies_soon
         enterable = (table.left >= self.least_left) & ~(self.flies | leaps)
-        self.goals = list[Goals]()
+        goals = list[Goals]()
         for shows in table.shows.T:
             rows = np.flatnonzero(shows & enterable)[:: settings.row_step]
             columns = self.costs[:, rows].reshape(-1, FEATURES + 1)
-            self.goals.append(Goals.of(rows, columns, self.TILE))
+            goals.append(Goals.of(rows, columns, self.TILE))
+        return goals
 
     def stillest(self, gait: int) -> int:
         """The row of a gait with the least speed, among those on the ground that others follow."""
@@ -323,13 +344,16 @@ class Matcher:
         query = self.query(self.desired_features(trajectory, row, mirror))
         best, best_mirror, best_cost = self.best(query, gait)
         # the present row is kept if the best one is near it or hardly better
-        near = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)  # on either side
-        bias = np.where(slow_walk, 0, self.settings.continuing)
-        cheap = self.cost_at(query, row, mirror) <= best_cost + bias
-        fits = self.table.shows[row, gait] & (near | cheap)
+        cheap = self.cost_at(query, row, mirror) <= best_cost + np.where(slow_walk, 0, self.settings.continuing)
+        fits = self.table.shows[row, gait] & (self._is_near(best, row) | cheap)
         # never leave a row in mid-air; always leave one whose recording is about to end
         stays = (self.flies[row] | fits) & (self.table.left[row] >= self.reserve)
         self.jump(playback, due[~stays], best[~stays], best_mirror[~stays])
+
+    def _is_near(self, best: Rows, row: Rows) -> Flags:
+        """Whether rows (n,) are too near to the present ones (n,) to be jumped to, mirrored or not."""
+        near: Flags = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)
+        return near
 
     def is_slow_walk(self, target: Array, gait: Rows) -> Flags:
         """Which figures with targets (n, 3) in gaits (n,) are to go more slowly than recordings do."""

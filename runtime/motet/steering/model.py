@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,8 @@ from motet.steering.step import LOOPS, PoseCodes
 SPREAD_FROM = 32
 """Number of characters from which the searches of a session are spread over the ticks."""
 
+CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone, kind in product(BONES, SIXD_KINDS)))
+
 FEATURE_STEPS = 16
 """Steps of a scaled unit of a feature in a table, whose features have 8 bits."""
 
@@ -73,7 +76,7 @@ class SteerModel(ControlModel):
         low, usual, high = (column.tolist() for column in self.abilities.speeds.T[:3])
         self.speeds = dict(zip(self.gaits, zip(low, high, strict=True), strict=True))
         self.usual = dict(zip(self.gaits, usual, strict=True))
-        if self.contract.channels != (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS)):
+        if self.contract.channels != CHANNELS:
             raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
         self.matcher = Matcher(self._table(config), settings, self.fps)
@@ -81,6 +84,10 @@ class SteerModel(ControlModel):
             self.table("pose_mean", "P", "float32").astype(np.float64),
             self.table("pose_basis", "K P", "float16").astype(np.float64),
         )
+        self._check_goals()
+
+    def _check_goals(self) -> None:
+        """BundleError for a gait without a row to jump to."""
         for gait, goals in zip(self.gaits, self.matcher.goals, strict=True):
             if not len(goals.rows):
                 need = self.matcher.least_left
@@ -139,15 +146,17 @@ class SteerModel(ControlModel):
         number = self.abilities.number(gait)
         spread = self.phases(characters, phases)
         playback = Playback.at(self.matcher.stillest(number), characters, self.sizes["K"], spread)
-        if not (words is None or hasattr(words, "act") or isinstance(words, GenerateModel)):
-            raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
-        sentence_acts = SaidActs(self, words) if isinstance(words, GenerateModel) else words
-        session = SteerSession(self, playback, number, hold_feet, strict, sentence_acts)
+        session = SteerSession(self, playback, number, hold_feet, strict, self._sentence_acts(words))
         if isinstance(start, Motion):
             session.take(self.pose_of(start))
         if places is not None:
             session.put(places)
         return session
+
+    def _sentence_acts(self, words: GenerateModel | SaidActs | None) -> SaidActs | None:
+        if not (words is None or hasattr(words, "act") or isinstance(words, GenerateModel)):
+            raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
+        return SaidActs(self, words) if isinstance(words, GenerateModel) else words
 
     def phases(self, characters: int, given: ArrayLike | None = None) -> Rows | None:
         """The phase of each character; None for those that search after every command."""

@@ -1,8 +1,4 @@
-"""Live figures: the pose of characters at one moment, for engines, and the springs that move them.
-
-A critically damped spring is the fastest return to rest without overshoot. The distance from rest after t seconds is
-(d + (v + d y) t) exp(-y t): d and v are its start and its rate there, y the damping.
-"""
+"""Live figures: the pose of characters at one moment, for engines."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,6 +12,10 @@ from motet.steering.events import Event
 
 Floats = NDArray[np.float32]
 Values = NDArray[Any]
+
+
+BONE_JOINTS = [HUMANOID.index(bone) for bone in BONES]
+"""The joints of the humanoid at which its bones begin."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,8 +36,10 @@ class Pose:
 
     def read_only(self) -> "Pose":
         """The same, whose arrays cannot be written into: what a session gives is the state that it goes on from."""
-        ground, rotations = self.ground.view(), self.rotations.view()
-        height, contacts = self.height.view(), self.contacts.view()
+        ground = self.ground.view()
+        rotations = self.rotations.view()
+        height = self.height.view()
+        contacts = self.contacts.view()
         for array in (ground, rotations, height, contacts):
             array.flags.writeable = False
         return Pose(ground, rotations, height, contacts, self.events)
@@ -65,8 +67,10 @@ class Pose:
         """Root motion (B, 3) since an earlier pose: forward and to the left in metres, seen from the facing then, and
         the turn to the left in radians."""
         step = self.ground - before.ground
-        sin, cos = np.sin(before.ground[:, 2]), np.cos(before.ground[:, 2])
-        forward, left = sin * step[:, 0] + cos * step[:, 1], cos * step[:, 0] - sin * step[:, 1]
+        sin = np.sin(before.ground[:, 2])
+        cos = np.cos(before.ground[:, 2])
+        forward = sin * step[:, 0] + cos * step[:, 1]
+        left = cos * step[:, 0] - sin * step[:, 1]
         return np.stack([forward, left, wrapped(step[:, 2])], axis=1)
 
     def positions(self) -> Array:
@@ -78,7 +82,7 @@ class Pose:
         count = len(HUMANOID.names)
         turned = np.zeros((count, len(self), 4), dtype=np.float32)
         turned[..., 3] = 1
-        turned[[HUMANOID.index(bone) for bone in BONES]] = np.swapaxes(self.rotations, 0, 1)
+        turned[BONE_JOINTS] = np.swapaxes(self.rotations, 0, 1)
         places = np.empty((count, len(self), 3))
         turned[0] = quat_product(self.heading, turned[0])
         places[0] = self.place

@@ -37,7 +37,7 @@ from motet.motion.scalar_or_batch import (
 from motet.settings import Range, Settings
 from motet.steering.follower import Follower
 from motet.steering.matching import Flags
-from motet.steering.pose import Pose
+from motet.steering.pose import Floats, Pose
 from motet.steering.settings import HalfLife, Metres, Radians, Share
 
 
@@ -110,25 +110,33 @@ class ReachLayer:
             return self, pose
         has_point = ~np.isnan(self.points[:, 0])
         rests = self.weight.shown < LEAST
-        # the aim follows the point; that of an arm at rest is there at once, as its weight takes it there
+        aim = self._aimed(has_point, rests, settings, seconds)
+        # the weight goes to 1, or back to 0
+        weight = self.weight.after(has_point[:, None].astype(np.float64), 0.5, settings.half_life, seconds)
+        # the arm
+        turned, beyond = _reached(pose, self.side, aim.shown, weight.shown[:, 0], settings)
+        rotations = self._with_arms(pose.rotations, turned, has_point | ~rests[:, 0])
+        layer = replace(self, aim=aim, weight=weight, beyond=beyond & has_point)
+        return layer, replace(pose, rotations=rotations)
+
+    def _with_arms(self, rotations: Floats, arms: tuple[Quaternion, Quaternion], moves: Flags) -> Floats:
+        """Local quaternions (B, J, 4) with upper arms and forearms of the figures that move theirs (B,)."""
+        rotations = rotations.copy()
+        for part, quats in zip(PARTS[1:3], arms, strict=True):
+            bone = BONES.index(sided(LEFT_RIGHT[self.side], part))
+            rotations[moves, bone] = np.transpose(quats).reshape(-1, 4)[moves]
+        return rotations
+
+    def _aimed(self, has_point: Flags, rests: Flags, settings: ReachSettings, seconds: float) -> Follower:
+        """The aim a tick later: it follows the point; that of an arm at rest (B, 1) is there at once, as its weight
+        takes the arm there."""
         wanted = np.where(has_point[:, None], self.points, self.aim.wanted)
         aim = Follower(
             np.where(rests, wanted, self.aim.wanted),
             np.where(rests, 0 * wanted, self.aim.offset),
             np.where(rests, 0 * wanted, self.aim.offset_rate),
         )
-        aim = aim.after(wanted, settings.leap, settings.half_life, seconds)
-        # the weight goes to 1, or back to 0
-        weight = self.weight.after(has_point[:, None].astype(np.float64), 0.5, settings.half_life, seconds)
-        # the arm
-        turned, beyond = _reached(pose, self.side, aim.shown, weight.shown[:, 0], settings)
-        rotations = pose.rotations.copy()
-        moves = has_point | ~rests[:, 0]
-        for part, quats in zip(PARTS[1:3], turned, strict=True):
-            bone = BONES.index(sided(LEFT_RIGHT[self.side], part))
-            rotations[moves, bone] = np.transpose(quats).reshape(-1, 4)[moves]
-        layer = replace(self, aim=aim, weight=weight, beyond=beyond & has_point)
-        return layer, replace(pose, rotations=rotations)
+        return aim.after(wanted, settings.leap, settings.half_life, seconds)
 
 
 def _reached(
@@ -140,9 +148,8 @@ def _reached(
     offsets = [HUMANOID.joints[HUMANOID.index(BONES[bone])].offset for bone in bones]
     shoulder, upper, lower, hand = (parts(pose.rotations[:, bone]) for bone in bones)
     # from the shoulder to the point, in the frame of the upper chest
-    chest_place, chest = _chest(pose)
     arm_start = plus(offsets[0], rotated(shoulder, offsets[1]))
-    to_point = minus(rotated(inverse(chest), minus(parts(points), chest_place)), arm_start)
+    to_point = minus(_in_chest(pose, points), arm_start)
     # the arm that is forward and half bent, brought as near as it can
     palm = plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0)))
     arm = _ready_arm(side, offsets[2], palm)
@@ -151,10 +158,11 @@ def _reached(
     ready_upper, ready_lower = READY[side]
     reaching_upper = product(turn_upper, ready_upper)
     reaching_lower = product(turn_lower, ready_lower)
-    # mixed with the recorded arm
+    # mixed with the recorded arm, in the frames of the parents
     (share,) = parts(weight[:, None])
     mixed_upper = _mixed(upper, product(inverse(shoulder), reaching_upper), share)
     mixed_lower = _mixed(lower, product(inverse(reaching_upper), reaching_lower), share)
+    # how far the hand still is from the point
     missing = length(minus(reachable, to_point))
     return (mixed_upper, mixed_lower), np.array(missing > settings.reached).reshape(-1)
 
@@ -162,6 +170,12 @@ def _reached(
 def _out(side: int) -> float:
     """1 for the left side, which is at positive x, -1 for the right."""
     return 1.0 - 2.0 * side
+
+
+def _in_chest(pose: Pose, points: Array) -> Vector:
+    """Points (B, 3) of the world in the frame of the upper chest."""
+    place, chest = _chest(pose)
+    return rotated(inverse(chest), minus(parts(points), place))
 
 
 def _chest(pose: Pose) -> tuple[Vector, Quaternion]:
@@ -205,17 +219,8 @@ READY = _ready(0), _ready(1)
 def _within(to_point: Vector, side: int, longest: Part, settings: ReachSettings) -> Vector:
     """The place nearest to a point (from the shoulder, in the frame of the upper chest) that an arm of a length reaches
     within the limits of turning and stretching."""
-    widest_cosine = np.cos(settings.widest)
-    axis = unit((_out(side), 0.0, 1.0))
+    x, y, z = _turnable(to_point, side, settings.widest)
     distance = length(to_point)
-    # directions beyond the widest are brought to the edge of that cone
-    along = dot(to_point, axis)
-    across = minus(to_point, times(axis, along))
-    edge_along = times(axis, widest_cosine * distance)
-    edge_across = times(unit(across), root(1 - widest_cosine * widest_cosine) * distance)
-    edge = plus(edge_along, edge_across)
-    inside = along >= widest_cosine * distance
-    x, y, z = (where(inside, value, limit) for value, limit in zip(to_point, edge, strict=True))
     # distances beyond the straight arm are eased towards its full length
     straight = settings.straight * longest
     stretch = settings.stretched * longest
@@ -224,6 +229,21 @@ def _within(to_point: Vector, side: int, longest: Part, settings: ReachSettings)
     reached = where(over > 0, eased, larger(distance, settings.nearest * longest))
     factor = reached / larger(distance, 1e-12)
     return x * factor, y * factor, z * factor
+
+
+def _turnable(to_point: Vector, side: int, widest: float) -> Vector:
+    """The vector to a point, brought to the edge of the cone of directions within ``widest`` radians if beyond it."""
+    widest_cosine = np.cos(widest)
+    axis = unit((_out(side), 0.0, 1.0))
+    distance = length(to_point)
+    along = dot(to_point, axis)
+    across = minus(to_point, times(axis, along))
+    edge_along = times(axis, widest_cosine * distance)
+    edge_across = times(unit(across), root(1 - widest_cosine * widest_cosine) * distance)
+    edge = plus(edge_along, edge_across)
+    inside = along >= widest_cosine * distance
+    x, y, z = (where(inside, value, limit) for value, limit in zip(to_point, edge, strict=True))
+    return x, y, z
 
 
 def _mixed(first: Quaternion, second: Quaternion, share: Part) -> Quaternion:

@@ -26,29 +26,33 @@ SIGNED = f"-?({NUMBER})"
 
 @dataclass(frozen=True)
 class Order:
-    """gait: None for the previous one. speed: m/s, None for the gait's usual one, -1 for the previous one.
-
-    way: of travel, in degrees from the facing, None for the previous one. turn: degrees to the left. caption: in words.
-    act: a sentence of what is done, beside what was ordered before. goal: x and z in metres to go to; facing: there, in
-    degrees, None for any.
-    """
+    """A part of a script."""
 
     gait: str | None
+    """None for the previous one."""
     speed: float | None
+    """m/s, None for the gait's usual one, -1 for the previous one."""
     way: float | None
+    """Direction of travel, in degrees from the facing, None for the previous one."""
     turn: float
+    """Degrees to the left."""
     seconds: float
     caption: str
+    """The order in words."""
     act: str | None = None
+    """A sentence to act, beside what was ordered before."""
     goal: tuple[float, float] | None = None
+    """x and z in metres to go to."""
     facing: float | None = None
+    """The facing there, in degrees, None for any."""
 
 
 def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
     """Parse a script of orders over known gaits; ScriptError marks the place of an error."""
-    orders, words = list[Order](), list[tuple[str, int]]()
-    found = [(match[0], match.start()) for match in re.finditer(r"[^\s,]+|,", script)]
-    for word, place in [*found, (",", len(script))]:
+    orders = list[Order]()
+    words = list[tuple[str, int]]()
+    tokens = [(match[0], match.start()) for match in re.finditer(r"[^\s,]+|,", script)]
+    for word, place in [*tokens, (",", len(script))]:
         if word != ",":
             words.append((word, place))
             continue
@@ -65,7 +69,9 @@ class _Words:
     """The words of one order with their places, taken one after the other."""
 
     def __init__(self, script: str, words: Sequence[tuple[str, int]]) -> None:
-        self.script, self.left, self.place = script, deque(words), 0
+        self.script = script
+        self.left = deque(words)
+        self.place = 0
         self.caption = " ".join(word for word, _ in words)
 
     def order(self, gaits: Sequence[str]) -> Order:
@@ -76,43 +82,50 @@ class _Words:
             return self.go()
         if kind not in (*gaits, *OTHERS):
             raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHERS))}")
-        found = self.turn() if kind == "turn" else {}
-        while self.left:
-            detail = self.detail()
-            for name in detail.keys() & found.keys():
-                raise self.fail(f"this order gives its {name} twice")
-            found |= detail
-        turn, seconds = found.get("turn", 0.0), found.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)
+        details = self.details(self.turn() if kind == "turn" else {})
+        turn = details.get("turn", 0.0)
+        seconds = details.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)
         if kind == "stop":
             return Order(None, 0.0, None, turn, seconds, self.caption)
         if kind == "turn":
-            return Order(None, found.get("speed", -1.0), found.get("way"), turn, seconds, self.caption)
-        return Order(kind, found.get("speed"), found.get("way", 0.0), turn, seconds, self.caption)
+            return Order(None, details.get("speed", -1.0), details.get("way"), turn, seconds, self.caption)
+        return Order(kind, details.get("speed"), details.get("way", 0.0), turn, seconds, self.caption)
 
     def act(self) -> Order:
         words = [self.take("what to do, such as 'wave'"), *(word for word, _ in self.left)]
         last = re.fullmatch(f"({NUMBER})s", words[-1])
-        said = " ".join(words[:-1] if last else words).strip("'\"")
-        if not said:
+        sentence = " ".join(words[:-1] if last else words).strip("'\"")
+        if not sentence:
             raise self.fail("expected what to do, such as act 'wave'")
-        return Order(None, -1.0, None, 0.0, float(last[1]) if last else 3.0, said, said)
+        seconds = float(last[1]) if last else 3.0
+        return Order(None, -1.0, None, 0.0, seconds, sentence, act=sentence)
 
     def go(self) -> Order:
         if self.take("to") != "to":
             raise self.fail("expected to, such as go to 2 3.5")
         goal = self.number("x in metres", SIGNED), self.number("z in metres", SIGNED)
-        found = dict[str, float]()
+        details = dict[str, float]()
         while self.left:
             if self.left[0][0] == "facing":
                 self.take("facing")
                 more = {"facing": self.number("degrees", SIGNED)}
             else:
                 more = self.detail()
-            if more.keys() & (found.keys() | {"turn", "way"}):
+            if more.keys() & (details.keys() | {"turn", "way"}):
                 raise self.fail("go to takes seconds, speed and facing, each once")
-            found |= more
-        seconds = found.get("seconds", 5.0)
-        return Order(None, found.get("speed"), None, 0.0, seconds, self.caption, None, goal, found.get("facing"))
+            details |= more
+        seconds = details.get("seconds", 5.0)
+        facing = details.get("facing")
+        return Order(None, details.get("speed"), None, 0.0, seconds, self.caption, goal=goal, facing=facing)
+
+    def details(self, details: dict[str, float]) -> dict[str, float]:
+        """All details of the order, with those that are known."""
+        while self.left:
+            detail = self.detail()
+            for name in detail.keys() & details.keys():
+                raise self.fail(f"this order gives its {name} twice")
+            details |= detail
+        return details
 
     def detail(self) -> dict[str, float]:
         word = self.take("more")

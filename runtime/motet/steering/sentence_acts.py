@@ -1,4 +1,4 @@
-"""Acts by sentence: what a figure that is steered is told to do in words, made by a generate model."""
+"""Acts by sentence: made by a generate model, for steered figures."""
 
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from motet.steering.model import SteerModel
 
 SECONDS = 3.0
-"""That are generated: of a motion that lasts longer the act that its sentence means."""
+"""Duration that is generated of a motion that lasts longer than the act of its sentence."""
 
 
 KEPT = 256
@@ -22,7 +22,8 @@ class SaidActs:
     """Acts for a model, each made once: sessions and threads can share it."""
 
     def __init__(self, model: "SteerModel", words: GenerateModel) -> None:
-        self.model, self.words = model, words
+        self.model = model
+        self.words = words
         self._made: dict[str, tuple[Act, Shown, list[str]]] = {}
 
     def act(self, sentence: str) -> Act:
@@ -46,25 +47,25 @@ class SaidActs:
             act = self.model.act_of(made.motion, sentence)
             known = act, Shown(made.action, made.lacking, made.confidence), each_once(notes)
             self._made[sentence] = known
-        act, shown, said = known
-        for text in said:
-            warn(text, TextWarning)
+        act, shown, warnings = known
+        for warning in warnings:
+            warn(warning, TextWarning)
         return act, shown
 
     def _known(self, sentence: str) -> str:
-        """A sentence that the model knows: itself, or what a person does who is told it."""
+        """A sentence that the model knows: the given one, or that order in the third person."""
         self.words.vocabulary.encode(sentence)  # an order without words is none, though "a person" is known
         try:
             self.words.check(sentence, lacking=False)
         except TextError:
-            told = _of_a_person(sentence)
+            in_third_person = _of_a_person(sentence)
             try:
-                self.words.check(told, lacking=False)
+                self.words.check(in_third_person, lacking=False)
             except TextError:
-                told = ""
-            if not told:
+                in_third_person = ""
+            if not in_third_person:
                 raise
-            return told
+            return in_third_person
         return sentence
 
 

@@ -121,12 +121,7 @@ class SteerSession(Guided):
         strict; a gait that only goes forward faces the way it goes. ControlError for values that are not numbers or do
         not fit; the control is unchanged then.
         """
-        numbers = dict[str, Array]()
-        for name, value in (("speed", speed), ("direction", direction), ("facing", facing)):
-            if value is not None:
-                numbers[name] = self._numbers(f"{name} needs a number", value)
-        for name in numbers.keys() & {"direction", "facing"}:
-            numbers[name] = np.radians(numbers[name])
+        numbers = self._command_numbers(speed, direction, facing)
         before = self._command
         gaits = None if gait is None else self._gaits(gait)
         if velocity is None:
@@ -147,6 +142,18 @@ class SteerSession(Guided):
     def target(self) -> Array:
         """Velocity along x and z, m/s, and facing, radians (characters, 3), within the limits of gaits."""
         return self._target.copy()
+
+    def _command_numbers(
+        self, speed: ArrayLike | None, direction: ArrayLike | None, facing: ArrayLike | None
+    ) -> dict[str, Array]:
+        """What a command gives of speed, direction and facing, angles in radians."""
+        numbers = dict[str, Array]()
+        for name, value in (("speed", speed), ("direction", direction), ("facing", facing)):
+            if value is not None:
+                numbers[name] = self._numbers(f"{name} needs a number", value)
+        for name in numbers.keys() & {"direction", "facing"}:
+            numbers[name] = np.radians(numbers[name])
+        return numbers
 
     def _set(self, command: Command) -> None:
         """Obey a command; ControlError or one warning for each gait whose limits it exceeds."""
@@ -288,13 +295,14 @@ class SteerSession(Guided):
         for action in each:
             if id(action) not in made:
                 made[id(action)] = self._acts_of(action, shown)
-        # a character that moves does the take that leads the farthest
         for character, action in zip(characters, each, strict=True):
-            acts = made[id(action)]
-            choose = max if self._target[character, :2].any() else min
-            act = choose(acts, key=lambda act: act.reach) if acts else None
-            self._actions.orders[character] = (act, upper)
+            self._actions.orders[character] = (self._take(character, made[id(action)]), upper)
         return shown
+
+    def _take(self, character: int, acts: tuple[Act, ...]) -> Act | None:
+        """The act that leads the farthest if the character moves, else the least far; None of none."""
+        choose = max if self._target[character, :2].any() else min
+        return choose(acts, key=lambda act: act.reach) if acts else None
 
     def prepare(self, *sentences: str) -> list[Shown]:
         """Make acts of sentences, so that :meth:`act` has them at once; what they are shown as. It may be called in

@@ -235,11 +235,14 @@ def _moved(
     # heading correction: the step turned towards the velocity of the springs, by a small angle
     correction = where(moving, _heading_correction(step_x, step_z, spring, settings), 0.0)
     next_root = x + (step_x + correction * step_z), z + (step_z - correction * step_x), next_facing
-    # the next playback rate: as fast as the springs; a slow walk shares the slowness between rate and stride
-    slowest = where(slow_walk, settings.creep_slowest, settings.slowest)
-    playback_rate = where(slow_walk, root_of(speed_ratio), speed_ratio)
-    playback_rate = where(moving, clipped(playback_rate, slowest, settings.fastest), 1.0)
+    playback_rate = where(moving, _playback_rate(speed_ratio, slow_walk, settings), 1.0)
     return Moved(next_root, playback_rate, where(slow_walk, smaller(stride, 1.0), 1.0))
+
+
+def _playback_rate(speed_ratio: Part, slow_walk: Part, settings: SteeringSettings) -> Part:
+    """The playback rate that is as fast as the springs; a slow walk shares the slowness between rate and stride."""
+    slowest = where(slow_walk, settings.creep_slowest, settings.slowest)
+    return clipped(where(slow_walk, root_of(speed_ratio), speed_ratio), slowest, settings.fastest)
 
 
 def _facing_correction(

@@ -186,16 +186,16 @@ class Guided(ABC):
             after[characters] = self._numbers("points need x, y and z", points, 3, count=len(characters))
         return after
 
-    def _chosen(self, who: CharacterIds) -> Rows:
+    def _chosen(self, ids: CharacterIds) -> Rows:
         """The numbers of characters."""
-        if who is None:
+        if ids is None:
             return np.arange(self.characters)
-        numbers = np.atleast_1d(np.array(who))
+        numbers = np.atleast_1d(np.array(ids))
         are_whole = numbers.ndim == 1 and numbers.dtype.kind in "iu" and len(numbers) > 0
         exist = are_whole and (numbers >= 0).all() and (numbers < self.characters).all()
         if not exist or len(set(numbers)) < len(numbers):
             raise ControlError(
-                f"who must be numbers of characters from 0 to {self.characters - 1}, none twice, not {who!r}"
+                f"who must be numbers of characters from 0 to {self.characters - 1}, none twice, not {ids!r}"
             )
         return numbers.astype(np.int64)
 
