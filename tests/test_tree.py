@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 265
+MOST_LARGE_FUNCTIONS = 250
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 500
-MOST_TUPLE_ASSIGNMENTS = 151
-MOST_NESTED_COMPREHENSIONS = 145
+MOST_BANNED_NAMES = 490
+MOST_TUPLE_ASSIGNMENTS = 140
+MOST_NESTED_COMPREHENSIONS = 140
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -102,7 +102,7 @@ CEILINGS = {
     "motet.representation": 9_400,
     "motet.search": 3_500,
     "motet.serve": 17_000,
-    "motet.steering": 36_900,
+    "motet.steering": 37_800,
     "motet.text": 5_300,
     "motet_export": 8_700,
     "motet_train": 9_400,
