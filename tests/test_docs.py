@@ -132,6 +132,17 @@ def test_the_readmes_commands_run_in_their_order(clone: Path) -> None:
         assert "-o" not in words or (clone / words[words.index("-o") + 1]).stat().st_size > 0
 
 
+def test_the_readmes_lines_of_the_papers_run(clone: Path) -> None:
+    """The table has a line for each bundle that is a paper's system, and each runs."""
+    rows = re.findall(r"^\|[^\n]*`(motet [^`]*--bundle [^`]*)`[^\n]*$", PAGES["README.md"].read_text(), re.MULTILINE)
+    bundles = [re.findall(r"--bundle (\S+)", row)[0] for row in rows]
+    assert sorted(bundles) == ["convseq2seq", "language-to-motion", "motion-to-language", "tdbn"]
+    for row in rows:
+        result = CliRunner().invoke(main, shlex.split(row)[1:])
+        assert (row, result.exit_code, result.stderr) == (row, 0, "")
+        assert result.stdout
+
+
 def test_the_speeds_of_the_servers_first_message_are_the_models() -> None:
     model = load_as(SteerModel, "control")
     slowest, fastest = model.speeds["walk"]

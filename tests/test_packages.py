@@ -1,8 +1,7 @@
-"""What the packages say of themselves on an index."""
+"""What the package says of itself on an index."""
 
 import importlib.util
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -33,14 +32,3 @@ def test_links_and_pictures_of_the_description_lead_to_files_of_the_repository(d
     paths = [re.sub(r"^/(raw|blob)/main/|#.*", "", target) for target in own]
     assert [path for path in paths if not (ROOT / path).is_file()] == []
     assert {target.rsplit(".", 1)[1] for target in own if target.startswith("/raw")} <= {"png", "gif"}
-
-
-def test_the_papers_package_fits_this_version_of_motet() -> None:
-    own, papers = (
-        tomllib.loads((ROOT / place / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-        for place in ("", "papers")
-    )
-    (needed,) = papers["dependencies"]
-    assert own["version"].startswith(needed.removeprefix("motet>="))
-    assert (ROOT / "papers/LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
-    assert (ROOT / "papers/NOTICE").read_text() in (ROOT / "NOTICE").read_text()

@@ -17,7 +17,15 @@ from motet.models.base import BundleModel
 from motet.models.load import build, kind_of
 from motet_export.decoded import differences, golden_vectors, whole_runs
 from motet_export.exporter import ExportError, export_graph, halved, quantised, round_weights
-from motet_export.parity import Examples, check_carried, check_one_step, check_runs, examples
+from motet_export.parity import (
+    Examples,
+    check_carried,
+    check_far,
+    check_meaning,
+    check_one_step,
+    check_runs,
+    examples,
+)
 from motet_train.runs import Run
 
 log = logging.getLogger("motet.export")
@@ -48,7 +56,7 @@ def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False
         files = {name: quantised(data) for name, data in files.items()}
         onnx = _loaded(torch, files)
         report["int8"] = differences(onnx, exact)
-    _write(out, onnx, files, {**run.manifest, "parity": report}, examples(torch.manifest, torch.graphs))
+    _write(out, onnx, files, {**run.manifest, "parity": report}, examples(torch.manifest, torch.graphs, far=True))
     return report
 
 
@@ -94,8 +102,18 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     onnx = _loaded(exact, files)
     changes = differences(onnx, exact)
     report = {**bundle.manifest.parity, "weights": "float16", "half": changes}
-    _write(out, onnx, files, {**bundle.manifest.source, "parity": report}, examples(bundle.manifest, exact.graphs))
+    draws = examples(bundle.manifest, exact.graphs, far=True)
+    _write(out, onnx, files, {**bundle.manifest.source, "parity": report}, draws)
     return changes
+
+
+def renew_golden(bundle: Bundle, out: str | Path) -> None:
+    """Copy a bundle to ``out`` with golden vectors as today's code makes them; nothing else changes."""
+    check_place(out)
+    manifest = bundle.manifest
+    model = kind_of(manifest).load(bundle)
+    files = {f"{role}.onnx": bundle.read(graph.file) for role, graph in manifest.graphs.items()}
+    _write(out, model, files, manifest.source, examples(manifest, model.graphs, far=True))
 
 
 def _loaded(model: BundleModel, files: Mapping[str, bytes]) -> BundleModel:
@@ -134,15 +152,24 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
     if bundle.manifest.parity.get("weights") == "float16":
         round_weights(run.model)
     model = kind_of(bundle.manifest).load(bundle, options)
-    return parity(model, build(bundle.manifest, run.torch_graphs(), run.model.tables()))
+    return parity(model, run.bundle_model())
+
+
+def _single_calls(onnx: BundleModel, torch: BundleModel, draws: Mapping[str, Examples]) -> dict[str, Any]:
+    """The rungs of each graph alone: inputs like the data's, and inputs far from all data."""
+    far = examples(torch.manifest, torch.graphs, far=True)
+    report: dict[str, Any] = {}
+    for role, graph in torch.graphs.items():
+        report[f"{role}.one_step"] = check_one_step(role, onnx.graphs[role], graph, draws[role])
+        report[f"{role}.far"] = check_far(role, onnx.graphs[role], graph, far[role])
+    return report
 
 
 def parity(onnx: BundleModel, torch: BundleModel) -> dict[str, Any]:
     """Climb the parity ladder and return the report for the manifest; ExportError at the first rung that fails."""
-    draws = examples(onnx.manifest, torch.graphs)
-    report: dict[str, Any] = {}
-    for role, graph in torch.graphs.items():
-        report[f"{role}.one_step"] = check_one_step(role, onnx.graphs[role], graph, draws[role])
+    check_meaning(onnx, torch)
+    draws = examples(torch.manifest, torch.graphs)
+    report = _single_calls(onnx, torch, draws)
     # a predictor's encoder is called again after its horizon
     horizon = int(onnx.defaults["horizon"]) if onnx.VERB == "predict" else None
     if "step" in torch.graphs:

@@ -11,7 +11,7 @@ from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.files import new_folder
 from motet.models.load import KINDS
-from motet_export.bundles import export_run, halve_bundle, parity_of
+from motet_export.bundles import export_run, halve_bundle, parity_of, renew_golden
 from motet_export.restored import restored
 from motet_train.runs import MANIFEST, Run
 
@@ -24,25 +24,33 @@ from motet_train.runs import MANIFEST, Run
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
 @click.option("--back", is_flag=True, help="RUN is a bundle: write a training run with its weights, to train on from.")
-def export(run: Path, out: Path, int8: bool, half: bool, back: bool) -> None:
+@click.option("--golden", is_flag=True, help="RUN is a bundle: copy it with golden vectors as today's code makes them.")
+def export(run: Path, out: Path, int8: bool, half: bool, back: bool, golden: bool) -> None:
     """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes the same as torch.
 
     RUN may be the folder that `motet train all` wrote: then OUT gets a bundle of each run that is a model by itself.
     With --half, RUN may also be a bundle: it is copied with rounded weights.
     """
+    if back or golden or (half and run.suffix == ".zip"):
+        _rewrite(Bundle.open(run), out, back, golden)
+        return
+    for path, trained in _runs(run, out).items():
+        report = export_run(trained, path, int8, half)
+        click.echo(_lines(report))
+        _show("int8", report.get("int8", {}))
+        click.echo(str(path))
+
+
+def _rewrite(bundle: Bundle, out: Path, back: bool, golden: bool) -> None:
+    """Write a bundle as a run, or copy it with new golden vectors, or else with rounded weights."""
     if back:
         with new_folder(out) as folder:
-            restored(Bundle.open(run)).save(folder)
-        click.echo(str(out))
-    elif half and run.suffix == ".zip":
-        _show("half", halve_bundle(Bundle.open(run), out))
-        click.echo(str(out))
+            restored(bundle).save(folder)
+    elif golden:
+        renew_golden(bundle, out)
     else:
-        for path, trained in _runs(run, out).items():
-            report = export_run(trained, path, int8, half)
-            click.echo(_lines(report))
-            _show("int8", report.get("int8", {}))
-            click.echo(str(path))
+        _show("half", halve_bundle(bundle, out))
+    click.echo(str(out))
 
 
 def _runs(folder: Path, out: Path) -> dict[Path, Run]:

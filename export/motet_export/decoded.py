@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.golden import TOLERANCE, vectors
+from motet.bundle.golden import TOLERANCE, difference, vectors
 from motet.bundle.graph import Arrays
 from motet.decode.beam import noise_of
 from motet.decode.loop import Recording
@@ -18,38 +18,47 @@ from motet.generate.base import GenerateModel
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.language import LanguageModel
+from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet.papers.tdbn_control import TdbnModel
 from motet.predict.fill import FillModel
 from motet.predict.model import PredictModel
 from motet.search.model import SearchModel
 from motet.steering.model import SteerModel
 from motet.text.vocabulary import MAX_WORDS, SPECIALS
-from motet_export.parity import Examples, sides, walks
+from motet_export.parity import FRAMES, Examples, nudged, sides, walks
 
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], Decoded]]
 """Name of a run -> decodes it with a model."""
+
+GOLDEN_ROWS, FEW_ROWS = 4, 2
+"""Rows for a graph that takes frames: zeros, ones, negatives and one as it is drawn; and for another graph."""
 
 Golden = tuple[Arrays, dict[str, Any]]
 """The inputs of a whole run and its settings."""
 
 
 def whole_runs(onnx: BundleModel, torch: BundleModel) -> dict[str, Callable[[], tuple[Decoded, Decoded]]]:
-    """Name of a run -> decodes it with both models."""
+    """Name of a run -> decodes it with both models.
+
+    Both take the motions, words and frames of the second one, and its contract and vocabulary read what they give. So
+    the runs differ where the first one declares others.
+    """
 
     def both(name: str) -> tuple[Decoded, Decoded]:
-        return runs_of(onnx)[name](), runs_of(torch)[name]()
+        return runs_of(onnx, torch)[name](), runs_of(torch, torch)[name]()
 
-    return {name: partial(both, name) for name in runs_of(onnx)}
+    return {name: partial(both, name) for name in runs_of(onnx, torch)}
 
 
 def differences(small: BundleModel, exact: BundleModel) -> dict[str, float]:
     """The effect of fewer bits on whole runs, for the manifest.
 
     "<run>.equal": share of decoded sentences that are the same. "<run>.score": mean |difference| of the log-likelihoods
-    of known pairs, relative to their mean |value|. "<run>.frames": mean |difference| of frames, for runs that decode
-    only these.
+    of known pairs, relative to their mean |value|. "<run>.frames": mean |difference| of frames, for runs of
+    equal lengths.
     """
     report: dict[str, float] = {}
     for name, run in whole_runs(small, exact).items():
@@ -59,7 +68,7 @@ def differences(small: BundleModel, exact: BundleModel) -> dict[str, float]:
         if "scores" in rounded:
             error = np.abs(rounded["scores"] - expected["scores"]).mean()
             report[f"{name}.score"] = float(error / np.abs(expected["scores"]).mean())
-        if set(rounded) == {"frames"}:
+        if "frames" in rounded and "lengths" not in rounded:
             report[f"{name}.frames"] = float(np.abs(rounded["frames"] - expected["frames"]).mean())
     return report
 
@@ -67,15 +76,37 @@ def differences(small: BundleModel, exact: BundleModel) -> dict[str, float]:
 def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[bytes, dict[str, Any]]:
     """The file of golden vectors of a bundle, and its entry in the manifest."""
     rng = np.random.default_rng(5)
-    feeds = {role: draws[role](rng, 2) for role in model.graphs}
+    feeds = {}
+    for role, graph in model.graphs.items():
+        framed = any(graph.spec.takes(name) for name in FRAMES)
+        feeds[role] = draws[role](rng, GOLDEN_ROWS if framed else FEW_ROWS)
     inputs, settings = golden_run(model, rng)
-    entry = {"file": "golden.npz", "tolerance": TOLERANCE, "run": settings}
-    return vectors(model, feeds, inputs, settings), entry
+    frames = walks(model.contract, rng, 1, 12)[0].astype(np.float64)
+    tolerance = float(f"{_tolerance(model, feeds, inputs, settings):.1g}")
+    entry = {"file": "golden.npz", "tolerance": tolerance, "run": settings}
+    return vectors(model, feeds, inputs, settings, frames), entry
+
+
+def _tolerance(model: BundleModel, feeds: Mapping[str, Arrays], inputs: Arrays, settings: Mapping[str, Any]) -> float:
+    """Ten times the effect of the inputs' last bits on the outputs, between TOLERANCE and ten times that."""
+    rng = np.random.default_rng(6)
+    largest = 0.0
+    for role, graph in model.graphs.items():
+        largest = max(largest, difference(graph(nudged(feeds[role], rng)), graph(feeds[role])))
+    # towards 0, which leaves controls and noise in their range
+    near = {}
+    for name, values in inputs.items():
+        near[name] = np.nextafter(values, np.zeros_like(values)) if values.dtype == np.float32 else values
+    moved = model.replay(near, settings)
+    exact = model.replay(inputs, settings)
+    if all(moved[name].shape == values.shape for name, values in exact.items()):
+        largest = max(largest, difference(moved, exact))
+    return min(max(TOLERANCE, 10 * largest), 10 * TOLERANCE)
 
 
 @singledispatch
-def runs_of(model: BundleModel) -> Runs:
-    """The whole runs of a model, by name."""
+def runs_of(model: BundleModel, _like: BundleModel) -> Runs:
+    """The whole runs of a model, by name, from the inputs of a model ``like`` it."""
     raise NotImplementedError(f"no whole runs of {model!r} are defined")
 
 
@@ -86,10 +117,10 @@ def golden_run(model: BundleModel, _: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: TdbnModel) -> Runs:
+def _(model: TdbnModel, like: TdbnModel) -> Runs:
     """Four characters go through all labels in turn, with ramps of half a second between them."""
-    ramp = round(model.fps / 2)
-    corners = np.repeat(np.eye(len(model.labels)), round(2 * model.fps) + ramp, axis=0)
+    ramp = round(like.fps / 2)
+    corners = np.repeat(np.eye(len(like.labels)), round(2 * like.fps) + ramp, axis=0)
     # a running mean turns the steps between labels into ramps
     window = np.ones(ramp) / ramp
     columns = [np.convolve(column, window)[: len(corners)] for column in corners.T]
@@ -98,7 +129,8 @@ def _(model: TdbnModel) -> Runs:
     def controlled(variety: float) -> Decoded:
         iterations = 2 if model.has_free_units else 1
         session = model.start(characters=4, seed=7, variety=variety, iterations=iterations, smooth=False)
-        return {"frames": session.frames(smooth.clip(0, 1))}
+        frames = session.frames(smooth.clip(0, 1))
+        return {"frames": frames, "places": _places(model, frames[0])}
 
     return {"mean_field": partial(controlled, 0.0), "sampled": partial(controlled, 1.0)}
 
@@ -114,16 +146,17 @@ def _(model: TdbnModel, rng: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: SteerModel) -> Runs:
+def _(model: SteerModel, like: SteerModel) -> Runs:
     """Four characters, each in another direction, in all gaits in turn, for a second each."""
 
     def steered() -> Decoded:
         session = model.start(characters=4)
         poses = []
-        for gait in model.gaits:
-            session.control(gait=gait, speed=model.usual[gait], direction=np.arange(4) * 70.0 - 100)
-            poses += [session.tick() for _ in range(round(model.fps))]
-        return {"frames": session.frames_of(poses)}
+        for gait in like.gaits:
+            session.control(gait=gait, speed=like.usual[gait], direction=np.arange(4) * 70.0 - 100)
+            poses += [session.tick() for _ in range(round(like.fps))]
+        frames = session.frames_of(poses)
+        return {"frames": frames, "places": _places(model, frames[0])}
 
     return {"steered": steered}
 
@@ -135,25 +168,25 @@ def _(_model: SteerModel, rng: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: DescribeModel) -> Runs:
+def _(model: DescribeModel, like: DescribeModel) -> Runs:
     """Descriptions of eight motions: word ids, log-probabilities and contexts; and the scores of known pairs."""
 
     def described(beams: int, draws: int | None = None) -> Decoded:
-        rows = model.describe(_motions(model), beams, draws, decoding="consensus" if draws else "beam")
+        rows = model.describe(_motions(like), beams, draws, decoding="consensus" if draws else "beam")
         descriptions = list(chain.from_iterable(rows))
         ids = np.zeros((len(descriptions), MAX_WORDS), dtype=np.int64)
         for row, description in zip(ids, descriptions, strict=True):
             if description.text:
-                words, _ = model.vocabulary.encode(description.text)
+                words, _ = like.vocabulary.encode(description.text)
                 row[: len(words)] = words
         scores = np.array([description.log_probability for description in descriptions])
-        return {"words": ids, "log_probabilities": scores, "contexts": model.embed(_motions(model))}
+        return {"words": ids, "log_probabilities": scores, "contexts": model.embed(_motions(like))}
 
     return {
         "greedy": partial(described, 1),
         "beam": partial(described, 5),
         "consensus": partial(described, 5, 50),
-        "scores": lambda: {"scores": np.array([model.score(*pair) for pair in _pairs(model)])},
+        "scores": lambda: {"scores": np.array([model.score(*pair) for pair in _pairs(like)])},
     }
 
 
@@ -167,20 +200,22 @@ def _(model: DescribeModel, rng: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: GenerateModel) -> Runs:
-    """Three motions for each of eight sentences: normalised frames, lengths, log-likelihoods and contexts."""
+def _(model: GenerateModel, like: GenerateModel) -> Runs:
+    """Three motions for each of eight sentences: normalised frames, lengths, log-likelihoods and contexts, and the
+    joint positions of the first one."""
 
     def generated(candidates: int | None = None) -> Decoded:
         hypotheses = 3 if "hypotheses" in model.defaults else None
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", TextWarning)  # these sentences make no sense
-            rows = model.generate(_sentences(model), hypotheses, candidates=candidates, seed=7, max_seconds=4)
+            rows = model.generate(_sentences(like), hypotheses, candidates=candidates, seed=7, max_seconds=4)
         motions = list(chain.from_iterable(rows))
         return {
-            "frames": np.concatenate([model.contract.normalised(motion.frames) for motion in motions]),
+            "frames": np.concatenate([like.contract.normalised(motion.frames) for motion in motions]),
             "lengths": np.array([len(motion.frames) for motion in motions]),
             "log_likelihoods": np.array([motion.log_likelihood or 0.0 for motion in motions]),
-            "contexts": model.embed(_sentences(model)),
+            "contexts": model.embed(_sentences(like)),
+            "places": _places(model, motions[0].frames),
         }
 
     if "candidates" not in model.defaults:
@@ -188,7 +223,7 @@ def _(model: GenerateModel) -> Runs:
     return {
         "samples": partial(generated, 1),
         "beam": partial(generated, 4),
-        "scores": lambda: {"scores": np.array([model.score(text, motion) for motion, text in _pairs(model)])},
+        "scores": lambda: {"scores": np.array([model.score(text, motion) for motion, text in _pairs(like)])},
     }
 
 
@@ -208,12 +243,13 @@ def _(model: GenerateModel, rng: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: PredictModel) -> Runs:
-    """Continuations of eight random walks, normalised."""
+def _(model: PredictModel, like: PredictModel) -> Runs:
+    """Continuations of eight random walks, normalised, and the joint positions of the first one."""
 
     def predicted(horizons: int) -> Decoded:
-        seeds = walks(model.contract, np.random.default_rng(3), 8, model.seed_frames)
-        return {"frames": model.contract.normalised(model.next_frames(seeds, horizons * model.horizon))}
+        seeds = walks(like.contract, np.random.default_rng(3), 8, like.seed_frames)
+        frames = model.next_frames(seeds, horizons * like.horizon)
+        return {"frames": like.contract.normalised(frames), "places": _places(model, frames[0])}
 
     return {"horizon": partial(predicted, 1), "beyond": partial(predicted, 3)}
 
@@ -225,15 +261,15 @@ def _(model: PredictModel, rng: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: FillModel) -> Runs:
+def _(model: FillModel, like: FillModel) -> Runs:
     """Gaps in eight random walks, filled."""
 
     def filled(frames: int) -> Decoded:
         rng = np.random.default_rng(3)
-        known = [sides(model.contract, rng, model.context) for _ in range(8)]
+        known = [sides(like.contract, rng, like.context) for _ in range(8)]
         return {"frames": np.stack([model.frames_between(past, after, frames) for past, after in known])}
 
-    return {"short": partial(filled, 4), "longest": partial(filled, model.longest)}
+    return {"short": partial(filled, 4), "longest": partial(filled, like.longest)}
 
 
 @golden_run.register
@@ -244,15 +280,22 @@ def _(model: FillModel, rng: np.random.Generator) -> Golden:
 
 
 @runs_of.register
-def _(model: SearchModel) -> Runs:
+def _(model: SearchModel, like: SearchModel) -> Runs:
     """Vectors of eight motions and eight sentences."""
-    return {"vectors": lambda: {"motions": model.embed(_motions(model)), "texts": model.embed_text(_sentences(model))}}
+    return {"vectors": lambda: {"motions": model.embed(_motions(like)), "texts": model.embed_text(_sentences(like))}}
 
 
 @golden_run.register
 def _(model: SearchModel, rng: np.random.Generator) -> Golden:
     """A motion, and a sentence of five words."""
     return {"frames": walks(model.contract, rng, 1, 20)[0]}, {"text": _text(model, rng)}
+
+
+def _places(model: BundleModel, frames: Array) -> Array:
+    """Joint positions (T, J, 3) of frames (T, D) by the model's manifest, in its skeleton's unit; none without a
+    skeleton."""
+    contract = model.contract
+    return np.zeros((0, 0, 3)) if contract.skeleton is None else positions(contract.motion(frames, plant=False))
 
 
 def _motions(model: LanguageModel) -> list[Motion]:

@@ -2,10 +2,15 @@
 
 An error is the largest |a - b| of an output, over the root mean square of b or over |b| itself where those are above 1
 (frames in degrees, cells of an LSTM): float32 rounds in proportion to what it rounds.
-Inputs are random numbers that keep a graph's contract, and frames as likely as the training data's.
+Both sides are built by themselves: torch's from the run, with the run's manifest, ONNX Runtime's from the bundle. So
+the words, channels, rate and statistics that the bundle declares are compared, too.
+Inputs are random numbers that keep a graph's contract, and frames as likely as the training data's; and, on a rung of
+their own, some that are not likely at all: zeros, ones, negatives, and single numbers far from all data, as a glitch of
+a recording gives.
 Every rung raises ExportError where its bound is exceeded, so a bundle that differs is never written.
 """
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -19,6 +24,7 @@ from motet.bundle.graph import Arrays, Graph, GraphSpec
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import advance
 from motet.errors import BundleError
+from motet.models.base import BundleModel
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.representation.placed import placed_by_way
@@ -26,6 +32,22 @@ from motet_export.exporter import ExportError
 
 CARRIED = 1e-4
 """Bound on the error after many carried steps or a whole run."""
+
+FAR_SHARE = 0.01
+"""Of the numbers in frames that are drawn: those that are far from all data."""
+
+FAR = (10.0, 1000.0)
+"""Standard deviations from the mean, between which these lie: nets clip at 50."""
+
+FRAMES = ("frames", "frame", "history")
+"""Inputs that are frames, or codes of frames: they are drawn like the training data's."""
+
+RANGED = ("noise", "variety", "temperature", "past", "plain", "after")
+"""Inputs that zeros, ones or negatives are no numbers for: noise in [0, 1), variety in [0, 1], temperatures above 0;
+and frames beside a gap, with rotations by two columns, which must not be parallel."""
+
+MEANING = ("verb", "model", "loop", "motion", "text", "vocabulary", "common", "control", "defaults", "config")
+"""What a manifest says of a model's numbers."""
 
 Examples = Callable[[np.random.Generator, int], Arrays]
 """Draws all inputs of a graph for so many rows."""
@@ -42,8 +64,28 @@ def error(found: Arrays, expected: Arrays) -> float:
         raise ExportError(str(fault)) from fault
 
 
+def check_meaning(onnx: BundleModel, torch: BundleModel) -> None:
+    """Rung 0: the bundle says of its numbers what the run says; ExportError names what differs."""
+    # as JSON, in which a tuple is a list
+    declared, trained = (json.loads(json.dumps(model.manifest.source)) for model in (onnx, torch))
+    for part in MEANING:
+        if declared.get(part) != trained.get(part):
+            raise ExportError(f"parity: the bundle's {_difference(part, declared, trained)} is not the run's")
+    for kind in onnx.SETTINGS:
+        if kind.FEATURE in trained.get("settings", {}) and onnx.settings(kind) != torch.settings(kind):
+            raise ExportError(f"parity: the bundle's settings.{kind.FEATURE} is not the run's")
+
+
+def _difference(part: str, declared: Mapping[str, Any], trained: Mapping[str, Any]) -> str:
+    """The name of a part of two manifests, with the first key whose values differ where it is an object."""
+    one, other = declared.get(part), trained.get(part)
+    if not isinstance(one, Mapping) or not isinstance(other, Mapping):
+        return part
+    return next(f"{part}.{key}" for key in {**one, **other} if one.get(key) != other.get(key))
+
+
 def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> dict[str, Any]:
-    """Rung 1 and 2: equal contracts, and one call at batch sizes 1, 1,000 and three random ones, of inputs drawn."""
+    """Rung 1: equal contracts, and one call at batch sizes 1, 1,000 and three random ones, of inputs drawn."""
     if onnx.spec != torch.spec:
         raise ExportError(f"{name}: the contracts differ: {onnx.spec} and {torch.spec}")
     draw = draw or partial(example, torch.spec)
@@ -51,6 +93,20 @@ def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None =
     batches = [1, 1000, *(int(batch) for batch in rng.integers(2, 100, 3))]
     errors = [error(onnx(feeds), torch(feeds)) for feeds in (draw(rng, batch) for batch in batches)]
     return _bounded(f"{name}.one_step", max(errors), 1e-5, batches=batches)
+
+
+def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str, Any]:
+    """Rung 2: calls with inputs that are far from all data. "rounding" is how far torch comes from itself when their
+    last bits change; a graph that amplifies it, as divisions by small numbers do, is held to ten times its own."""
+    rng = np.random.default_rng(7)
+    batches, largest, rounding = (4, 100), 0.0, 0.0
+    for batch in batches:
+        feeds = draw(rng, batch)
+        expected = torch(feeds)
+        largest = max(largest, error(onnx(feeds), expected))
+        rounding = max(rounding, error(torch(nudged(feeds, rng)), expected))
+    bound = min(max(1e-5, 10 * rounding), 1e-2)
+    return _bounded(f"{name}.far", largest, bound, rounding=rounding, batches=batches)
 
 
 def check_carried(
@@ -70,23 +126,24 @@ def check_carried(
         if n % (horizon or steps) == 0:
             states = [{name: inputs[name] for name in feedback}] * 3
         given = {name: value for name, value in inputs.items() if name not in feedback}
-        states[2] = _nudged(states[2], rng)
-        (found, states[0]), (expected, states[1]), (nudged, states[2]) = (
+        states[2] = nudged(states[2], rng)
+        (found, states[0]), (expected, states[1]), (moved, states[2]) = (
             advance(graph, state, given) for graph, state in zip((onnx, torch, torch), states, strict=True)
         )
-        largest, rounding = max(largest, error(found, expected)), max(rounding, error(nudged, expected))
+        largest, rounding = max(largest, error(found, expected)), max(rounding, error(moved, expected))
     # a net that amplifies rounding is held to ten times its own; one that does so more cannot be compared
     bound = min(max(CARRIED, 10 * rounding), 1e-2)
     return _bounded("step.carried", largest, bound, rounding=rounding, steps=steps, horizon=horizon, batch=batch)
 
 
-def _nudged(state: Arrays, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
-    """A state whose numbers have moved to one of their two neighbours in float32."""
+def nudged(state: Arrays, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
+    """A state whose numbers, but for zeros, have moved to one of their two neighbours in float32."""
     ends = np.array([-np.inf, np.inf], dtype=np.float32)
-    return {
-        name: np.nextafter(values, rng.choice(ends, values.shape)) if values.dtype == np.float32 else values
-        for name, values in state.items()
-    }
+    moved = dict(state)
+    for name, values in state.items():
+        if values.dtype == np.float32:
+            moved[name] = np.where(values == 0, values, np.nextafter(values, rng.choice(ends, values.shape)))
+    return moved
 
 
 def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:
@@ -101,23 +158,30 @@ def _bounded(name: str, largest: float, bound: float, **details: Any) -> dict[st
     return {"error": largest, "bound": bound, **details}
 
 
-def examples(manifest: Manifest, torch: Mapping[str, Graph]) -> dict[str, Examples]:
+def examples(manifest: Manifest, torch: Mapping[str, Graph], far: bool = False) -> dict[str, Examples]:
     """What draws the inputs of each graph, by role: :func:`example`, with frames as likely as the training data's.
 
+    far: of frames some numbers are :func:`strained`, and there are :func:`extremes` among four rows or more.
     A history of codes is what the encoder makes of such frames in torch; and a predictor's other graphs get what its
     encoder gives: from numbers far from any frames a net that feeds its frames back can make much of a rounding.
     """
-    contract, like_data = manifest.motion, ("frames", "frame", "history")
+    contract = manifest.motion
 
     def draw(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
         found = example(spec, rng, rows, _below(manifest))
-        return {**found, **{name: _like(value, name, rng) for name, value in found.items() if name in like_data}}
+        for name, value in found.items():
+            if name in FRAMES:
+                found[name] = _like(value, name, rng)
+            if far and value.dtype == np.float32 and name not in RANGED:
+                found[name] = extremes(found[name])
+        return found
 
     def _like(value: NDArray[Any], name: str, rng: np.random.Generator) -> NDArray[Any]:
         if name == "history":
             frames = walks(contract, rng, *value.shape[:2])
             return torch["encoder"]({"frames": frames.reshape(-1, frames.shape[2])})["codes"].reshape(value.shape)
-        frames = walks(contract, rng, len(value), math.prod(value.shape[1:-1])).reshape(*value.shape[:-1], -1)
+        walk = walks(contract, rng, len(value), math.prod(value.shape[1:-1]))
+        frames = (strained(walk, contract, rng) if far else walk).reshape(*value.shape[:-1], -1)
         if value.shape[-1] == frames.shape[-1]:
             return frames
         flags = np.ones((*value.shape[:-1], 1), dtype=np.float32)  # of frames as generators take them
@@ -172,6 +236,27 @@ def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames:
     steps = 0.1 * rng.normal(size=(rows, frames, len(contract.mean)))
     found: Array = contract.mean + contract.std * steps.cumsum(axis=1)
     return found.astype(np.float32)
+
+
+def strained(frames: NDArray[np.float32], contract: MotionContract, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Frames (..., C) of which single numbers, but one at least, are at ``FAR`` standard deviations from the mean."""
+    far = rng.random(frames.shape) < FAR_SHARE
+    far.flat[rng.integers(far.size)] = True
+    low, high = FAR
+    off = 10 ** rng.uniform(np.log10(low), np.log10(high), frames.shape) * rng.choice([-1.0, 1.0], frames.shape)
+    std = np.where(contract.std > 0, contract.std, 1.0)
+    return np.where(far, contract.mean + std * off, frames).astype(np.float32)
+
+
+def extremes(values: NDArray[Any]) -> NDArray[Any]:
+    """Rows (B, ...), of four or more of which the first is all zeros, the second all ones, the third negative."""
+    if len(values) < 4:
+        return values
+    rows = values.copy()
+    rows[0] = 0
+    rows[1] = 1
+    rows[2] = -np.abs(values[2])
+    return rows
 
 
 def sides(

@@ -11,7 +11,7 @@ from motet.bundle.manifest import Manifest, read_contract
 from motet.models.load import KINDS
 from motet_export.decoded import golden_run, runs_of
 from motet_export.exporter import ExportError
-from motet_export.parity import check_carried, examples, walks
+from motet_export.parity import check_carried, check_far, examples, walks
 
 MOTION = {
     "representation": "angles",
@@ -76,6 +76,46 @@ def test_a_predictors_step_is_asked_about_what_its_encoder_makes_of_frames_like_
     )
     np.testing.assert_allclose(frames.mean(axis=(0, 1)), MOTION["mean"], rtol=0.02)
     assert (np.abs(frames - np.array(MOTION["mean"])) < 2 * np.array(MOTION["std"])).all()
+
+
+def test_inputs_far_from_all_data_are_zeros_ones_negatives_and_single_numbers() -> None:
+    graphs: dict[str, Graph] = {"encoder": Means(), "step": Turn()}
+    frames = examples(manifest("predict", "free_run"), graphs, far=True)["encoder"](np.random.default_rng(0), 500)[
+        "frames"
+    ]
+    assert frames[0].max() == frames[0].min() == 0
+    assert frames[1].max() == frames[1].min() == 1
+    assert frames[2].max() <= 0
+    np.testing.assert_allclose(np.median(frames[3:], axis=(0, 1)), MOTION["mean"], rtol=0.02)
+    off = np.abs(frames[3:] - np.array(MOTION["mean"])) / np.array(MOTION["std"])
+    assert 0.005 < (off > 2).mean() < 0.02  # one of a hundred
+    assert 9.9 < off[off > 2].min() < 20
+    assert 500 < off.max() < 1010
+
+
+class Inverse:
+    """A step whose division makes much of the last bits of small numbers."""
+
+    spec = STEP
+
+    def __init__(self, slip: float = 0.0) -> None:
+        self.slip = np.float32(slip)
+
+    def __call__(self, feeds: Arrays) -> dict[str, np.ndarray]:
+        state = 1 / (feeds["state"] - np.float32(0.7)) + self.slip
+        return {"frame": state, "next_state": state}
+
+
+def test_far_inputs_are_held_to_the_rounding_of_torch() -> None:
+    def draw(rng: np.random.Generator, rows: int) -> Arrays:
+        return {"state": (0.7 + rng.uniform(0.001, 0.002, (rows, 2))).astype(np.float32)}
+
+    report = check_far("step", Inverse(), Inverse(), draw)
+    assert report["bound"] == pytest.approx(10 * report["rounding"]) != 1e-5
+    with pytest.raises(ExportError, match=r"step\.far"):
+        check_far("step", Inverse(20.0), Inverse(), draw)
+    with pytest.raises(ExportError, match=r"step\.far: the error is 1\.0"):
+        check_far("step", Turn(1e-4), Turn(), lambda rng, rows: {"state": rng.random((rows, 2), np.float32)})
 
 
 def test_frames_of_other_graphs_are_like_the_datas_and_the_rest_is_what_their_contract_allows() -> None:

@@ -145,7 +145,7 @@ def test_a_bundle_of_it_works_and_is_described_alone_as_in_a_batch(
     export_run(Run({**named, **words, "config": {}, "licence": {"weights": None}}, net), tmp_path / "x.zip")
     model = load(tmp_path / "x.zip")
     assert isinstance(model, DescribeModel)
-    assert set(verify_errors := verify_bundle(tmp_path / "x.zip")) == {"encoder", "step", "run"}
+    assert set(verify_errors := verify_bundle(tmp_path / "x.zip")) == {"encoder", "step", "run", "meaning"}
     assert max(verify_errors.values()) < 1e-6
     assert model.manifest.graphs["step"].spec == STEP
     rng = np.random.default_rng(1)

@@ -51,7 +51,7 @@ def test_weights_that_would_lose_something_stay_as_they_are() -> None:
 
 @pytest.mark.slow
 def test_a_bundle_is_written_anew_with_half_the_weights(tmp_path: Path) -> None:
-    exact = list_bundles()["cmu-control"]
+    exact = list_bundles()["tdbn"]
     done = CliRunner().invoke(main, ["export", str(exact), "--half", "-o", str(tmp_path / "half.zip")])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "half.zip").stat().st_size < 0.62 * exact.stat().st_size

@@ -57,7 +57,7 @@ def test_it_holds_plain_arrays_and_no_graph(run: Run, bundle: Path) -> None:
     opened = Bundle.open(bundle)
     for name, table in run.model.tables().items():
         np.testing.assert_array_equal(opened.table(name), table)
-    assert set(verify(opened).errors) == {"run"}
+    assert set(verify(opened).errors) == {"meaning", "run"}
     model = load_as(SteerModel, bundle)
     assert (model.matcher.settings.lasting, model.matcher.settings.blend) == (15, 0.2)
     session = model.start()

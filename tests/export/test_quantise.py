@@ -22,7 +22,7 @@ def rounded(values: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def step() -> tuple[Bundle, bytes]:
-    bundle = Bundle.open("cmu-control")
+    bundle = Bundle.open("tdbn")
     return bundle, bundle.read("step.onnx")
 
 

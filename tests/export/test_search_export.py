@@ -57,7 +57,7 @@ def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> No
     assert found.files == ("golden.npz", "motion.onnx", "text.onnx")
     assert max(found.errors.values()) < 1e-5
     report = opened.manifest.parity
-    rungs = {"motion.one_step", "text.one_step", "runs"}
+    rungs = {"motion.one_step", "text.one_step", "motion.far", "text.far", "runs"}
     assert {name for name in report if "." in name or name == "runs"} == rungs
     assert all(report[rung]["error"] < report[rung]["bound"] for rung in rungs)
     again = parity_of(run(), opened)

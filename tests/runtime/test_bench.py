@@ -218,7 +218,7 @@ def test_a_profile_has_the_calls_alone_and_all_of_their_time() -> None:
 
     def ready(options: SessionOptions) -> Callable[[], object]:
         asked.append(options)
-        model = motet.load("cmu-control", options)
+        model = motet.load("tdbn", options)
         session = model.start(smooth=False)
         for _ in range(50):
             session.step()  # not to be counted

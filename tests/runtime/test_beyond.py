@@ -129,7 +129,7 @@ def test_what_cannot_be_gone_on_with_is_refused(walk: Motion) -> None:
     with pytest.raises(DecodingError, match="expected a seed"):
         predictor().futures(walk, beyond=writer(), seed=-1)
     with pytest.raises(DecodingError, match=r"motion-code model such as motet\.load\('generate'\)"):
-        predictor().predict(walk, beyond=motet.load("cmu-generate"), frames=30)
+        predictor().predict(walk, beyond=motet.load("language-to-motion"), frames=30)
     with pytest.raises(MotionError, match="a motion of 7 frames is too short to continue: 8 are needed"):
         predictor().futures(walk.resample(30.0)[:7], beyond=writer())
     with pytest.raises(MotionError, match="needs 10 frames"):
@@ -251,7 +251,7 @@ def test_errors_are_told_of_the_predictors_own_frames(
     [
         (2, ["--samples", "0"], "range 1<=x<=100"),
         (2, ["--samples", "2", "--beyond", "none"], "a predictor has one future"),
-        (2, ["--samples", "2", "--beyond", "cmu-generate"], "need one that is a CodesModel"),
+        (2, ["--samples", "2", "--beyond", "language-to-motion"], "need one that is a CodesModel"),
         (2, ["--frames", "26", "--beyond", "control"], "is for 'control'"),
         (2, ["--frames", "26", "--beyond", "no-such"], "unknown bundle 'no-such'"),
         (1, ["--samples", "1"], "short.npz: a motion of 7 frames is too short to continue: 8 are needed (--beyond"),

@@ -21,7 +21,10 @@ from motet.cli import main
 from motet.errors import BundleError, OutputError, SettingError
 from motet.models.load import KINDS, kind_of, load, verify
 
-SHIPPED = list_bundles()["cmu-control"]
+PAPERS = ("convseq2seq", "language-to-motion", "motion-to-language", "tdbn")
+"""Bundles of the papers' systems; the others have the names of their verbs."""
+
+SHIPPED = list_bundles()["tdbn"]
 
 
 @pytest.fixture
@@ -39,7 +42,7 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
-    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, "cmu-control", "cmu-generate"])
+    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, *PAPERS])
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem
@@ -67,21 +70,21 @@ def test_every_kind_of_model_is_measured_and_has_loops_of_its_own() -> None:
 
 
 def test_folder_and_zip_run_alike_and_pack_to_the_same_bytes(folder: Path, tmp_path: Path) -> None:
-    np.testing.assert_array_equal(load(folder).start().step(), load("cmu-control").start().step())
+    np.testing.assert_array_equal(load(folder).start().step(), load("tdbn").start().step())
     for name, source in (("a.zip", folder), ("b.zip", SHIPPED)):
         Bundle.open(source).pack(tmp_path / name)
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes() == SHIPPED.read_bytes()
 
 
 def test_a_bundle_says_what_it_is() -> None:
-    path = str(list_bundles()["cmu-control"])
-    assert repr(Bundle.open("cmu-control")) == f"Bundle('cmu-control', 'control' by 'session', {path!r})"
+    path = str(list_bundles()["tdbn"])
+    assert repr(Bundle.open("tdbn")) == f"Bundle('tdbn', 'control' by 'session', {path!r})"
 
 
 def test_an_unknown_name_lists_the_known() -> None:
-    with pytest.raises(BundleError, match=r"unknown bundle '3'.*expected one of cmu-control"):
+    with pytest.raises(BundleError, match=r"unknown bundle '3'.*expected one of control"):
         load(3)  # type: ignore[call-overload]
-    with pytest.raises(BundleError, match=r"unknown bundle 'nothing'.*expected one of cmu-control"):
+    with pytest.raises(BundleError, match=r"unknown bundle 'nothing'.*expected one of control"):
         load("nothing")
 
 
@@ -253,7 +256,7 @@ def test_a_folder_that_cannot_be_listed_is_refused(folder: Path, monkeypatch: py
 
 def test_a_path_loads_where_the_default_bundles_were_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motet.bundle.bundle.DEFAULT_BUNDLES", tmp_path / "gone")
-    assert load(SHIPPED).manifest.name == "cmu-control"
+    assert load(SHIPPED).manifest.name == "tdbn"
     with pytest.raises(BundleError, match="unknown bundle 'describe'"):
         load("describe")
 
@@ -267,14 +270,21 @@ def test_packages_bring_bundles_by_an_entry_point(tmp_path: Path, monkeypatch: p
     monkeypatch.syspath_prepend(tmp_path)
     points = (EntryPoint("more", "more_motions", "motet.bundles"),)
     monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: points if group == "motet.bundles" else ())
-    assert load("bends").manifest.name == "cmu-control"
+    assert load("bends").manifest.name == "tdbn"
     assert load("describe").manifest.name == "describe"  # motet's own come first
-    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, "bends"])
-    monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: ())
-    with pytest.raises(
-        BundleError, match=r"expected one of control, describe.*more with pip install ./papers, from a clone"
-    ):
+    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, *PAPERS, "bends"])
+    gone = EntryPoint("gone", "not_installed_any_more", "motet.bundles")
+    monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: (gone,))
+    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, *PAPERS])
+    with pytest.raises(BundleError, match="unknown bundle 'bends'"):
         load("bends")
+
+
+@pytest.mark.parametrize(("old", "new"), [("cmu-control", "tdbn"), ("cmu-generate", "language-to-motion")])
+def test_old_names_of_bundles_lead_to_the_new_ones(old: str, new: str) -> None:
+    with pytest.raises(BundleError, match=f"the bundle '{old}' is '{new}' now"):
+        load(old)
+    assert load(new).manifest.name == new
 
 
 def test_a_model_of_a_relative_path_pickles_to_another_folder(
@@ -284,7 +294,7 @@ def test_a_model_of_a_relative_path_pickles_to_another_folder(
     data = pickle.dumps(load(folder.name, SessionOptions(threads=2)))
     monkeypatch.chdir("/")
     model = pickle.loads(data)
-    assert model.manifest.name == "cmu-control"
+    assert model.manifest.name == "tdbn"
     assert model._source == (folder, SessionOptions(threads=2))
 
 
@@ -419,7 +429,7 @@ def test_threads_are_bounded(threads: Any) -> None:
 
 
 def test_threads_may_be_numpys() -> None:
-    assert load("cmu-control", SessionOptions(threads=np.int64(2))).providers == ("CPUExecutionProvider",)  # type: ignore[arg-type]
+    assert load("tdbn", SessionOptions(threads=np.int64(2))).providers == ("CPUExecutionProvider",)  # type: ignore[arg-type]
 
 
 def test_a_provider_that_is_not_here_is_refused_and_what_is_active_is_said() -> None:
@@ -431,4 +441,4 @@ def test_a_provider_that_is_not_here_is_refused_and_what_is_active_is_said() -> 
         SessionOptions(provider_options=({}, {}))
     with pytest.raises(SettingError, match=r"a tuple of names, such as \('CPUExecutionProvider',\)"):
         SessionOptions(providers="CPUExecutionProvider")  # type: ignore[arg-type]
-    assert load("cmu-control", SessionOptions(threads=2)).providers == ("CPUExecutionProvider",)
+    assert load("tdbn", SessionOptions(threads=2)).providers == ("CPUExecutionProvider",)

@@ -16,7 +16,7 @@ from motet.formats import read_motion
 from motet.motion.kinematics import positions
 
 WALK = "39_14.amc"
-CMU = ("--bundle", "cmu-control")
+CMU = ("--bundle", "tdbn")
 
 
 def test_a_script_becomes_a_motion_that_travels(tmp_path: Path) -> None:
@@ -104,15 +104,15 @@ def test_view_prints_the_page_it_wrote(clips: Path) -> None:
 
 def test_bundle_commands(tmp_path: Path) -> None:
     rows = json.loads(run("bundle", "list", "--json").stdout)
-    assert {("cmu-control", "control"), ("predict", "predict")} <= {(row["name"], row["verb"]) for row in rows}
-    assert "cmu-control" in run("bundle", "list").stdout
-    assert json.loads(run("bundle", "info", "cmu-control", "--json").stdout)["format"] == 3
-    assert "NSF EIA-0196217" in run("bundle", "info", "cmu-control").stdout
-    verified = run("bundle", "verify", "cmu-control", "--threads", 2, "--provider", "cpu").stdout
+    assert {("tdbn", "control"), ("predict", "predict")} <= {(row["name"], row["verb"]) for row in rows}
+    assert "tdbn" in run("bundle", "list").stdout
+    assert json.loads(run("bundle", "info", "tdbn", "--json").stdout)["format"] == 3
+    assert "NSF EIA-0196217" in run("bundle", "info", "tdbn").stdout
+    verified = run("bundle", "verify", "tdbn", "--threads", 2, "--provider", "cpu").stdout
     assert "3 files match the manifest\nthe model runs on CPUExecutionProvider\n" in verified
     assert "golden vectors: the largest difference is " in verified
-    assert run("bundle", "pack", "cmu-control", "-o", tmp_path / "b.zip").exit_code == 0
-    assert (tmp_path / "b.zip").read_bytes() == list_bundles()["cmu-control"].read_bytes()
+    assert run("bundle", "pack", "tdbn", "-o", tmp_path / "b.zip").exit_code == 0
+    assert (tmp_path / "b.zip").read_bytes() == list_bundles()["tdbn"].read_bytes()
 
 
 def test_bench_describes_a_file_and_says_where_it_ran(clips: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,7 +150,7 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path, monkeypatch: 
         (2, ["control", "walk 3s", "-o", "{out}/no/a.html"], "does not exist"),
         (2, ["control", "walk 3s", "-o", "{out}/a.xyz"], "expected one of .amc"),
         (2, ["control", "walk 3s", "-o", "{out}"], "expected one of .amc"),
-        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--bundle", "cmu"], "expected one of cmu-control"),
+        (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--bundle", "cmu"], "expected one of control"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly", *CMU], "expected one of walk, run, bend"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--start", "fly.amc"], "no such file"),
         (2, ["control", "walk 3s", "-o", "{out}/a.bvh", "--variety", "2"], "range 0<=x<=1"),
@@ -180,15 +180,15 @@ def test_bench_describes_a_file_and_says_where_it_ran(clips: Path, monkeypatch: 
         (1, ["convert", "{bad}/alone.amc", "{out}/a.npz"], "no skeleton found"),
         (1, ["view", "{bad}/text.bvh"], "text.bvh, line 1: "),
         (2, ["bundle", "verify", "{bad}"], "no manifest.json"),
-        (2, ["bundle", "pack", "cmu-control", "-o", "{out}/b.tar"], "is a .zip"),
-        (2, ["bundle", "info", "nothing"], "expected one of cmu-control"),
+        (2, ["bundle", "pack", "tdbn", "-o", "{out}/b.tar"], "is a .zip"),
+        (2, ["bundle", "info", "nothing"], "expected one of control"),
         (
             2,
             ["control", "walk 3s", "-o", "{out}/a.bvh", "--provider", "none"],
             "has no provider 'none' here; available: ",
         ),
         (2, ["describe", "{clips}/39_14.amc", "--threads", "257"], "257 is not in the range 1<=x<=256"),
-        (2, ["bundle", "verify", "cmu-control", "--provider", "none"], "has no provider 'none' here"),
+        (2, ["bundle", "verify", "tdbn", "--provider", "none"], "has no provider 'none' here"),
         (2, ["bench", "--provider", "OpenVINO"], "in place of onnxruntime:  pip install onnxruntime-openvino"),
     ],
 )

@@ -225,7 +225,7 @@ def test_embed(tmp_path: Path, files: list[Path]) -> None:
         (2, ["generate", "walks", "-o", "{out}/a.bvh", "--hypotheses", "0"], "range 1<=x<=100"),
         (2, ["generate", "walks", "-o", "{out}/a.bvh", "--max-seconds", "-3"], "range 0<=x<=600"),
         (2, ["generate", "walks", "-o", "{out}/a.bvh", "--fps", "0"], "range 0<x<=10000"),
-        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
+        (2, ["generate", "walks", "-o", "{out}/a.bvh", "--bundle", "tdbn"], "is for 'control'"),
         (2, ["embed", "-o", "{out}/a.npy"], "either motion files or --text"),
         (2, ["embed", "{bad}/good.npz", "--text", "walks", "-o", "{out}/a.npy"], "either motion files or --text"),
         (2, ["embed", "{bad}/good.npz", "-o", "{out}/a.txt"], "written as .npy"),

@@ -42,7 +42,7 @@ def test_predict_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
 
 
 def test_control_is_three_lines_of_python(tmp_path: Path) -> None:
-    for bundle in ("control", "cmu-control"):
+    for bundle in ("control", "tdbn"):
         run("control", "run 1s, walk 1s", "--bundle", bundle, "-o", tmp_path / "cli.bvh")
         model = motet.load(bundle)
         motion = model.run("run 1s, walk 1s")

@@ -25,12 +25,12 @@ SCRIPT = "walk .5s, walk>run .5s, run .5s, bend .5s"
 
 @pytest.fixture(scope="module")
 def model() -> TdbnModel:
-    return load("cmu-control")
+    return load("tdbn")
 
 
 def test_the_documented_loop_gives_the_same_frames(model: TdbnModel) -> None:
     """docs/reference/bundle.md in plain onnxruntime: no code of motet between the bundle and the frames."""
-    with zipfile.ZipFile(list_bundles()["cmu-control"]) as archive:
+    with zipfile.ZipFile(list_bundles()["tdbn"]) as archive:
         manifest = json.loads(archive.read("manifest.json"))
         encoder, step = (
             onnxruntime.InferenceSession(
@@ -216,7 +216,7 @@ def test_one_figure_runs_a_script_in_one_call(model: TdbnModel) -> None:
     motion = model.run("run .2s, walk .1s", seed=np.int64(3), variety=0.5)
     session = model.start("run", seed=3, variety=0.5)
     np.testing.assert_array_equal(motion.values, session.run("run .2s, walk .1s")[0].values)
-    assert repr(session) == "TdbnSession(1 characters, tick 12, TdbnModel('cmu-control', 59 channels, 40 fps))"
+    assert repr(session) == "TdbnSession(1 characters, tick 12, TdbnModel('tdbn', 59 channels, 40 fps))"
     assert repr(session.snapshot()) == "TdbnSnapshot(1 characters, tick 12)"
 
 

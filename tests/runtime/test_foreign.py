@@ -45,19 +45,19 @@ def mixamo(walk: Motion) -> Motion:
     return motet.from_humanoid(motet.to_humanoid(walk).motion, MIXAMO)
 
 
-@pytest.mark.parametrize("bundle", ["describe", "predict", "cmu-control"])
+@pytest.mark.parametrize("bundle", ["describe", "predict", "tdbn"])
 def test_files_of_the_models_own_joints_are_taken_as_they_are(bundle: str, tmp_path: Path, clips: Path) -> None:
     contract = motet.load(bundle).contract
     for name in CLIPS:
         amc = motet.read(clips / f"{name}.amc")
-        own = amc if bundle == "cmu-control" else motet.to_humanoid(amc).motion
+        own = amc if bundle == "tdbn" else motet.to_humanoid(amc).motion
         motet.write(tmp_path / "a.bvh", own)
         for motion in (own, motet.read(tmp_path / "a.bvh", unit="m"), contract.features(contract.frames(amc))):
             assert contract.on_figure(motion) is motion
 
 
 def test_limbs_come_out_as_those_of_the_models_own_figure(walk: Motion, mixamo: Motion) -> None:
-    contract = motet.load("cmu-generate").contract
+    contract = motet.load("language-to-motion").contract
     own, brought = contract.frames(walk), contract.frames(mixamo)
     limbs = [i for i, name in enumerate(contract.channels) if name.split(".")[0] in ("lfemur", "rtibia", "rhumerus")]
     np.testing.assert_allclose(brought[:, limbs], own[:, limbs], atol=0.01)
@@ -182,7 +182,7 @@ def turned(motion: Motion, turn: np.ndarray) -> Motion:
 
 
 def test_control_goes_on_from_another_figure(mixamo: Motion, walk: Motion) -> None:
-    model = motet.load_as(TdbnModel, "cmu-control")
+    model = motet.load_as(TdbnModel, "tdbn")
     found, expected = (model.run("walk 1s", motion) for motion in (mixamo, walk))
     knee = found.channels.index("ltibia.rx")
     assert np.abs(found.values[:, knee] - expected.values[:, knee]).mean() < 5

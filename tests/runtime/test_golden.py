@@ -16,7 +16,7 @@ from motet.models.load import load
 
 pytestmark = pytest.mark.numeric
 
-NAMES = ["cmu-control", "cmu-generate", "describe", "fill", "generate", "predict"]
+NAMES = ["convseq2seq", "describe", "fill", "generate", "language-to-motion", "motion-to-language", "predict", "tdbn"]
 
 
 def packed(arrays: Mapping[str, Any]) -> bytes:
@@ -35,7 +35,7 @@ def test_each_output_counts(name: str) -> None:
     arrays = read(bundle.read(golden.file))
     assert max(replay(model, packed(arrays), golden).values()) < golden.tolerance
     outputs = [key for key in arrays if ".out." in key]
-    assert {key.partition(".")[0] for key in outputs} == {*model.graphs, "run"}
+    assert {key.partition(".")[0] for key in outputs} == {*model.graphs, "run", "meaning"}
     for key in outputs:
         other = arrays[key] + (
             1 if arrays[key].dtype.kind == "i" else np.float32(0.1) * (1 + np.abs(arrays[key]).max())
@@ -59,9 +59,24 @@ def test_a_run_follows_from_its_inputs_and_noise(name: str) -> None:
         assert any(other[k].shape != v.shape or np.abs(other[k] - v).max() > 1e-3 for k, v in plain.items()), key
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_vectors_without_a_meaning_are_read_and_frames_of_another_size_refused(name: str) -> None:
+    bundle = Bundle.open(name)
+    model, golden = load(name), bundle.manifest.golden
+    assert golden is not None
+    arrays = read(bundle.read(golden.file))
+    assert replay(model, packed(arrays), golden)["meaning"] == 0
+    older = {key: value for key, value in arrays.items() if not key.startswith("meaning.")}
+    assert set(replay(model, packed(older), golden)) == {*model.graphs, "run"}
+    frames = arrays["meaning.in.frames"]
+    for other, reason in ((frames[:, :-1], "channels, not"), (frames[0], "no meaning.in.frames"), (frames[:0], "no")):
+        with pytest.raises(BundleError, match=reason):
+            replay(model, packed({**arrays, "meaning.in.frames": other}), golden)
+
+
 def test_what_does_not_fit_a_model_is_refused() -> None:
-    bundle = Bundle.open("cmu-generate")
-    model, golden = load("cmu-generate"), bundle.manifest.golden
+    bundle = Bundle.open("language-to-motion")
+    model, golden = load("language-to-motion"), bundle.manifest.golden
     assert golden is not None
     arrays = read(bundle.read(golden.file))
     for change, reason in (
@@ -129,7 +144,7 @@ def test_vectors_are_the_same_bytes_every_time() -> None:
     size = len(model.contract.channels)
     given = {"frames": np.ones((model.seed_frames, size), np.float32)}
     feeds = {"encoder": {"frames": np.ones((2, model.seed_frames, size), np.float32)}}
-    made = [vectors(model, feeds, given, {"frames": 3}) for _ in range(2)]
+    made = [vectors(model, feeds, given, {"frames": 3}, np.ones((2, size))) for _ in range(2)]
     assert made[0] == made[1]
     assert read(made[0])["run.out.frames"].shape == (3, size)
 

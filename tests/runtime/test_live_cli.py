@@ -27,7 +27,7 @@ def test_the_page_is_that_of_python(tmp_path: Path, steer_model: SteerModel) -> 
         (("-o", "{out}/live.html", "--script", "walk"), "-o writes a page and does nothing else"),
         (("-o", "{out}/none/live.html"), "the folder {out}/none does not exist"),
         (("-o", "{out}/live.html", "--bundle", "search"), "bundle search is for 'search'; need one for 'control'"),
-        (("-o", "{out}/live.html", "--bundle", "cmu-control"), "its loop is 'session'; need one that is a SteerModel"),
+        (("-o", "{out}/live.html", "--bundle", "tdbn"), "its loop is 'session'; need one that is a SteerModel"),
         (("--port", 1, *OSC, "--script", "walk"), "--script is for --osc without --port"),
         (("--port", 99999), "99999 is not in the range"),
         (OSC, "--osc needs --script, or --port"),

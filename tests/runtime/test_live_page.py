@@ -45,7 +45,7 @@ def test_what_cannot_be_steered_is_refused(tmp_path: Path, steer_model: SteerMod
         with pytest.raises(ControlError, match="characters must be a whole number from 1 to 50"):
             motet.write_live_page(tmp_path / "live.html", steer_model, characters)  # type: ignore[arg-type]
     with pytest.raises(BundleError, match="is not steered"):
-        motet.live_page(motet.load("cmu-control"))
+        motet.live_page(motet.load("tdbn"))
     with pytest.raises(OutputError):
         motet.write_live_page(tmp_path / "none" / "live.html", steer_model)
     assert not list(tmp_path.iterdir())

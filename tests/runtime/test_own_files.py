@@ -45,8 +45,8 @@ def test_the_length_of_the_legs_tells_the_unit_of_a_file_of_other_proportions(cl
     walk = motet.read(clips / "39_14.amc")
     for metres in (1.0, 0.01, 0.0254):
         motet.write(tmp_path / "walk.bvh", walk.scaled(metres))
-        frames = motet.load("cmu-generate").contract.frames(motet.read(tmp_path / "walk.bvh"))
-        np.testing.assert_allclose(frames, motet.load("cmu-generate").contract.frames(walk), atol=2e-3)
+        frames = motet.load("language-to-motion").contract.frames(motet.read(tmp_path / "walk.bvh"))
+        np.testing.assert_allclose(frames, motet.load("language-to-motion").contract.frames(walk), atol=2e-3)
 
 
 def _places(motion: Motion) -> Array:

@@ -68,7 +68,7 @@ def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Pat
         (2, ["{clips}/39_14.amc", "-o", "{out}/no/a.bvh"], "does not exist"),
         (1, ["{clips}/none.amc", "-o", "{out}/a.bvh"], "no such file"),
         (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu"], "unknown bundle 'cmu'"),
-        (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "cmu-control"], "is for 'control'"),
+        (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--bundle", "tdbn"], "is for 'control'"),
         (2, ["{clips}/39_14.amc", "-o", "{out}/a.bvh", "--frames", "0"], "range 1<=x<=100000"),
         (1, ["{bad}/walker.npz", "-o", "{out}/a.bvh"], "no joint was found for spine, leftFoot"),
         (

@@ -62,7 +62,7 @@ def test_what_has_no_path_comes_back_and_what_has_no_skeleton_is_refused() -> No
         ("fill", "dance.npz", "--gap", "1:1.5", "-o", "out.npz"),
         ("join", "dance.npz", "dance.npz", "-o", "out.npz"),
         ("control", "walk 1s", "-o", "out.npz"),
-        ("control", "--bundle", "cmu-control", "walk .5s", "-o", "out.npz"),
+        ("control", "--bundle", "tdbn", "walk .5s", "-o", "out.npz"),
     ],
     ids=lambda command: " ".join(map(str, command[:2])),
 )

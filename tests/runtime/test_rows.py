@@ -40,7 +40,7 @@ def test_contexts(motions: list[Motion]) -> None:
     check_equal(generator.embed(SENTENCES), [generator.embed([one])[0] for one in SENTENCES])
 
 
-@pytest.mark.parametrize("name", ["generate", "cmu-generate"])
+@pytest.mark.parametrize("name", ["generate", "language-to-motion"])
 def test_generated_motions(name: str) -> None:
     model = load(name)
     together = model.generate(SENTENCES, 3, seed=[5, 6, 7, 8], max_seconds=4)
@@ -67,7 +67,7 @@ def test_predicted_frames() -> None:
 
 @pytest.mark.parametrize("variety", [0.0, 1.0])
 def test_controlled_characters(variety: float) -> None:
-    model = load("cmu-control")
+    model = load("tdbn")
     track = np.random.default_rng(0).uniform(size=(30, 4, len(model.labels)))
     together = model.start("walk", characters=4, seed=3, variety=variety).frames(track)
     alone = [

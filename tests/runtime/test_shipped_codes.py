@@ -251,7 +251,7 @@ def test_the_command_line_tells_a_story(tmp_path: Path, clips: Path, model: Code
     assert "0.0-2.0 s " + WALK in run("generate", WALK, JUMP, *options, "-o", out).stdout
     result = run("generate", WALK, "--after", clips / "39_14.amc", "--stand", "end", "-o", out)
     assert result.exit_code == 0, result.stderr
-    assert run("generate", WALK, "--story", "--bundle", "cmu-generate", "-o", out).exit_code == 2
+    assert run("generate", WALK, "--story", "--bundle", "language-to-motion", "-o", out).exit_code == 2
     assert run("generate", "a violin", "--strict", "-o", out).exit_code == 1
 
 

@@ -76,11 +76,12 @@ def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_tim
     files = [tmp_path / "one.bvh", tmp_path / "two.bvh"]
     for file in files:
         sentence = "a person walks and turns left"
-        assert run("generate", sentence, "--bundle", "cmu-generate", "--seed", 1, "-o", file).exit_code == 0
+        assert run("generate", sentence, "--bundle", "language-to-motion", "--seed", 1, "-o", file).exit_code == 0
     assert files[0].read_bytes() == files[1].read_bytes()
     sliding = tmp_path / "sliding.bvh"
     assert (
-        run("generate", sentence, "--bundle", "cmu-generate", "--seed", 1, "--no-plant", "-o", sliding).exit_code == 0
+        run("generate", sentence, "--bundle", "language-to-motion", "--seed", 1, "--no-plant", "-o", sliding).exit_code
+        == 0
     )
     assert sliding.read_bytes() != files[0].read_bytes()
     block = to_root_block(read_motion(files[0]).with_unit(1.0))
@@ -90,7 +91,7 @@ def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_tim
 
 
 def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
-    model = load("cmu-generate")
+    model = load("language-to-motion")
     found = model.generate(["a person walks"] * 5 + ["a person runs"] * 5, hypotheses=5, seed=list(range(10)))
     forward = model.contract.channels.index("root.forward")
     speeds = [float(np.median(row[0].features.values[:, forward])) for row in found]
@@ -99,7 +100,7 @@ def test_runs_are_faster_than_walks_and_both_end_by_themselves() -> None:
 
 
 def test_a_motion_scores_what_the_search_gave_it() -> None:
-    model = load("cmu-generate")
+    model = load("language-to-motion")
     best = model.generate("a person runs", seed=3)[0]
     assert model.score("a person runs", best.contract.features(best.frames)) == pytest.approx(
         best.log_likelihood, rel=1e-4

@@ -53,6 +53,15 @@ def test_an_epoch_visits_every_motion_at_every_offset_once(data: Examples) -> No
     assert all(words in sentences[frames] for frames, words in found)
 
 
+def test_an_epoch_of_pairs_visits_every_sentence_of_every_motion_at_every_offset_once(data: Examples) -> None:
+    pairs = []
+    for i in range(len(data.records)):
+        for k in range(3):
+            frames, _ = expected(data, i, k)
+            pairs += [(frames, tuple(ids.tolist())) for ids in data.sentences[i]]
+    assert sorted(rows(list(data.epoch(np.random.default_rng(0), 5, pairs=True)))) == sorted(pairs)
+
+
 def test_batches_depend_on_the_generator_alone_and_differ_between_epochs(data: Examples) -> None:
     one, same, other = (rows(list(data.epoch(np.random.default_rng(seed), 4))) for seed in (1, 1, 2))
     assert one == same

@@ -154,6 +154,9 @@ def test_the_report_of_a_perfect_describe_model(corpus: SplitStore) -> None:
     assert report["wording"] == pytest.approx(
         {"test_sentences": 15, "test_sentences_seen": 2 / 3, "test_motions_unseen": 5}
     )
+    seen = {sentence for said in corpus.references(corpus.parts.train) for sentence in said}
+    said = [sentence for one in corpus.references(corpus.parts.test) for sentence in one]
+    assert report["wording"]["test_sentences_seen"] == np.mean([sentence in seen for sentence in said])
     assert report["bleu_unseen"]["1"] < report["bleu_unseen"]["3"] == pytest.approx(1.0)
     test = corpus.parts.test
     unseen, best = corpus.unseen(test), [corpus.sentences(record)[0] for record in test]
@@ -290,7 +293,7 @@ def test_evaluate_refuses_before_it_measures(runs: Path, monkeypatch: pytest.Mon
 def test_evaluate_says_what_it_lacks(runs: Path) -> None:
     result = CliRunner().invoke(main, ["evaluate", str(runs / "describe")])
     assert (result.exit_code, "need --data" in result.output) == (2, True)
-    result = CliRunner().invoke(main, ["evaluate", str(runs / "describe"), "cmu-control"])
+    result = CliRunner().invoke(main, ["evaluate", str(runs / "describe"), "tdbn"])
     assert (result.exit_code, "separately" in result.output) == (2, True)
 
 

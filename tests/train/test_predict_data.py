@@ -28,6 +28,7 @@ from motet_train.papers.li2018.expmap import (
     CMU_LAYOUT,
     H36M_LAYOUT,
     Scaling,
+    _mirrored_columns,
     expmap_material,
     is_expmap,
     parse,
@@ -93,7 +94,42 @@ def test_gimbal_lock_is_as_in_the_code_of_the_papers(sign: float, first: float) 
     ],
 )
 def test_windows_begin_where_the_protocol_says(length: int, starts: list[int]) -> None:
-    assert window_starts(length).tolist() == starts
+    assert [start for _, start in window_starts([length])] == starts
+
+
+def test_windows_of_two_motions_are_drawn_in_turn_from_one_generator() -> None:
+    """As ``find_indices_srnn`` of the papers' code does for the two trials of an action of Human3.6M."""
+    lengths, generator = (1800, 2222), np.random.RandomState(1234567890)
+    expected = []
+    for _ in range(4):
+        expected.append((0, generator.randint(16, lengths[0] - 50 - 100)))
+        expected.append((1, generator.randint(16, lengths[1] - 50 - 100)))
+    starts = window_starts(lengths, 8, H36M_LAYOUT.first, H36M_LAYOUT.room)
+    assert starts == expected
+    motions = [motion + np.arange(2 * length)[:, None] for motion, length in zip((0, 10_000), lengths, strict=True)]
+    drawn = windows(motions, 8, H36M_LAYOUT)
+    assert drawn.shape == (8, 75, 1)
+    assert [int(window[0, 0]) for window in drawn] == [10_000 * motion + 2 * start for motion, start in expected]
+    with pytest.raises(DataError, match="of 166 frames is too short: windows need more than 166"):
+        window_starts((166, 900), 8, 16, 150)
+
+
+def test_a_mirrored_pose_of_human36m_has_left_and_right_exchanged() -> None:
+    """By the bones of Martinez et al. 2017: the hips lie along x, and the arms' bones along y, on both sides."""
+    columns, signs = (np.array(values) for values in _mirrored_columns(H36M_LAYOUT))
+    frame = np.random.default_rng(0).normal(size=99)
+    mirrored = frame[columns] * signs
+    flip = np.diag([-1.0, 1.0, 1.0])
+
+    def turned(vector: np.ndarray) -> np.ndarray:
+        return Rotation.from_rotvec(vector).as_matrix()
+
+    for joint, other in ((1, 6), (8, 3), (12, 12), (17, 25), (30, 22)):
+        own, across = (3 + 3 * one for one in (joint, other))
+        np.testing.assert_allclose(
+            turned(mirrored[own : own + 3]), flip @ turned(frame[across : across + 3]) @ flip, atol=1e-12
+        )
+    np.testing.assert_allclose(mirrored[columns] * signs, frame)
 
 
 def test_times_are_those_of_the_files() -> None:
@@ -139,7 +175,7 @@ def test_the_rotation_error_is_scipys_angle_and_does_not_leap_at_gimbal_lock() -
 def test_a_perfect_prediction_has_no_error_and_zero_velocity_grows() -> None:
     motion = 0.2 * np.sin(np.arange(400)[:, None] * np.linspace(0.01, 0.03, 117))
     scaling = Scaling(motion.mean(0), motion.std(0), tuple(range(117)))
-    truth = iter([windows(motion)])
+    truth = iter([windows([motion])])
     perfect = errors(predictions(lambda seed: next(truth)[:, 50:], {"x": [motion]}, scaling))["x"]
     assert perfect.max() == pytest.approx(0, abs=1e-12)
     still = errors(predictions(zero_velocity, {"x": [motion]}, scaling))["x"]
@@ -186,7 +222,7 @@ def test_what_is_no_corpus_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no training files"):
         scaling_of({})
     with pytest.raises(DataError, match="of 60 frames is too short"):
-        window_starts(60)
+        window_starts([60])
 
 
 def test_windows_keep_to_the_motions_and_the_recipe(tmp_path: Path) -> None:

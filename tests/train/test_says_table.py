@@ -210,7 +210,7 @@ def test_trials_of_a_folder(corpus: Path) -> None:
 def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = "a person runs straight forward"
     monkeypatch.setattr(table, "prompts", lambda: only(run))
-    result = CliRunner().invoke(main, ["evaluate", "cmu-generate", "--says", "--data", str(corpus), "--json"])
+    result = CliRunner().invoke(main, ["evaluate", "language-to-motion", "--says", "--data", str(corpus), "--json"])
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)
     assert report["prompt"] == report["prompt_real"] == report["prompt_lookup"] == {run: 1.0}
@@ -222,10 +222,10 @@ def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch
 
 def test_the_command_says_what_does_not_go_together(tmp_path: Path) -> None:
     for arguments, said in (
-        (["cmu-generate", "--save"], "drop --save"),
+        (["language-to-motion", "--save"], "drop --save"),
         (["describe"], "not describe"),
-        (["cmu-generate", "--search", "describe"], "need one for 'search'"),
-        (["cmu-generate", "--data", str(tmp_path)], "no motion files"),
+        (["language-to-motion", "--search", "describe"], "need one for 'search'"),
+        (["language-to-motion", "--data", str(tmp_path)], "no motion files"),
     ):
         result = CliRunner().invoke(main, ["evaluate", "--says", *arguments])
         assert result.exit_code != 0

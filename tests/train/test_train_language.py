@@ -215,5 +215,7 @@ PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
 @pytest.mark.parametrize(("recipe", "config", "clip"), PAPER)
 def test_the_paper_preset_is_table_1(recipe: Recipe, config: Callable[[int, int], object], clip: float) -> None:
     assert recipe.sized(channels=44, words=1344) == config(44, 1344)
-    assert recipe.training == Training(epochs=100, batch=128, learning_rate=1e-3, optimiser="nadam", clip=clip)
-    assert recipe.visits == LanguageVisits(offsets=None, windows=None, mirror=False)
+    assert recipe.training == Training(
+        epochs=100, batch=128, learning_rate=1e-3, optimiser="nadam", clip=clip, keep="last"
+    )
+    assert recipe.visits == LanguageVisits(offsets=None, windows=None, mirror=False, pairs=True)

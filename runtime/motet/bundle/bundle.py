@@ -8,6 +8,7 @@ docs/reference/bundle.md describes the format.
 import hashlib
 import io
 import json
+import logging
 import os
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -27,7 +28,11 @@ from motet.bundle.members import Archive, Folder, array_of
 from motet.errors import BundleError
 from motet.files import new_folder, write_whole
 
+log = logging.getLogger(__name__)
+
 DEFAULT_BUNDLES = Path(__file__).parents[1] / "bundles"
+RENAMED = {"cmu-control": "tdbn", "cmu-generate": "language-to-motion"}
+"""Names that bundles had before -> their names."""
 MAX_MANIFEST = 4 << 20
 """Bytes; as JSON objects in memory they can be twenty times as many."""
 
@@ -139,15 +144,21 @@ def find_bundle(name_or_path: str | Path) -> Path:
         fault = "neither a folder nor a file" if path.exists() else "no such path"
     except (OSError, TypeError, ValueError) as error:
         fault = str(error)
-    more = "" if entry_points(group="motet.bundles") else "; more with pip install ./papers, from a clone of motet"
-    raise BundleError(f"unknown bundle {name!r}: {fault}; expected one of {', '.join(known)}{more}")
+    if name in RENAMED:
+        raise BundleError(f"the bundle {name!r} is {RENAMED[name]!r} now")
+    raise BundleError(f"unknown bundle {name!r}: {fault}; expected one of {', '.join(known)}")
 
 
 def list_bundles() -> dict[str, Path]:
     """The installed bundles by name: motet's own, and those of packages with an entry point ``motet.bundles``."""
-    plugins = [Path(str(resources.files(point.value))) for point in entry_points(group="motet.bundles")]
-    # motet's own come first
-    found = {path.stem: path for folder in [*reversed(plugins), DEFAULT_BUNDLES] for path in folder.glob("*.zip")}
+    folders = [DEFAULT_BUNDLES]
+    for point in entry_points(group="motet.bundles"):
+        try:
+            folders.append(Path(str(resources.files(point.value))))
+        except ImportError as error:
+            log.info("the bundles of %s are left out: %s", point.value, error)
+    # motet's own come last, and so replace others of their names
+    found = {path.stem: path for folder in reversed(folders) for path in folder.glob("*.zip")}
     return dict(sorted(found.items()))
 
 

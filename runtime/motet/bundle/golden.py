@@ -1,8 +1,8 @@
 """Golden vectors: inputs, noise and outputs of a bundle's graphs and of one whole run, to be computed again anywhere.
 
 They are arrays in an .npz: ``ROLE.in.NAME`` and ``ROLE.out.NAME`` of one call of each graph, ``run.in.NAME`` and
-``run.out.NAME`` of the run, whose settings are in the manifest. docs/reference/bundle.md says what the run
-of each verb is.
+``run.out.NAME`` of the run, whose settings are in the manifest, and ``meaning.in.NAME`` and ``meaning.out.NAME``, which
+hold the manifest to the graphs. docs/reference/bundle.md says what the run of each verb is.
 """
 
 import math
@@ -17,9 +17,13 @@ from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Golden
 from motet.bundle.members import Archive, array_bytes, array_of
 from motet.errors import BundleError
+from motet.motion.rotations import Array
 
-TOLERANCE = 1e-3
-"""On :func:`difference`, for graphs in float32: processors round differently, and a run carries that on."""
+TOLERANCE = 1e-4
+"""On :func:`difference`, for graphs in float32: processors round differently, and a run carries that on. The bundles of
+nets that amplify rounding have a larger one."""
+
+MEANING = "meaning"
 
 
 class Replayable(Protocol):
@@ -30,22 +34,30 @@ class Replayable(Protocol):
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The outputs of the whole run."""
 
+    def meaning(self, frames: Array) -> Arrays:
+        """What frames (T, D), and the ids of words, mean by the manifest."""
 
-def vectors(model: Replayable, feeds: Mapping[str, Arrays], given: Arrays, settings: Mapping[str, Any]) -> bytes:
-    """The golden vectors of a model: of its graphs from the ``feeds`` of each role, and of a run."""
+
+def vectors(
+    model: Replayable, feeds: Mapping[str, Arrays], given: Arrays, settings: Mapping[str, Any], frames: Array
+) -> bytes:
+    """The golden vectors of a model: of its graphs from the ``feeds`` of each role, of a run, and of the meaning of
+    ``frames`` (T, D)."""
     arrays: dict[str, Arrays] = {}
     for role, inputs in feeds.items():
         arrays |= {f"{role}.in": inputs, f"{role}.out": model.graphs[role](inputs)}
     arrays |= {"run.in": given, "run.out": model.replay(given, settings)}
+    arrays |= {f"{MEANING}.in": {"frames": frames}, f"{MEANING}.out": model.meaning(frames)}
     return archive_bytes(
         {f"{a}.{b}.npy": array_bytes(value) for a, part in arrays.items() for b, value in part.items()}
     )
 
 
 def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
-    """The :func:`difference` of each graph and of the run from the vectors ``data``.
+    """The :func:`difference` of each graph, of the run and of the meaning from the vectors ``data``.
 
-    BundleError where one is above the tolerance, or the vectors do not fit the model.
+    BundleError where one is above the tolerance, or the vectors do not fit the model. Vectors that were written before
+    there was a meaning among them have none.
     """
     arrays = read(data)
     found = {}
@@ -56,10 +68,19 @@ def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise BundleError(f"the golden run cannot be replayed: {error}") from error
     found["run"] = difference(run, _part(arrays, "run.out."))
+    if any(name.startswith(f"{MEANING}.") for name in arrays):
+        found[MEANING] = _meaning_difference(model, arrays)
     for name, off in found.items():
         if not off <= golden.tolerance:
             raise BundleError(f"golden vectors, {name}: off by {off:.2e}, the tolerance is {golden.tolerance:g}")
     return found
+
+
+def _meaning_difference(model: Replayable, arrays: Arrays) -> float:
+    frames = _part(arrays, f"{MEANING}.in.").get("frames")
+    if frames is None or frames.ndim != 2 or not len(frames):
+        raise BundleError(f"the golden vectors have no {MEANING}.in.frames of shape (T, D)")
+    return difference(model.meaning(frames), _part(arrays, f"{MEANING}.out."))
 
 
 def difference(found: Arrays, expected: Arrays) -> float:

@@ -291,7 +291,7 @@ def control(
     Orders are separated by commas: a gait, "turn" or "stop", and in any order seconds ("3s"), a speed in m/s ("speed
     1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90"). "act jump" does something
     once, "act 'wave'" as the bundle generate shows it.
-    With --bundle cmu-control: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
+    With --bundle tdbn: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     output.check(out)
     model = load_as(ControlModel, bundle, session)

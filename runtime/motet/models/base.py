@@ -1,5 +1,6 @@
 """The base of all models: a manifest, a motion contract, graphs, and the bundle they were loaded from."""
 
+import hashlib
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -7,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
+import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.bundle import Bundle
@@ -14,7 +16,9 @@ from motet.bundle.graph import Arrays, Graph, SessionOptions, Sizes, TensorSpec,
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import Loop
 from motet.errors import BundleError
+from motet.motion.kinematics import positions
 from motet.motion.motion import Motion, with_frames
+from motet.motion.rotations import Array
 from motet.settings import Settings
 
 S = TypeVar("S", bound=Settings)
@@ -124,3 +128,33 @@ class BundleModel(ABC):
     @abstractmethod
     def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The complete run of the golden vectors (docs/reference/bundle.md): outputs from its inputs and settings."""
+
+    def meaning(self, frames: Array) -> Arrays:
+        """What the manifest makes of numbers, for the golden vectors: it is in no graph.
+
+        frames: (T, D) in the contract's units. Gives "normal", the same in standard deviations from the mean; "seconds"
+        (1,), how long they last; "places" (T, J, 3), the joints of the figure that they move, in metres, where there is
+        a skeleton; and "names" (32,) int64, the SHA-256 of the names of all channels, of all words in the order of
+        their ids, and of the labels, each on a line. BundleError where the frames have another number of channels.
+        """
+        contract = self.contract
+        if frames.shape[1] != len(contract.channels):
+            raise BundleError(f"golden vectors: frames have {len(contract.channels)} channels, not {frames.shape[1]}")
+        outputs: dict[str, NDArray[Any]] = {
+            "normal": contract.normalised(frames),
+            "seconds": np.array([len(frames) / contract.fps]),
+        }
+        if contract.skeleton is not None:
+            scale = contract.skeleton.metres_per_unit or 1.0
+            outputs["places"] = scale * positions(contract.motion(frames, plant=False))
+        digest = hashlib.sha256("\n".join(self._names()).encode()).digest()
+        outputs["names"] = np.frombuffer(digest, dtype=np.uint8).astype(np.int64)
+        return outputs
+
+    def _names(self) -> list[str]:
+        """Of channels, of words in the order of their ids, and of labels."""
+        names = [*self.contract.channels, *self.manifest.vocabulary]
+        names += [f"{word} {known}" for word, known in self.manifest.common.items()]
+        if self.manifest.control is not None:
+            names += self.manifest.control.labels
+        return names

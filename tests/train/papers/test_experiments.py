@@ -37,7 +37,7 @@ def clips() -> Clips:
 
 
 def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: Clips) -> None:
-    model = load("cmu-control")
+    model = load("tdbn")
     report = control_report(study_of(model, clips))
     missed = {
         name: report[name.split(".")[0]][name.split(".")[1]]
@@ -65,7 +65,7 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
 
 
 def test_a_linear_autoregression_has_no_cycle(clips: Clips) -> None:
-    study = autoregression(study_of(load("cmu-control"), clips))
+    study = autoregression(study_of(load("tdbn"), clips))
     figures = limit_cycle(study, seconds=60.0)
     # what is linear dies out or blows up: no motion of the right size and period is left after a minute
     assert np.isfinite(figures["energy"])
@@ -73,7 +73,7 @@ def test_a_linear_autoregression_has_no_cycle(clips: Clips) -> None:
 
 
 def test_figures_have_the_names_of_the_labels(clips: Clips) -> None:
-    study = study_of(load("cmu-control"), clips)
+    study = study_of(load("tdbn"), clips)
     other = replace(study, walk="stroll", run="jog", bend="wave")
     names = ("bend.share_from_run", "cycle_run.period_s", "hysteresis.walk_to", "gait.share")
     assert [by_label(study, name) for name in names] == list(names)
@@ -83,7 +83,7 @@ def test_figures_have_the_names_of_the_labels(clips: Clips) -> None:
 
 
 def test_figures_that_the_clips_allow_are_drawn(clips: Clips, tmp_path: Path) -> None:
-    study = study_of(load("cmu-control"), clips)
+    study = study_of(load("tdbn"), clips)
     assert len(drawings(study)) == 7
     assert list(drawings(replace(study, run=None, bend=None, legs=None))) == ["figure-5.2-limit-cycle"]
     some = {name: draw for name, draw in drawings(study).items() if "5.3" in name or "5.7" in name}

@@ -298,7 +298,7 @@ def test_strips_are_seed_frames_and_what_follows(tmp_path: Path) -> None:
     data = write_files(tmp_path / "data")
     corpus = read_expmap(data)
     found = strips({"run": loaded(saved(tmp_path / "run", data, 0))}, corpus, "walking", SKELETON)
-    window = windows(corpus.test["walking"]["test/walking/walking_1.txt"])[0]
+    window = windows([corpus.test["walking"]["test/walking/walking_1.txt"]])[0]
     assert [points.shape for points in found.values()] == [(SEED_POSES + 13, 38, 3)] * 2
     np.testing.assert_allclose(found["truth"][SEED_POSES - 1], places(window[50 - FRAMES_APART], SKELETON))
     np.testing.assert_allclose(found["truth"][-1], places(window[-1], SKELETON))

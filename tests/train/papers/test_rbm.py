@@ -52,6 +52,27 @@ def test_reconstruction_is_a_sample_and_then_means() -> None:
     np.testing.assert_allclose(end_hidden[0], probabilities(expected), atol=1e-6)
 
 
+def test_the_thesis_procedure_is_one_reconstruction() -> None:
+    """Thesis 3.2: hidden units of the data, visible units of these, and hidden units of those; then the update."""
+    rbm, frames = small_rbm(), torch.tensor([[0.5, -1.0, 0.3]])
+    before = {name: value.clone() for name, value in rbm.named_parameters()}
+    learning = Learning(1, rate=0.1, batch=1, decay=0.0, temperature=(1.0, 1.0))
+    layer = RBMLayer(rbm, frames, torch.ones(1), learning, torch.Generator().manual_seed(3))
+    layer.epoch(0)
+    generator = torch.Generator().manual_seed(3)
+    torch.multinomial(torch.ones(1), 1, replacement=True, generator=generator)
+    noise = torch.rand(1, 1, 1, 4, generator=generator)[0, 0]
+
+    def hidden(visible: torch.Tensor) -> torch.Tensor:
+        return torch.sigmoid(visible @ before["weight"] + before["hidden_bias"])
+
+    first = (noise < hidden(frames)).float()
+    again = first @ before["weight"].T + before["visible_bias"]
+    learned = 0.1 * (frames.T @ first - again.T @ hidden(again)) * rbm.mask
+    np.testing.assert_allclose(rbm.weight - before["weight"], learned, atol=1e-6)
+    np.testing.assert_allclose(rbm.visible_bias - before["visible_bias"], 0.1 * (frames - again)[0], atol=1e-6)
+
+
 def test_ascent_has_momentum_and_decay() -> None:
     value = torch.tensor([[1.0, -2.0]])
     ascent = Ascent(value, decay=0.5)

@@ -132,9 +132,18 @@ def test_the_parts_cover_the_columns_of_the_cmu_files_once() -> None:
     assert [c + 18 for c in limbs[2]] == limbs[3]
 
 
+def test_the_parts_of_human36m_are_those_of_jain() -> None:
+    """The ranges of features in the code of Jain et al. 2016: torso, left and right arm, left and right leg."""
+    spine, *limbs = parts_of(H36M_LAYOUT, range(99))
+    assert spine == (*range(6), *range(36, 51))
+    assert limbs == [tuple(range(51, 75)), tuple(range(75, 99)), tuple(range(21, 36)), tuple(range(6, 21))]
+
+
 def test_layouts_that_do_not_fit_are_refused() -> None:
-    with pytest.raises(DataError, match="h36m-expmap does not say which columns"):
+    with pytest.raises(DataError, match="h36m-expmap: columns kept from 51 and from 75 on are not the same"):
         parts_of(H36M_LAYOUT, range(54))
+    with pytest.raises(DataError, match="cmu-expmap does not say which columns"):
+        parts_of(replace(CMU_LAYOUT, pairs=()), KEPT)
     with pytest.raises(DataError, match="from 63 and from 90 on are not the same"):
         parts_of(CMU_LAYOUT, KEPT[:-1])
 

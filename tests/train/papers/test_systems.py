@@ -11,12 +11,16 @@ import torch
 from click.testing import CliRunner, Result
 from test_predict_data import write_files
 
+from motet.bundle.manifest import Manifest
 from motet.cli import main
+from motet.formats import read_motion, write_motion
+from motet.predict.model import PredictModel
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.papers.li2018 import SYSTEMS
 from motet_train.papers.li2018.convseq2seq import Config
-from motet_train.papers.li2018.expmap import expmap_material, read_expmap, validation_files
+from motet_train.papers.li2018.expmap import H36M_LAYOUT, expmap_material, read_expmap, validation_files
 from motet_train.papers.li2018.recipe import RECIPES, sized, validation_error
-from motet_train.recipes.recipe import Recipe
+from motet_train.recipes.recipe import Recipe, Visits
 from motet_train.runs import Run
 from motet_train.trainer import CHECKPOINT
 
@@ -67,6 +71,30 @@ def test_it_is_evaluated(trained: Path, data: Path) -> None:
     shown = run("evaluate", trained, "--data", data, "--json")
     assert shown.exit_code == 0, shown.output
     assert "frame_24" in shown.stdout
+
+
+def test_motion_files_teach_it_to_continue_a_figure(tmp_path: Path) -> None:
+    data, out = tmp_path / "data", tmp_path / "run"
+    data.mkdir()
+    walk = read_motion(CMU_FOLDER / "39_14.amc").scaled(0.01)
+    for n in range(10):
+        write_motion(data / f"{n:02}_01.npz", walk[5 * n : 5 * n + 340])
+    given = ("--data", data, "-o", out, "--steps", 1, "--batch", 2)
+    trained = run("train", "convseq2seq", *given, "--adversary", 0.01)
+    assert trained.exit_code == 0, trained.output
+    found = Run.load(out)
+    assert len(found.manifest["training"]["data"]["test"]) == 1
+    model = PredictModel(Manifest.from_json(found.manifest), found.torch_graphs())
+    after = model.predict(walk, frames=60)
+    assert (len(after), after.channels, after.skeleton) == (60, walk.channels, walk.skeleton)
+    jump = np.abs(after.values[0, :3] - walk.values[-1, :3]).max()
+    assert jump < 10  # centimetres: it goes on from where the walk ends
+    for command, more, said in (
+        ("srnn", (), "exponential-map text files"),
+        ("convseq2seq", ("--all-files",), "--all-files is for text files"),
+    ):
+        refused = run("train", command, "--data", data, "-o", tmp_path / command, "--steps", 1, *more)
+        assert (refused.exit_code, said in refused.stderr) == (2, True)
 
 
 def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None:
@@ -136,6 +164,10 @@ def test_the_presets_are_the_papers_and_its_codes(data: Path) -> None:
     assert settings(code) == (16, 5e-5, 0.0005)
     assert sized(paper, material) == Config(70)
     assert sized(code, material) == Config(70, dropout=(0.2, 0.2, 0.5), own=0.95)
+    human = replace(material, layout=H36M_LAYOUT)
+    assert sized(paper, human) == Config(70, padding="same")
+    assert sized(code, human).padding == "same"
+    assert paper.visits == code.visits == Visits()  # neither the paper nor its code has augmentation
 
 
 def test_log_has_a_line_for_each_validation(trained: Path) -> None:

@@ -32,6 +32,16 @@ def test_the_net_has_the_thesis_sizes() -> None:
     assert used == 56 * 30 + 56 + 150 + 67500 + 150 + 20 * 150 + 20  # "about 72 k parameters in all"
 
 
+def test_the_thesis_second_layer_is_one_block_for_two_gaits_and_equal_parts_for_three() -> None:
+    """Thesis 5.3 and 5.4."""
+    parts = [0, 0, 1]
+    two, three = (TDBN(TDBNConfig.thesis(), parts, labels=count) for count in (2, 3))
+    assert two.crbm.control_units == 20
+    assert two.expansion.tolist() == [[0.0] * 20, [1.0] * 20]
+    assert three.expansion.tolist() == np.repeat(np.eye(3), 7, axis=1).tolist()
+    assert TDBNConfig.thesis().rbm.steps == 1
+
+
 def test_training_repeats_by_its_seed() -> None:
     first, again, other = (train(seed=seed).model.state_dict() for seed in (1, 1, 2))
     assert all(torch.equal(first[name], again[name]) for name in first)

@@ -20,7 +20,7 @@ from motet_train.papers.plappert2017 import recipe as plappert2017
 from motet_train.papers.plappert2017.language_to_motion import LOSSES
 from motet_train.papers.tdbn import recipe as tdbn
 from motet_train.papers.tdbn import steered
-from motet_train.papers.tdbn.clips import read_clips
+from motet_train.papers.tdbn.clips import Clips, read_clips
 from motet_train.plan import PLANNED_VERBS, STAGES, Plan
 from motet_train.recipes import actions, codec, codes, fill, known, language, matching, predict, search
 from motet_train.recipes.actions import WordVectors
@@ -100,10 +100,7 @@ augmentation = with_options(
 )
 
 
-@train.add_command
-@train_command(
-    "predict",
-    predict.RECIPES,
+predictor_data = with_options(
     click.option(
         "--data",
         type=Path,
@@ -117,9 +114,11 @@ augmentation = with_options(
         type=click.Choice(["trial", "subject"]),
         help="How to hold out motion files: at random, or by person. [default: subject]",
     ),
-    steps,
-    augmentation,
 )
+
+
+@train.add_command
+@train_command("predict", predict.RECIPES, predictor_data, steps, augmentation)
 def train_predictor(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     """Train a predictor: a net that continues a motion from its last frames.
 
@@ -134,11 +133,19 @@ def train_predictor(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     return predict.train_predict(expmap_material(read_expmap_files(data)), job)
 
 
+MISSING_SHOWN = 10
+"""Files that are missing, of which each has a line; the others are counted."""
+
+
 def read_expmap_files(data: Path) -> ExpmapCorpus:
     """The corpus of text files in a folder or zip; missing files are named on stderr."""
     corpus = read_expmap(data)
     if corpus.missing and distributed.rank() == 0:
-        click.echo(f"motet: {data} lacks {len(corpus.missing)} files: {', '.join(corpus.missing)}", err=True)
+        shown = corpus.missing[:MISSING_SHOWN]
+        for name in shown:
+            click.echo(f"motet: {data} lacks {name}", err=True)
+        if more := len(corpus.missing) - len(shown):
+            click.echo(f"motet: {data} lacks {more} files more", err=True)
     return corpus
 
 
@@ -153,12 +160,21 @@ clips_data = with_options(
 )
 
 
-# seed 6 is that of the bundle cmu-control
+labels = click.option("--labels", help='Labels to train on, such as "walk,run". [default: all]')
+
+
+# seed 6 is that of the bundle tdbn
 @train.add_command
-@train_command("tdbn", tdbn.RECIPES, clips_data, defaults={"seed": 6, "out": "runs/tdbn", "name": "cmu-control"})
-def train_tdbn(job: Job, data: Path | None, unit_in: str | None) -> Run:
+@train_command("tdbn", tdbn.RECIPES, clips_data, labels, defaults={"seed": 6, "out": "runs/tdbn", "name": "tdbn"})
+def train_tdbn(job: Job, data: Path | None, unit_in: str | None, labels: str | None) -> Run:
     """Train a temporal deep belief net for live control, on short labelled clips."""
-    return tdbn.train_control(read_clips(data, job.recipe.config.root_rotation, unit_in), job)
+    return tdbn.train_control(labelled_clips(data, job.recipe.config.root_rotation, unit_in, labels), job)
+
+
+def labelled_clips(data: Path | None, root_rotation: bool, unit_in: str | None, labels: str | None) -> Clips:
+    """The clips of a folder; of ``labels``, separated by commas, alone."""
+    clips = read_clips(data, root_rotation, unit_in)
+    return clips.only([label.strip() for label in labels.split(",")]) if labels else clips
 
 
 @train.add_command
@@ -166,7 +182,7 @@ def train_tdbn(job: Job, data: Path | None, unit_in: str | None) -> Run:
     "crbm",
     tdbn.BASELINES,
     clips_data,
-    click.option("--labels", help='Labels to train on, such as "walk,run". [default: all]'),
+    labels,
     click.option("--past-rate", type=float, help="Rate from past to angles. [default: the preset's]"),
     click.option("--control-units", type=click.IntRange(1), help="Units per label. [default: the preset's]"),
     epochs,
@@ -178,8 +194,7 @@ def train_crbm(job: Job, data: Path | None, unit_in: str | None, labels: str | N
     if epochs is not None:
         config = replace(config, crbm=replace(config.crbm, epochs=epochs))
         job = replace(job, recipe=replace(job.recipe, config=config))
-    clips = read_clips(data, config.root_rotation, unit_in)
-    return tdbn.train_control(clips.only([label.strip() for label in labels.split(",")]) if labels else clips, job)
+    return tdbn.train_control(labelled_clips(data, config.root_rotation, unit_in, labels), job)
 
 
 NETS = {
@@ -253,10 +268,16 @@ _on_store("steered-tdbn", steered.RECIPES, steered.train_steered)
 def _system(name: str, title: str) -> None:
     """Add the command of a published system that predicts."""
 
-    def run(job: Job, data: Path, all_files: bool) -> Run:
-        corpus = read_expmap_files(data)
-        kept_back = () if all_files else validation_files(corpus)
-        return li2018.train_system(expmap_material(corpus, kept_back), job)
+    def run(job: Job, data: Path, all_files: bool, by: str | None, **corpus: Any) -> Run:
+        if not is_expmap(data):
+            if all_files:
+                raise DataError(f"{data} has no test files of its own: --all-files is for text files of the protocol")
+            return li2018.train_system(store_material(prepared(data, job, **corpus), data.name, by or "subject"), job)
+        if by is not None:
+            raise DataError(f"{data} has its own test files: --split is for motion files")
+        files = read_expmap_files(data)
+        kept_back = () if all_files else validation_files(files)
+        return li2018.train_system(expmap_material(files, kept_back), job)
 
     run.__doc__ = f"Train {title}, a baseline of `motet train predict`."
     switches = (ablations,) if name == "convseq2seq" else ()
@@ -264,7 +285,7 @@ def _system(name: str, title: str) -> None:
 
 
 of_system = with_options(
-    click.option("--data", type=Path, required=True, help="Folder or zip of exponential-map text files."),
+    predictor_data,
     steps,
     click.option("--batch", type=click.IntRange(1), help="Windows per batch. [default: the preset's]"),
     click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="[default: the preset's]"),

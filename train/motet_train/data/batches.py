@@ -22,6 +22,9 @@ from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
 
+Visit = tuple[int, int, int | None]
+"""A motion, its down-sampling offset, and which of its sentences; None for one that is drawn."""
+
 Cut = Callable[[NDArray[Any], np.random.Generator], NDArray[Any]]
 """Takes frames (T, D) of a motion and random numbers; gives an excerpt (T', D), perhaps changed."""
 
@@ -82,33 +85,36 @@ class Examples:
     mirror: FrameMirror | None = None
 
     def epoch(
-        self, rng: np.random.Generator, batch: int, offsets: int | None = None, windows: tuple[int, int] | None = None
+        self,
+        rng: np.random.Generator,
+        batch: int,
+        offsets: int | None = None,
+        windows: tuple[int, int] | None = None,
+        pairs: bool = False,
     ) -> Iterator[Batch]:
         """Visit each motion once, in batches of at most ``batch``, each with one of its sentences drawn afresh.
+
+        pairs: visit it once with each of its sentences instead.
 
         Every down-sampling offset of a motion is a visit of its own; ``offsets`` draws only so many of them. With a
         mirror, half of the visits are to the mirrored motion and sentence. With ``windows`` a batch takes at most
         :func:`drawn_length` frames of a motion, from a random start.
         """
         longest = windows[1] if windows else sys.maxsize
-        batches = self._batches(rng, batch, offsets, longest)
+        batches = self._batches(rng, batch, offsets, longest, pairs)
         for place in rng.permutation(len(batches)):
             limit = drawn_length(rng, windows) if windows else sys.maxsize
-            yield _padded([self._visit(rng, i, offset, limit) for i, offset in batches[place]])
+            yield _padded([self._visit(rng, visit, limit) for visit in batches[place]])
 
     def _batches(
-        self, rng: np.random.Generator, batch: int, offsets: int | None, longest: int
-    ) -> list[list[tuple[int, int]]]:
-        """Visits (motion, offset) in random order, grouped into batches of similar length."""
-        # every motion at some or all of its offsets
-        visits = []
-        for i, record in enumerate(self.records):
-            for offset in rng.permutation(len(self.store.records[record].spans))[:offsets]:
-                visits.append((i, int(offset)))
+        self, rng: np.random.Generator, batch: int, offsets: int | None, longest: int, pairs: bool
+    ) -> list[list[Visit]]:
+        """Visits in random order, grouped into batches of similar length."""
+        visits = self._visits(rng, offsets, pairs)
         shuffled = [visits[i] for i in rng.permutation(len(visits))]
 
-        def length(visit: tuple[int, int]) -> int:
-            return min(self._length(*visit), longest)
+        def length(visit: Visit) -> int:
+            return min(self._length(*visit[:2]), longest)
 
         # sorting more motions together would waste less on padding, but mix them less
         together = 16 * batch
@@ -117,6 +123,15 @@ class Examples:
             similar = sorted(shuffled[start : start + together], key=length)
             batches += [similar[i : i + batch] for i in range(0, len(similar), batch)]
         return batches
+
+    def _visits(self, rng: np.random.Generator, offsets: int | None, pairs: bool) -> list[Visit]:
+        """Every motion at some or all of its offsets, once or with each of its sentences."""
+        visits: list[Visit] = []
+        for i, record in enumerate(self.records):
+            sentences = range(len(self.sentences[i])) if pairs else (None,)
+            for offset in rng.permutation(len(self.store.records[record].spans))[:offsets]:
+                visits += [(i, int(offset), sentence) for sentence in sentences]
+        return visits
 
     def everything(self, batch: int, longest: int | None = None) -> Iterator[Batch]:
         """The first ``longest`` frames of every motion, at its first offset, with each of its sentences: to validate.
@@ -138,10 +153,12 @@ class Examples:
         start, stop = self.store.records[self.records[i]].spans[offset]
         return stop - start
 
-    def _visit(self, rng: np.random.Generator, i: int, offset: int, longest: int) -> tuple[Floats, bool, Ids]:
+    def _visit(self, rng: np.random.Generator, visit: Visit, longest: int) -> tuple[Floats, bool, Ids]:
+        i, offset, sentence = visit
         start = int(rng.integers(max(0, self._length(i, offset) - longest) + 1))
         frames, ended = self._excerpt(i, offset, start, longest)
-        sentence = int(rng.integers(len(self.sentences[i])))
+        if sentence is None:
+            sentence = int(rng.integers(len(self.sentences[i])))
         if self.mirror is not None and rng.random() < 0.5:
             return self.mirror(frames), ended, self.mirrored[i][sentence]
         return frames, ended, self.sentences[i][sentence]

@@ -158,7 +158,9 @@ def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
 
     # the same on references that are not in training
     copied = corpus.references(nearest_motions(corpus, corpus.motions(test)))
-    yield _unseen(hypotheses, copied, references, corpus.unseen(test))
+    trained = corpus.trained_sentences()
+    seen = sum(sentence in trained for sentences in references for sentence in sentences)
+    yield _unseen(hypotheses, copied, references, corpus.unseen(test), seen)
 
     # the best description of each motion against the floors
     best = [row[0] for row in hypotheses]
@@ -191,13 +193,19 @@ def _table_2(part: str, hypotheses: list[list[str]], references: References) -> 
     }
 
 
-def _unseen(hypotheses: list[list[str]], copied: References, references: References, unseen: References) -> Report:
-    """BLEU on references that occur in no training sentence, their number, and the floor."""
+def _unseen(
+    hypotheses: list[list[str]], copied: References, references: References, unseen: References, seen: int
+) -> Report:
+    """BLEU on the sentences of motions that no training saw, beside the floor.
+
+    references: what was said about the motions; ``seen`` of these sentences stand in training, word for word. unseen:
+    for each motion the others, and those of the pool "test", which are no references.
+    """
     motions = [i for i, sentences in enumerate(unseen) if sentences]
     sentences = sum(map(len, references))
     wording = {
         "test_sentences": float(sentences),
-        "test_sentences_seen": 1 - sum(map(len, unseen)) / sentences,
+        "test_sentences_seen": seen / sentences,
         "test_motions_unseen": float(len(motions)),
     }
     if not motions:

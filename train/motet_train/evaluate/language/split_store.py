@@ -60,9 +60,13 @@ class SplitStore:
             described = np.sort(np.random.default_rng(0).choice(described, most, replace=False))
         return tuple(described.tolist())
 
+    def trained_sentences(self) -> set[str]:
+        """The sentences about training motions, normalised."""
+        return {sentence for sentences in self.references(self.parts.train) for sentence in sentences}
+
     def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
         """The sentences of several records that are not in training: the reserved ones and new ones."""
-        known = {sentence for sentences in self.references(self.parts.train) for sentence in sentences}
+        known = self.trained_sentences()
         unseen = []
         for record in records:
             sentences = (*self.kept(record), *self.sentences(record))

@@ -22,9 +22,11 @@ SLOPE = 0.2
 class Config:
     """Sizes of the net; the defaults are the paper's for CMU, and the switches those of its ablations.
 
-    window: C of the short-term encoder, eq. 2. kernel: frames x channels. padding: "valid" (none, CMU) or "same"
-    (Human3.6M), which a window of 5 frames and other kernels need. long_term: the encoder of the whole seed:
-    convolutional, an LSTM, or none. dropout: of each convolution's outputs. decoder_dropout: of the decoder's hidden
+    window: C of the short-term encoder, eq. 2. kernel: frames x channels. padding: "valid" (none) or "same",
+    which a window of 5 frames and other kernels need. The paper does not say; its authors' code has "valid" for CMU and
+    "same" for Human3.6M, and "paper", in recipes alone, becomes that of the data. long_term: the encoder of the seed:
+    convolutional, an LSTM, or none. It sees all frames but the last, 49 of 50, as in the authors' code; eq. 1 has all.
+    dropout: of each convolution's outputs. decoder_dropout: of the decoder's hidden
     units. own: share of predicted frames among those fed back in training, eta in eq. 10. loss: "square", the mean
     squared distance of predicted frames, eq. 7, or "distance", their mean distance, which is the final measure and
     gives early frames, whose errors are small, more weight.
@@ -34,7 +36,7 @@ class Config:
     seed_frames: int = 50
     window: int = 20
     kernel: tuple[int, int] = (2, 7)
-    padding: Literal["valid", "same"] = "valid"
+    padding: Literal["valid", "same", "paper"] = "valid"
     long_term: Literal["convolutional", "recurrent", "none"] = "convolutional"
     filters: tuple[int, ...] = (64, 128, 128)
     units: int = 512

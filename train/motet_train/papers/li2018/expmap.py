@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Literal
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,9 @@ class Layout:
     """The files of a corpus in its archive or folder, and the columns of a line.
 
     train, test: group -> names. fps: of the files. pairs: (left, right, width), spans of columns that are mirrored.
-    extra: training groups that are not measured, as their test files are missing; they count half.
+    extra: training groups that are not measured, as their test files are missing; they count half. first, room: a test
+    window of a motion of T sub-sampled frames starts in [first, T - room). padding: of the convolutions of Li et al.
+    2018.
     """
 
     name: str
@@ -59,6 +62,9 @@ class Layout:
     fps: float
     pairs: tuple[tuple[int, int, int], ...] = ()
     extra: tuple[str, ...] = ()
+    first: int = 0
+    room: int = PROTOCOL_WINDOW
+    padding: Literal["valid", "same"] = "valid"
 
     @property
     def names(self) -> list[str]:
@@ -103,8 +109,14 @@ H36M_LAYOUT = Layout(
     {f"S{subject}": _of_subject(subject) for subject in (1, 6, 7, 8, 9, 11)},
     {action: _numbered(f"S5/{action}", 2) for action in H36M_ACTIONS},
     50.0,
+    pairs=((21, 6, 15), (51, 75, 24)),
+    first=16,
+    room=150,
+    padding="same",
 )
-"""Human3.6M in its usual division: two trials of fifteen actions, with subject 5 for testing."""
+"""Human3.6M in its usual division: two trials of fifteen actions, with subject 5 for testing. Its 32 joints are the hips,
+the right leg, the left leg, the spine with the head, the left arm and the right arm (Jain et al. 2016). The hips lie along
+x, and all other bones along y or z, so left and right are mirrored like CMU's."""
 
 
 @dataclass(frozen=True, eq=False)

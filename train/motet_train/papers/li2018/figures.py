@@ -86,7 +86,7 @@ def strips(
 
     The first :data:`SEED_POSES` poses are seed frames. The root's rotation is drawn as predicted, though not measured.
     """
-    window = windows(next(iter(corpus.test[action].values())), 1)
+    window = windows(list(corpus.test[action].values()), 1, corpus.layout)
     seed = window[:, :SEED_FRAMES]
     frames = {"truth": window}
     for name, model in models.items():

@@ -23,6 +23,7 @@ from motet_train.evaluate.predict.floors import (
     turned_on,
 )
 from motet_train.papers.li2018.expmap import (
+    CMU_LAYOUT,
     CONSTANT_STD,
     OUTPUT_FRAMES,
     PROTOCOL_WINDOW,
@@ -30,6 +31,7 @@ from motet_train.papers.li2018.expmap import (
     SEED_FRAMES,
     STRIDE,
     ExpmapCorpus,
+    Layout,
     Scaling,
     scaling_of,
 )
@@ -73,18 +75,31 @@ def _rotations(frames: Array) -> Array:
     return rotvec_to_rotmat(frames[..., 3:].reshape(*frames.shape[:-1], -1, 3))
 
 
-def window_starts(length: int, count: int = 8) -> NDArray[np.int64]:
-    """Starts (W,) of the test windows in a motion of ``length`` sub-sampled frames, from the protocol's generator."""
-    if length <= PROTOCOL_WINDOW:
-        raise DataError(f"a test motion of {length} frames is too short: windows need more than {PROTOCOL_WINDOW}")
+def window_starts(
+    lengths: Sequence[int], count: int = 8, first: int = 0, room: int = PROTOCOL_WINDOW
+) -> list[tuple[int, int]]:
+    """The test windows of an action: the number of a motion of it, and where the window starts.
+
+    One generator draws them from the motions in turn, as all papers since Jain et al. 2016 do (``find_indices_srnn`` of
+    their code). lengths: of the motions, in sub-sampled frames. first, room: see
+    :class:`motet_train.papers.li2018.expmap.Layout`. DataError for a motion that is too short.
+    """
     generator = np.random.RandomState(1234567890)
-    return np.array([generator.randint(0, length - PROTOCOL_WINDOW) for _ in range(count)], dtype=np.int64)
+    starts: list[tuple[int, int]] = []
+    for length in lengths:
+        if length <= first + room:
+            raise DataError(f"a test motion of {length} frames is too short: windows need more than {first + room}")
+    for number in range(count):
+        motion = number % len(lengths)
+        starts.append((motion, int(generator.randint(first, lengths[motion] - room))))
+    return starts
 
 
-def windows(motion: Array, count: int = 8) -> Array:
-    """The test windows (W, 75, C) of a motion (T, C) at its file's frame rate."""
-    frames = motion[::STRIDE]
-    return _cut(frames, window_starts(len(frames), count))
+def windows(motions: Sequence[Array], count: int = 8, layout: Layout = CMU_LAYOUT) -> Array:
+    """The test windows (W, 75, C) of the motions (T, C) of an action, which are at the frame rate of their files."""
+    frames = [motion[::STRIDE] for motion in motions]
+    starts = window_starts([len(motion) for motion in frames], count, layout.first, layout.room)
+    return np.stack([frames[motion][start : start + PROTOCOL_WINDOW] for motion, start in starts])
 
 
 def _cut(frames: Array, starts: NDArray[np.int64]) -> Array:
@@ -124,12 +139,16 @@ def _joint_vectors(frames: Array) -> Array:
 
 
 def predictions(
-    system: Continuation, test: Mapping[str, Sequence[Array]], scaling: Scaling, count: int = 8
+    system: Continuation,
+    test: Mapping[str, Sequence[Array]],
+    scaling: Scaling,
+    count: int = 8,
+    layout: Layout = CMU_LAYOUT,
 ) -> Predictions:
-    """The predictions for ``count`` windows of each motion (T, C) of each action."""
+    """The predictions for ``count`` windows of each action, which has motions (T, C)."""
     by_action = {}
     for action, motions in test.items():
-        truth = scaling.with_constants(np.concatenate([windows(motion, count) for motion in motions]))
+        truth = scaling.with_constants(windows(motions, count, layout))
         by_action[action] = system(truth[:, :SEED_FRAMES]), truth
     return by_action
 

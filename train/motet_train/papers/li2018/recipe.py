@@ -13,15 +13,18 @@ from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
 from motet_train.papers.li2018 import convseq2seq, from_config, recurrent, srnn
-from motet_train.papers.li2018.expmap import OUTPUT_FRAMES, PROTOCOL_WINDOW, SEED_FRAMES, ExpmapMaterial
+from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, PROTOCOL_WINDOW, SEED_FRAMES, ExpmapMaterial
 from motet_train.papers.li2018.stepwise import Stepwise
 from motet_train.recipes.predict import possible
-from motet_train.recipes.recipe import AUGMENTED, Job, Recipe
+from motet_train.recipes.recipe import AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
 from motet_train.trainer import Part
 
 CODE = Training(steps=20_000, every=500, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01)
 PAPER_TRAINING = Training(steps=20_000, every=500, learning_rate=2e-4, batch=64, l2=0.001, adversary=0.01)
+"""Section 4.1. How long it trains is not said there: 20,000 steps are the code's. The error is divided by the number of
+channels, as in the code, while eq. 7 sums over them; so both regularisers weigh that many times as much as in eq. 9."""
+
 SHORT = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5, average=0.99)
 """What learns best in a quarter of an hour on a CPU, by the error on held-out files: a higher learning rate, which
 falls; the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels; no
@@ -37,16 +40,18 @@ many each takes here was set by time; with twice as many, which three of them we
 files is smaller by seven per cent at most, see docs/predict.md."""
 
 
-def _recipe(model: str, config: Any, training: Training) -> Recipe:
+def _recipe(model: str, config: Any, training: Training, visits: Visits = AUGMENTED) -> Recipe:
     derived = ("dimensions", "parts") if model == "srnn" else ("dimensions",)
-    return Recipe("predict", model, "free_run", config, derived, training, AUGMENTED, {"horizon": OUTPUT_FRAMES})
+    return Recipe("predict", model, "free_run", config, derived, training, visits, {"horizon": OUTPUT_FRAMES})
 
 
 RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "convseq2seq": {
         "default": _recipe("convseq2seq", convseq2seq.Config(0, padding="same", loss="distance"), SHORT),
-        "paper": _recipe("convseq2seq", convseq2seq.Config(0), PAPER_TRAINING),
-        "code": _recipe("convseq2seq", convseq2seq.Config(0, dropout=(0.2, 0.2, 0.5), own=0.95), CODE),
+        "paper": _recipe("convseq2seq", convseq2seq.Config(0, padding="paper"), PAPER_TRAINING, Visits()),
+        "code": _recipe(
+            "convseq2seq", convseq2seq.Config(0, padding="paper", dropout=(0.2, 0.2, 0.5), own=0.95), CODE, Visits()
+        ),
     },
     "rrnn": {"default": _recipe("rrnn", recurrent.RRNNConfig(0), RESIDUAL)},
     "erd": {"default": _recipe("erd", recurrent.ERDConfig(0), replace(TAUGHT, steps=900))},
@@ -57,15 +62,23 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
 """Model -> name of a preset -> recipe."""
 
 
-def sized(recipe: Recipe, material: ExpmapMaterial) -> Any:
-    """The system's configuration for the material."""
-    parts = {"parts": srnn.parts_of(material.layout, material.kept)} if "parts" in recipe.derived else {}
-    return recipe.sized(dimensions=len(material.kept), **parts)
+def sized(recipe: Recipe, material: Material) -> Any:
+    """The system's configuration for the material; DataError where it needs parts of the body that are not known."""
+    if "parts" not in recipe.derived:
+        config = recipe.sized(dimensions=len(material.kept))
+        if isinstance(config, convseq2seq.Config) and config.padding == "paper":
+            layout = material.layout if isinstance(material, ExpmapMaterial) else CMU_LAYOUT
+            config = replace(config, padding=layout.padding)
+        return config
+    if not isinstance(material, ExpmapMaterial):
+        raise DataError("srnn is trained on exponential-map text files, whose columns are assigned to legs and arms")
+    return recipe.sized(dimensions=len(material.kept), parts=srnn.parts_of(material.layout, material.kept))
 
 
-def train_system(material: ExpmapMaterial, job: Job) -> Run:
+def train_system(material: Material, job: Job) -> Run:
     """Train a system, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where the data cannot be trained on.
 
+    material: of text files, as the paper's, or of motion files on the humanoid, which a bundle can continue.
     The weights kept are those with the smallest :func:`validation_error`.
     """
     visits, kept = possible(job.recipe.visits, material), list(material.kept)
@@ -82,10 +95,16 @@ def train_system(material: ExpmapMaterial, job: Job) -> Run:
     )
     net = from_config(job.recipe.model, manifest["config"])
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
-    learner = _learner(net.to(job.device), config, Windows(material, PROTOCOL_WINDOW, **asdict(visits)), job)
+    learner = _learner(net.to(job.device), config, _windows(material, visits), job)
     trained = learner.kept
     assert isinstance(trained, Stepwise)
     return job.run(trained, learner, manifest)
+
+
+def _windows(material: Material, visits: Visits) -> Windows:
+    """Windows of the protocol's length; those of text files, which have no bones, are taken as they are."""
+    anchor = None if material.contract.skeleton is None else SEED_FRAMES
+    return Windows(material, PROTOCOL_WINDOW, **asdict(visits), seed=anchor)
 
 
 def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> GradientLearner:

@@ -116,8 +116,8 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
     measured: dict[str, Mapping[tuple[str, str], Array]] = {}
     with tqdm(systems.items(), unit=" systems", disable=None, leave=False) as bar:
         for name, system in bar:
-            few = predictions(system, test, scaling, 8)
-            many = predictions(system, test, scaling, 256)
+            few = predictions(system, test, scaling, 8, corpus.layout)
+            many = predictions(system, test, scaling, 256, corpus.layout)
             by_kind = {FEW: errors(few), MANY: errors(many), ANGLE_ERRORS: errors(many, rotation_errors)}
             measured[name] = _with_means(by_kind, complete(corpus))
     return Results(models, corpus, seed_groups(models), measured)

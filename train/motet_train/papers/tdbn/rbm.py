@@ -25,8 +25,8 @@ class Learning:
     """Settings of the training of one layer.
 
     final_rate: learning rate of the last epoch relative to the first. momentum_after: first epochs without momentum.
-    steps: k of CD-k, Gibbs steps of the reconstruction. temperature: of the sigmoids in the first and the last epoch.
-    Rate and temperature change geometrically between these.
+    steps: k of CD-k, reconstructions of the visible units; 1 is the procedure of thesis 3.2. temperature: of the
+    sigmoids in the first and the last epoch. Rate and temperature change geometrically between these.
     """
 
     epochs: int
@@ -209,11 +209,11 @@ class RBMLayer(Layer):
         return float(error.square().mean())
 
     def _noise(self, batches: int) -> tuple[Tensor, Tensor]:
-        """Uniform numbers (batches, k + 1, [R,] B, H), and normal ones (batches, k + 1, [R,] B, D)."""
+        """Uniform numbers (batches, k, [R,] B, H), and normal ones (batches, k, [R,] B, D)."""
         generator = self.generator
         stack = self.rbm.weight.shape[:-2]
         visible_units, hidden_units = self.rbm.mask.shape
-        shape = (batches, self.learning.steps + 1, *stack, self.learning.batch)
+        shape = (batches, self.learning.steps, *stack, self.learning.batch)
         uniform = torch.rand(*shape, hidden_units, generator=generator, device=generator.device)
         normal = torch.randn(*shape, visible_units, generator=generator, device=generator.device)
         return uniform, normal
@@ -224,7 +224,7 @@ class RBMLayer(Layer):
         # positive phase: hidden units sampled from the data
         visible = self.frames[rows].expand(*rbm.weight.shape[:-2], -1, -1)
         hidden = (noise[0] < rbm.encode(visible, epoch.temperature)).float()
-        # negative phase: the reconstruction after k Gibbs steps
+        # negative phase: the k-th reconstruction
         end, end_hidden = reconstruct(rbm, hidden, noise[1:], jitter[1:], epoch.temperature)
         # step along the difference of their statistics; units of different body parts stay unconnected
         self.ascents["weight"].contrast((visible, hidden), (end, end_hidden), epoch)
@@ -235,9 +235,9 @@ class RBMLayer(Layer):
 
 
 def reconstruct(rbm: RBM, hidden: Tensor, noise: Tensor, jitter: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
-    """From hidden samples (B, H), sample visible and hidden units k times; the means of both, (B, D) and (B, H).
+    """From hidden samples (B, H), sample visible and hidden units k - 1 times; the means of both, (B, D) and (B, H).
 
-    noise (k, B, H) is uniform in [0, 1), jitter (k, B, D) standard normal.
+    noise (k - 1, B, H) is uniform in [0, 1), jitter (k - 1, B, D) standard normal.
     """
     for uniform, normal in zip(noise, jitter, strict=True):
         visible = rbm.decode(hidden) + normal

@@ -185,7 +185,8 @@ class TDBNConfig:
     """Sizes and training of the net; the defaults are the recipe of the shipped bundle.
 
     root_rotation: whether it is among the channels: 59 of CMU's skeleton, otherwise the thesis' 56. control_units: for
-    each label. clamped: whether they keep their values in the reconstruction. sigma: standard deviation of a visible
+    each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for the
+    second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard deviation of a visible
     unit relative to its channel's: with a smaller one, codes are more precise. past_noise, own: noise and unrolled of
     :class:`Past`. onset: how many times as often the first window of a motion that ends is drawn as its last.
     temperature: of the codes and of generation; learning anneals from 1 to it. initial: standard deviation of the first
@@ -198,6 +199,7 @@ class TDBNConfig:
     hidden_per_part: int = 30
     taps: int = 3
     control_units: int = 24
+    gait_units: int = 0
     free_units: int = 0
     clamped: bool = True
     sigma: float = 0.38
@@ -208,15 +210,21 @@ class TDBNConfig:
     initial: float = 0.01
     restarts: int = 2
     tries: int = 3
-    rbm: Learning = field(default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, temperature=(1.0, 0.38)))
+    rbm: Learning = field(
+        default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, steps=2, temperature=(1.0, 0.38))
+    )
     crbm: Learning = field(default_factory=lambda: Learning(80, rate=6e-3, final_rate=0.3, temperature=(1.0, 0.38)))
 
     @staticmethod
     def thesis() -> "TDBNConfig":
-        """The thesis' text: 56 angles, control units unclamped in the reconstruction, no annealing (5.2 to 5.4)."""
+        """The thesis' text: 56 angles, CD-1, control units unclamped in the reconstruction, no annealing (5.2 to 5.4).
+
+        The second hidden layer is one block of 20 units for two gaits (5.3), and three equal parts for three motions
+        (5.4), which 7 units each come nearest to.
+        """
         rbm = Learning(1000, temperature=(1.0, 1.0))
         crbm = Learning(100, temperature=(1.0, 1.0))
-        net = TDBNConfig(root_rotation=False, control_units=7, rbm=rbm, crbm=crbm)
+        net = TDBNConfig(root_rotation=False, control_units=7, gait_units=20, rbm=rbm, crbm=crbm)
         return replace(net.unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
 
     def unclamped(self) -> "TDBNConfig":
@@ -234,9 +242,12 @@ class TDBN(ControlNet):
 
     def __init__(self, config: TDBNConfig, parts: Sequence[int], labels: int) -> None:
         mask = block_mask(parts, config.hidden_per_part)
-        control = labels * config.control_units
+        gaits = labels == 2 and config.gait_units > 0
+        control = config.gait_units if gaits else labels * config.control_units
         crbm = CRBM(mask.shape[1], config.taps, control, config.free_units)
         super().__init__(config, crbm, len(parts), parts=parts, labels=labels)
+        if gaits:
+            self.expansion = torch.tensor([[0.0], [1.0]]).expand(2, control).clone()
         self.rbm = RBM(mask)
 
     def encode(self, frames: Tensor) -> Tensor:
