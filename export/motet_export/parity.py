@@ -78,10 +78,12 @@ def check_meaning(onnx: BundleModel, torch: BundleModel) -> None:
 
 def _difference(part: str, declared: Mapping[str, Any], trained: Mapping[str, Any]) -> str:
     """The name of a part of two manifests, with the first key whose values differ where it is an object."""
-    one, other = declared.get(part), trained.get(part)
-    if not isinstance(one, Mapping) or not isinstance(other, Mapping):
+    in_bundle = declared.get(part)
+    in_run = trained.get(part)
+    if not isinstance(in_bundle, Mapping) or not isinstance(in_run, Mapping):
         return part
-    return next(f"{part}.{key}" for key in {**one, **other} if one.get(key) != other.get(key))
+    keys = {**in_bundle, **in_run}
+    return next(f"{part}.{key}" for key in keys if in_bundle.get(key) != in_run.get(key))
 
 
 def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> dict[str, Any]:
