@@ -33,8 +33,11 @@ Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], Decoded]]
 """Name of a run -> decodes it with a model."""
 
-GOLDEN_ROWS, FEW_ROWS = 4, 2
-"""Rows for a graph that takes frames: zeros, ones, negatives and one as it is drawn; and for another graph."""
+GOLDEN_ROWS = 4
+"""Rows for a graph that takes frames: zeros, ones, negatives and one as it is drawn."""
+
+FEW_ROWS = 2
+"""Rows for another graph."""
 
 Golden = tuple[Arrays, dict[str, Any]]
 """The inputs of a whole run and its settings."""

@@ -101,7 +101,9 @@ def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str,
     """Rung 2: calls with inputs that are far from all data. "rounding" is how far torch comes from itself when their
     last bits change; a graph that amplifies it, as divisions by small numbers do, is held to ten times its own."""
     rng = np.random.default_rng(7)
-    batches, largest, rounding = (4, 100), 0.0, 0.0
+    batches = (4, 100)
+    largest = 0.0
+    rounding = 0.0
     for batch in batches:
         feeds = draw(rng, batch)
         expected = torch(feeds)

@@ -159,7 +159,9 @@ def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
     # the same on references that are not in training
     copied = corpus.references(nearest_motions(corpus, corpus.motions(test)))
     trained = corpus.trained_sentences()
-    seen = sum(sentence in trained for sentences in references for sentence in sentences)
+    seen = 0
+    for sentences in references:
+        seen += sum(sentence in trained for sentence in sentences)
     yield _unseen(hypotheses, copied, references, corpus.unseen(test), seen)
 
     # the best description of each motion against the floors
