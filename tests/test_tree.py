@@ -77,7 +77,7 @@ ONE_WAY = {
     "motet_train.data": (*PRODUCT[1:], "motet_train.papers", "motet_train.cli"),
     "motet_train.models": (*PRODUCT[2:], "motet_train.papers", "motet_train.cli"),
     "motet_train.evaluate": (*PRODUCT[3:], "motet_train.papers", "motet_train.cli"),
-    "motet_train.recipes": ("motet_train.papers", "motet_train.cli"),
+    "motet_train.recipes": 14_900("motet_train.papers", "motet_train.cli"),
     "motet_train.papers": ("motet_train.cli",),
 }
 """Package -> what its modules do not import when they are imported."""

@@ -184,14 +184,14 @@ def _spec(name: str, *sizes: int) -> TensorSpec:
 class TDBNConfig:
     """Sizes and training of the net; the defaults are the recipe of the shipped bundle.
 
-    root_rotation: whether it is among the channels: 59 of CMU's skeleton, otherwise the thesis' 56. control_units: for
-    each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for the
-    second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard deviation of a visible
-    unit relative to its channel's: with a smaller one, codes are more precise. past_noise, own: noise and unrolled of
-    :class:`Past`. onset: how many times as often the first window of a motion that ends is drawn as its last.
-    temperature: of the codes and of generation; learning anneals from 1 to it. initial: standard deviation of the first
-    weights. restarts: RBMs that learn side by side; their features decide how the net moves. tries: most CRBMs trained
-    on each of them until a net reaches its goals.
+    root_rotation: whether it is among the channels: 59 of CMU's skeleton, otherwise the thesis' 56. control_units:
+    for each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for
+    the second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard
+    deviation of a visible unit relative to its channel's: with a smaller one, codes are more precise. past_noise,
+    own: noise and unrolled of :class:`Past`. onset: how many times as often the first window of a motion that ends
+    is drawn as its last. temperature: of the codes and of generation; learning anneals from 1 to it. initial:
+    standard deviation of the first weights. restarts: RBMs that learn side by side; their features decide how the
+    net moves. tries: most CRBMs trained on each of them until a net reaches its goals.
     """
 
     fps: float = 40.0
