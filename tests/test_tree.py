@@ -77,7 +77,7 @@ ONE_WAY = {
     "motet_train.data": (*PRODUCT[1:], "motet_train.papers", "motet_train.cli"),
     "motet_train.models": (*PRODUCT[2:], "motet_train.papers", "motet_train.cli"),
     "motet_train.evaluate": (*PRODUCT[3:], "motet_train.papers", "motet_train.cli"),
-    "motet_train.recipes": 14_900("motet_train.papers", "motet_train.cli"),
+    "motet_train.recipes": ("motet_train.papers", "motet_train.cli"),
     "motet_train.papers": ("motet_train.cli",),
 }
 """Package -> what its modules do not import when they are imported."""
@@ -111,7 +111,7 @@ CEILINGS = {
     "motet_train.evaluate": 44_900,
     "motet_train.models": 20_400,
     "motet_train.papers": 41_600,
-    "motet_train.recipes": 14_800,
+    "motet_train.recipes": 14_900,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

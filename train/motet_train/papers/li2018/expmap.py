@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Literal
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,9 +113,11 @@ H36M_LAYOUT = Layout(
     room=150,
     padding="same",
 )
-"""Human3.6M in its usual division: two trials of fifteen actions, with subject 5 for testing. Its 32 joints are the hips,
-the right leg, the left leg, the spine with the head, the left arm and the right arm (Jain et al. 2016). The hips lie along
-x, and all other bones along y or z, so left and right are mirrored like CMU's."""
+"""Human3.6M in its usual division: two trials of fifteen actions, with subject 5 for testing.
+
+Its 32 joints are the hips, the right leg, the left leg, the spine with the head, the left arm and the right arm (Jain
+et al. 2016). The hips lie along x, and all other bones along y or z, so left and right are mirrored like CMU's.
+"""
 
 
 @dataclass(frozen=True, eq=False)
