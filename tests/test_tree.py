@@ -14,7 +14,7 @@ MOST_LARGE_FUNCTIONS = 250
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 MOST_BANNED_NAMES = 490
-MOST_TUPLE_ASSIGNMENTS = 140
+MOST_TUPLE_ASSIGNMENTS = 139
 MOST_NESTED_COMPREHENSIONS = 140
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
@@ -104,13 +104,13 @@ CEILINGS = {
     "motet.serve": 17_000,
     "motet.steering": 37_800,
     "motet.text": 5_300,
-    "motet_export": 10_300,
+    "motet_export": 10_200,
     "motet_train": 9_400,
     "motet_train.cli": 8_400,
     "motet_train.data": 21_900,
     "motet_train.evaluate": 44_900,
     "motet_train.models": 20_400,
-    "motet_train.papers": 41_600,
+    "motet_train.papers": 41_400,
     "motet_train.recipes": 14_900,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
