@@ -236,6 +236,7 @@ export class Memory {
     const end = take.length - 1;
     let best: [number, number] = [0, end];
     if (end <= this.settings.act_steps) return best;
+    // distances of all steps of the recording, each with those before it
     const past = take.map((row) =>
       Array.from({ length: this.settings.past_steps }, (_, back) => this.past(row, back)),
     );
@@ -243,6 +244,7 @@ export class Memory {
     const enough = this.settings.act_share * take.reduce((sum, row) => sum + this.particular[row]!, 0);
     const edge = (to: number, at: number) => Math.min(apart[to]![at]! / this.settings.alike_distance, 1);
     const shown = take.map(() => end + 1); // where each step is first shown, from a place on
+    // for each first step, from the last back, the earliest last step by which enough is shown
     let least = Infinity;
     const spans: [number, number, number][] = [];
     for (let first = end; first >= 0; first--) {
@@ -263,6 +265,7 @@ export class Memory {
         ]);
       }
     }
+    // the cheapest span; of several the first
     for (const [cost, first, last] of spans.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
       if (cost < least) {
         least = cost;

@@ -166,9 +166,11 @@ export function laid(
   const { dt } = matcher;
   const { playing, base } = acting;
   acting.base = { rotations: pose.rotations, height: pose.height };
+  // how the figure goes: as the act, or as its steps
   const step: Ground = playing?.whole
     ? stepOf(playing.act, playing.frame, root[2])
     : [playback.root[0] - root[0], playback.root[1] - root[1], wrapped(playback.root[2] - root[2])];
+  // inertialization: a jump in the pose becomes an offset that fades
   if (changed) lose(acting, settings, base, step, dt);
   acting.before = acting.shown;
   acting.led = !!playing?.whole;
@@ -177,9 +179,11 @@ export function laid(
     acting.going = each((i) => step[i]! / dt);
     return pose;
   }
+  // the pose is the act, or the steps, and what is left of the offset
   fade(acting, settings, dt);
   acting.shown = plus(source(acting, acting.base, 0), acting.offset);
   acting.going = each((i) => step[i]! / dt + acting.drift[i]!);
+  // the figure goes where that leads
   const to = playing?.whole ? each((i) => root[i]! + step[i]!) : playback.root;
   playback.root = [
     to[0] + acting.drift[0] * dt,

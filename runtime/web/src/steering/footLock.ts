@@ -41,12 +41,15 @@ export function held(
   const hips = product(about(Y, facing), pose.rotations[0]!);
   const rotations = [...pose.rotations];
   lock.forEach((foot, side) => {
+    // where the leg and the points of its sole are played
     const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
     const soles = POINTS.map(([joint, point]) =>
       plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)),
     );
     const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
+    // the point that bears the foot: the ball, or heel or tip if they are lower
     const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
+    // the shift that keeps it where it was, or that fades once the foot swings
     const contact = pose.contacts[side]!;
     const moved = shift(
       foot,
@@ -56,6 +59,7 @@ export function held(
       dt,
     );
     foot.soles = soles;
+    // lift a foot that is moved back while its contact still is high, and any out of the ground
     const steps = contact * settings.steps * Math.min(1, moved / (settings.swings * dt));
     const [off, rise] = damped(foot.height[0] - steps, foot.height[1], dampingOf(settings.lifts), dt);
     foot.height = [steps + off, rise];

@@ -198,18 +198,22 @@ export class Matcher {
     if (figure.ticksToSearch-- > 0) return;
     const { settings } = this;
     figure.ticksToSearch = settings.search_every - 1;
+    // the nearest row that is played: one in mid-air is never left, one that goes on may be kept
     const row = figure.row + (figure.part > 0.5 ? 1 : 0);
     const lasts = this.tables.left[row]! >= this.reserve;
     if (lasts && this.flies(row)) return; // who flies lands first
     const stays = lasts && this.shows(row, gait);
+    // what is wanted: how the row is now, and where the springs lead
     const goals = this.goals[gait]!;
     const creeps = this.creeping(target, gait);
     this.ask(figure, row, target, creeps);
+    // the cheapest row of the gait; to go on costs less by the bias, if the row may be kept
     const here = figure.mirror ? this.image : this.query;
     const bias = creeps ? 0 : settings.continuing * UNIT;
     const bound = stays ? goals.cost(here, this.features, row * MATCHING.FEATURES) - bias : Infinity;
     const nearest = goals.nearest(this.query, this.image, bound);
     if (!nearest) return;
+    // a row that comes soon by itself needs no jump
     const ahead = nearest.row - row;
     if (!stays || ahead < -settings.jump_back || ahead > settings.jump_ahead)
       this.jump(figure, nearest.row, nearest.mirror);

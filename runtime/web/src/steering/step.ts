@@ -37,14 +37,18 @@ export class Steerer {
   tick(figure: Playback, target: Target, gait: number): Played {
     const { matcher } = this;
     const { settings, dt } = matcher;
+    // search: jump to another row where one fits better
     matcher.search(figure, target, gait);
+    // playback: go on by the playback rate
     const at = figure.part + figure.rate;
     figure.row += Math.floor(at);
     figure.part = at - Math.floor(at);
+    // the springs approach the target, and the root follows them
     const moves = this.moves(figure);
     approach(figure, target, dampingOf(settings.velocity), dampingOf(settings.facing), dt);
     this.warp(figure, moves[3]!);
     this.move(figure, moves, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
+    // inertialization: the offset of the last jumps fades
     this.fade(figure, dampingOf(settings.blend));
     const left = Math.fround(moves[4]!);
     const right = Math.fround(moves[5]!); // so bounds are passed in the same ticks as in Python
@@ -106,19 +110,23 @@ export class Steerer {
     } = figure;
     const recorded = moves[3]!;
     const side = mirror ? -1 : 1;
+    // how fast the springs go beside the recording
     const pace = Math.hypot(spring[0], spring[1]);
     const moving = creeps || Math.min(recorded, pace) > settings.idle;
     const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : settings.idle);
+    // stride: what the playback rate does not make up for of the speed
     const stride = moving ? clamp(ratio / rate, creeps ? 0 : settings.shortest, settings.longest) : 1;
     const by = rate * dt * stride;
     const forward = moves[0]! * by;
     const left = side * moves[1]! * by;
     const turn = side * moves[2]! * rate * dt;
+    // turn as recorded, and a little more towards the facing of the springs
     const error = wrapped(spring[2] - facing);
     const most =
       (settings.turn_still + settings.turn_moving * Math.min(pace, settings.turn_speed)) * dt +
       settings.turn_turning * Math.abs(turn);
     const turned = wrapped(facing + turn + clamp(error * (1 - 0.5 ** (dt / settings.turn)), -most, most));
+    // the step over the ground, turned as the legs are
     const sin = Math.sin(facing + figure.warp);
     const cos = Math.cos(facing + figure.warp);
     const stepX = sin * forward + cos * left;
@@ -129,8 +137,10 @@ export class Steerer {
     const veers = moving && along > settings.veer_within * Math.abs(across);
     const angle = veers ? clamp(Math.atan(across / Math.max(along, 1e-6)), -settings.veer, settings.veer) : 0;
     figure.root = [x + stepX + angle * stepZ, z + stepZ - angle * stepX, turned];
+    // the next playback rate; a slow walk shares the slowness between rate and stride
     const slowest = creeps ? settings.creep_slowest : settings.slowest;
     figure.rate = moving ? clamp(creeps ? Math.sqrt(ratio) : ratio, slowest, settings.fastest) : 1;
+    // stride warping: the legs reach as far as the root goes
     const target = creeps ? Math.min(stride, 1) : 1;
     const [off, slower] = damped(figure.stride - target, figure.strideRate, dampingOf(settings.blend), dt);
     figure.stride = target + off;
