@@ -1,4 +1,4 @@
-"""Which action a sentence asks for: a small net over words and their stems.
+"""The action in a sentence: a small net over words and their stems.
 
 Letters in shapes: B rows, W words, A actions, E numbers of a word's vector.
 """
@@ -69,13 +69,16 @@ class ActionNet(Net):
         self.roots.weight.mul_(0.3)
 
     def _of(self, words: Tensor) -> Tensor:
-        """What is known of words (B, W): (B, W, E)."""
-        own, stems = words.masked_fill(words >= self.config.words, UNKNOWN), self.stems[words]
+        """Vectors (B, W, E) of words (B, W)."""
+        ids = words.masked_fill(words >= self.config.words, UNKNOWN)
+        stems = self.stems[words]
         if self.training and self.meant is not None:
+            # these words are known by their vectors alone
             unheard = torch.rand(words.shape, device=words.device) < self.config.unheard
-            own, stems = own.masked_fill(unheard, UNKNOWN), stems.masked_fill(unheard, int(self.stems[UNKNOWN]))
-        found: Tensor = self.words(own) + self.roots(stems)
-        return found if self.meant is None else found + self.meant(self.vectors[words].float() / 16)
+            ids = ids.masked_fill(unheard, UNKNOWN)
+            stems = stems.masked_fill(unheard, int(self.stems[UNKNOWN]))
+        vectors: Tensor = self.words(ids) + self.roots(stems)
+        return vectors if self.meant is None else vectors + self.meant(self.vectors[words].float() / 16)
 
     def forward(self, words: Tensor, lengths: Tensor) -> Tensor:
         """Ids (B, W) int64 of sentences of lengths (B,) int64 to log-probabilities (B, A)."""
@@ -86,13 +89,14 @@ class ActionNet(Net):
         vectors = self.dropout(self._of(words)) * known[..., None]
         around = gelu(self.around(vectors.transpose(1, 2))) * known[:, None]
         count = known.sum(dim=1, keepdim=True).clamp_min(1)
-        most = around.amax(dim=2).clamp_min(0)  # as if a word followed that says nothing: padding changes nothing
+        most = around.amax(dim=2).clamp_min(0)  # as if an empty word followed, so that padding changes nothing
         seen = [around.sum(dim=2) / count, most, vectors.sum(dim=1) / count]
         return functional.log_softmax(self.outward(self.dropout(torch.cat(seen, dim=1))), dim=1)
 
     def encoder(self) -> tuple[nn.Module, GraphSpec]:
         """Itself as a graph, the encoder of sentences."""
-        words, lengths = TensorSpec("words", ("batch", "words"), "int64"), TensorSpec("lengths", ("batch",), "int64")
+        words = TensorSpec("words", ("batch", "words"), "int64")
+        lengths = TensorSpec("lengths", ("batch",), "int64")
         return self, GraphSpec((words, lengths), (TensorSpec("context", ("batch", self.config.actions)),))
 
     def graphs(self) -> dict[str, Any]:
@@ -110,7 +114,7 @@ def stem(word: str) -> str:
 
 
 def stems_of(words: Sequence[str], common: Sequence[str] = ()) -> tuple[int, ...]:
-    """For each word the number of its stem; for common words that of an unknown word where no word has their stem."""
+    """For each word the number of its stem; for common words with a new stem that of unknown words."""
     numbers: dict[str, int] = {}
-    own = [numbers.setdefault(stem(word), len(numbers)) for word in words]
-    return (*own, *(numbers.get(stem(word), own[UNKNOWN]) for word in common))
+    stems = [numbers.setdefault(stem(word), len(numbers)) for word in words]
+    return (*stems, *(numbers.get(stem(word), stems[UNKNOWN]) for word in common))

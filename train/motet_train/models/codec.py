@@ -56,13 +56,15 @@ class Residual(nn.Module):
 
     def __init__(self, width: int, ahead: int) -> None:
         super().__init__()
-        self.ahead, self.norm = ahead, nn.LayerNorm(width)
-        self.first, self.second = nn.Linear(3 * width, width), nn.Linear(width, width)
+        self.ahead = ahead
+        self.norm = nn.LayerNorm(width)
+        self.first = nn.Linear(3 * width, width)
+        self.second = nn.Linear(width, width)
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, N, C) to the same shape."""
-        found: Tensor = x + self.second(gelu(self.first(around(self.norm(x), self.ahead))))
-        return found
+        mlp: Tensor = self.second(gelu(self.first(around(self.norm(x), self.ahead))))
+        return x + mlp
 
 
 def around(x: Tensor, ahead: int) -> Tensor:
@@ -78,7 +80,8 @@ class CodecEncoder(nn.Module):
     def __init__(self, config: CodecConfig) -> None:
         super().__init__()
         numbers = config.groups * len(config.levels)
-        self.inward, self.fine = nn.Linear(3 * config.channels, config.fine), Residual(config.fine, 1)
+        self.inward = nn.Linear(3 * config.channels, config.fine)
+        self.fine = Residual(config.fine, 1)
         self.down = nn.Linear(config.hop * config.fine, config.width)
         self.blocks = nn.Sequential(*(Residual(config.width, 1) for _ in range(config.blocks)))
         self.outward = nn.Linear(config.width, numbers)
@@ -88,8 +91,8 @@ class CodecEncoder(nn.Module):
         """See the class."""
         hidden = self.fine(self.inward(around(frames, 1)))
         hidden = self.blocks(self.down(hidden.reshape(frames.shape[0], -1, self.down.in_features)))
-        found: Tensor = self.spread(self.outward(hidden).transpose(1, 2))
-        return found.transpose(1, 2)
+        values: Tensor = self.spread(self.outward(hidden).transpose(1, 2))
+        return values.transpose(1, 2)
 
 
 class CodecDecoder(nn.Module):
@@ -107,8 +110,8 @@ class CodecDecoder(nn.Module):
     def forward(self, moves: Tensor, values: Tensor) -> Tensor:
         """See the class."""
         hidden = self.up(self.blocks(self.inward(torch.cat([moves, values], dim=-1))))
-        found: Tensor = self.outward(self.fine(hidden.reshape(moves.shape[0], -1, self.outward.in_features)))
-        return found
+        frames: Tensor = self.outward(self.fine(hidden.reshape(moves.shape[0], -1, self.outward.in_features)))
+        return frames
 
 
 class MotionCodec(Net):
@@ -128,7 +131,8 @@ class MotionCodec(Net):
         if not all(level % 2 for level in config.levels):
             raise DataError(f"levels of codes have to be odd numbers, not {', '.join(map(str, config.levels))}")
         self.config = config
-        self.encoder, self.decoder = CodecEncoder(config), CodecDecoder(config)
+        self.encoder = CodecEncoder(config)
+        self.decoder = CodecDecoder(config)
         self.places = SixdPlaces(config.tree)
         self.register_buffer("book", torch.zeros(config.moves, 3))
         self.register_buffer("book_scale", torch.ones(3))
@@ -180,13 +184,19 @@ class MotionCodec(Net):
 
 def places_in_world(codec: MotionCodec, frames: Tensor, way: Tensor) -> Tensor:
     """Joints (B, T, J, 3) of decoder frames (B, T, D), whose root is relative to poses (B, T, 3) of x, z, facing."""
+    # the root, beside the way of the moves
     forward, left, turn = frames[..., :PATH].unbind(-1)
-    sin, cos = way[..., 2].sin(), way[..., 2].cos()
+    sin = way[..., 2].sin()
+    cos = way[..., 2].cos()
     x = way[..., 0] + forward * sin + left * cos
     z = way[..., 1] + forward * cos - left * sin
     root = torch.stack([x, frames[..., PATH], z], dim=-1)
+
+    # the joints around it, turned by its facing
     places = codec.places(frames[..., len(ROOT_SIXD) :])
-    sin, cos = (way[..., 2] + turn).sin()[..., None], (way[..., 2] + turn).cos()[..., None]
+    facing = way[..., 2] + turn
+    sin = facing.sin()[..., None]
+    cos = facing.cos()[..., None]
     across, up, along = places.unbind(-1)
     turned = torch.stack([across * cos + along * sin, up, along * cos - across * sin], dim=-1)
     return turned + root[..., None, :]

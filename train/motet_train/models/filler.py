@@ -47,20 +47,26 @@ class Block(nn.Module):
     def __init__(self, width: int, heads: int, inner: int) -> None:
         super().__init__()
         self.heads = heads
-        self.norm, self.norm_2 = nn.LayerNorm(width), nn.LayerNorm(width)
-        self.asked, self.mixed = nn.Linear(width, 3 * width), nn.Linear(width, width)
-        self.inward, self.outward = nn.Linear(width, inner), nn.Linear(inner, width)
+        # weights keep the names that trained runs have: asked is qkv, mixed is proj, inward and outward are the MLP
+        self.norm = nn.LayerNorm(width)
+        self.norm_2 = nn.LayerNorm(width)
+        self.asked = nn.Linear(width, 3 * width)
+        self.mixed = nn.Linear(width, width)
+        self.inward = nn.Linear(width, inner)
+        self.outward = nn.Linear(inner, width)
         # half of the heads attend to all frames alike
         slopes = torch.cat([0.5 ** torch.linspace(1, 4, heads // 2), torch.zeros(heads - heads // 2)])
         self.register_buffer("slopes", slopes[:, None, None], persistent=False)
 
     def forward(self, x: Tensor, apart: Tensor) -> Tensor:
         """(B, T, C) to the same; apart: frames between any two (T, T)."""
-        asked, keys, values = self.asked(self.norm(x)).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4)
-        scores = asked @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 - self.slopes * apart
-        x = x + self.mixed((scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2))
-        found: Tensor = x + self.outward(gelu(self.inward(self.norm_2(x))))
-        return found
+        qkv = self.asked(self.norm(x)).unflatten(-1, (3, self.heads, -1))
+        queries, keys, values = qkv.permute(2, 0, 3, 1, 4)
+        scores = queries @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 - self.slopes * apart
+        attended = (scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2)
+        x = x + self.mixed(attended)
+        mlp: Tensor = self.outward(gelu(self.inward(self.norm_2(x))))
+        return x + mlp
 
 
 class Filler(Net):
@@ -79,7 +85,8 @@ class Filler(Net):
         self.ends = nn.Sequential(nn.Linear(2 * width, width), nn.GELU(), nn.Linear(width, width))
         self.told = nn.Linear(4 * config.waves + 1, config.width)
         self.blocks = nn.ModuleList(Block(config.width, config.heads, config.inner) for _ in range(config.layers))
-        self.norm, self.outward = nn.LayerNorm(config.width), nn.Linear(config.width, config.channels)
+        self.norm = nn.LayerNorm(config.width)
+        self.outward = nn.Linear(config.width, config.channels)
         nn.init.zeros_(self.outward.weight)
         nn.init.zeros_(self.outward.bias)
         self.places = SixdPlaces(config.tree)
@@ -90,12 +97,12 @@ class Filler(Net):
         self.register_buffer("frequencies", 2 * torch.pi / waves, persistent=False)
 
     def forward(self, past: Tensor, plain: Tensor, after: Tensor) -> Tensor:
-        """Frames (B, P, E), (B, N, E) and (B, A, E), in metres, to what fills the gap (B, N, E): the mean of what is
-        seen in them and in their mirror image."""
+        """Frames (B, P, E), (B, N, E) and (B, A, E), in metres, to the frames that fill the gap (B, N, E): the mean of
+        those for them and for their mirror image."""
         # rows and their mirror images in one batch, side by side
         both = (torch.stack([part, self.mirror(part)], dim=1).flatten(0, 1) for part in (past, plain, after))
-        found = self.once(*both).reshape(-1, 2, *plain.shape[1:])
-        mean: Tensor = (found[:, 0] + self.mirror(found[:, 1])) / 2
+        filled = self.once(*both).reshape(-1, 2, *plain.shape[1:])
+        mean: Tensor = (filled[:, 0] + self.mirror(filled[:, 1])) / 2
         return mean
 
     def mirror(self, frames: Tensor) -> Tensor:
@@ -103,35 +110,45 @@ class Filler(Net):
         return frames[..., self.mirrored] * self.signs
 
     def once(self, past: Tensor, plain: Tensor, after: Tensor) -> Tensor:
-        """As forward, without the mirror image: what is trained."""
-        given = torch.cat([past, plain, after], dim=1)
-        before, count = past.shape[1], plain.shape[1]
+        """Like forward, without the mirror image: this is trained."""
+        frames = torch.cat([past, plain, after], dim=1)
+        before = past.shape[1]
+        count = plain.shape[1]
         # frames since the last one before the gap, and until the first one after it
-        place = torch.arange(given.shape[1], device=given.device) - before + 1
+        place = torch.arange(frames.shape[1], device=frames.device) - before + 1
         left = count + 1 - place
-        places = self.places(given[..., ROOT_PLACE:]).flatten(2) / 0.3
-        seen = torch.cat([normalised(given, self.mean, self.scale), places], dim=-1)
-        steps = functional.pad(4 * (seen[:, 1:] - seen[:, :-1]), (0, 0, 1, 1))
-        x = self.inward(torch.cat([seen, steps[:, :-1], steps[:, 1:]], dim=-1))
+
+        # a token for each frame: the frame, its joints, and the steps from and to its neighbours
+        joints = self.places(frames[..., ROOT_PLACE:]).flatten(2) / 0.3
+        features = torch.cat([normalised(frames, self.mean, self.scale), joints], dim=-1)
+        steps = functional.pad(4 * (features[:, 1:] - features[:, :-1]), (0, 0, 1, 1))
+        x = self.inward(torch.cat([features, steps[:, :-1], steps[:, 1:]], dim=-1))
+
+        # plus both ends of the gap, and the distances from them
         ends = self.ends(torch.cat([x[:, before - 1], x[:, before + count]], dim=-1))
         angles = torch.stack([place, left], dim=-1)[..., None] * self.frequencies
         inside = ((place > 0) & (left > 0)).float()[:, None]
-        x = x + ends[:, None] + self.told(torch.cat([angles.sin().flatten(1), angles.cos().flatten(1), inside], dim=-1))
+        distances = torch.cat([angles.sin().flatten(1), angles.cos().flatten(1), inside], dim=-1)
+        x = x + ends[:, None] + self.told(distances)
+
+        # the transformer
         apart = (place[:, None] - place).abs().float()
         for block in self.blocks:
             x = block(x, apart)
+
+        # what it adds to the plain way, fading towards the ends
         added = self.outward(self.norm(x[:, before : before + count])) * self.scale
         near = torch.stack([place, left])[:, before : before + count, None].float()
-        found: Tensor = plain + (near / (near + self.config.soft)).prod(dim=0) * added
-        return found
+        filled: Tensor = plain + (near / (near + self.config.soft)).prod(dim=0) * added
+        return filled
 
     def joints(self, frames: Tensor) -> Tensor:
         """Joints (..., J, 3) in metres of placed frames (..., E)."""
-        found: Tensor = self.places(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]
-        return found
+        joints: Tensor = self.places(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]
+        return joints
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The one graph."""
         axes = {"past": "before", "plain": "gap", "after": "behind", "filled": "gap"}
-        *given, filled = (TensorSpec(name, ("batch", axis, self.config.channels)) for name, axis in axes.items())
-        return {"filler": (self, GraphSpec(tuple(given), (filled,)))}
+        *inputs, filled = (TensorSpec(name, ("batch", axis, self.config.channels)) for name, axis in axes.items())
+        return {"filler": (self, GraphSpec(tuple(inputs), (filled,)))}

@@ -78,10 +78,10 @@ class JointEmbedding(Net):
 
     def embed_statistics(self, seen: Tensor) -> Tensor:
         """Statistics (..., S) to unit vectors (..., E)."""
-        found = normalised(seen, self.seen_mean, self.seen_scale, LIMIT)
+        z = normalised(seen, self.seen_mean, self.seen_scale, LIMIT)
         if self.training:
-            found = found + self.config.noise * torch.randn_like(found)
-        return functional.normalize(self.motion(self.dropout(found)), dim=-1)
+            z = z + self.config.noise * torch.randn_like(z)
+        return functional.normalize(self.motion(self.dropout(z)), dim=-1)
 
     def see_by(self, seen: Tensor) -> None:
         """Set mean and scale of statistics from examples (..., S)."""
@@ -114,12 +114,12 @@ class JointEmbedding(Net):
         return functional.normalize(self.text(self.dropout(mean)), dim=1)
 
     def losses(self, pairs: Pairs) -> Tensor:
-        """For each row how hard its motion and its sentence, and its sentences, find each other among all (B,)."""
+        """For each row (B,) the loss between its motion and its sentence, and between its sentences, among all rows."""
         motions = self.embed_statistics(pairs.seen)
         texts, others = (self.embed_text(words, (words != 0).sum(dim=1)) for words in (pairs.words, pairs.others))
-        found = contrast(motions @ texts.T / self.config.temperature, pairs.groups)
-        between = contrast(texts @ others.T / self.config.temperature, pairs.groups)
-        return found + self.config.wordings * between
+        between_motion_and_text = contrast(motions @ texts.T / self.config.temperature, pairs.groups)
+        between_texts = contrast(texts @ others.T / self.config.temperature, pairs.groups)
+        return between_motion_and_text + self.config.wordings * between_texts
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """Both encoders, each with its contract."""
@@ -147,14 +147,17 @@ def contrast(scores: Tensor, groups: Tensor) -> Tensor:
 
 def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
     """Frames (B, T, C) of lengths (B,) to mean, deviation, least and greatest, and the means of parts: (B, 7 C)."""
-    active, count = before(lengths, x.shape[1]), lengths[:, None]
-    # sitting down is not standing up
-    place, thirds = (
-        3 * torch.arange(x.shape[1], device=x.device),
-        count[..., None] * torch.arange(3, device=x.device)[:, None],
-    )
+    active = before(lengths, x.shape[1])
+    count = lengths[:, None]
+
+    # sums over thirds of the time: sitting down is not standing up
+    place = 3 * torch.arange(x.shape[1], device=x.device)
+    thirds = count[..., None] * torch.arange(3, device=x.device)[:, None]
     parts = ((place >= thirds) & (place < thirds + count[..., None])).float()
-    sums, sizes = parts @ x, parts.sum(dim=2, keepdim=True)
+    sums = parts @ x
+    sizes = parts.sum(dim=2, keepdim=True)
+
+    # mean, deviation, and extremes of the frames that there are
     mean = sums.sum(dim=1) / count
     square = _sum((x - mean[:, None]).square(), active) / count
     shown = torch.where(active[..., None], x, x[:, :1])

@@ -25,20 +25,31 @@ def forward_kinematics(parents: Sequence[int], offsets: Tensor, local: Tensor, b
     parents: each joint's, before it; -1 for the root. offsets: (J, 3) from the parents. local: rotations (3, 3, K, N)
     of ``bones``, among them all joints that have children; that of the root, the first, is in the world.
     """
-    level, turned, place = [0], local[:, :, :1], local.new_zeros(3, 1, 1, local.shape[-1])
-    joints, places = [0], [place]
+    level = [0]
+    turned = local[:, :, :1]
+    place = local.new_zeros(3, 1, 1, local.shape[-1])
+    joints = [0]
+    places = [place]
     while inner := [joint for joint in level if joint in parents]:
+        # the rotations of the joints that have children; the root's are in the world
         if inner != [0]:
             rows = [level.index(joint) for joint in inner]
             turned = product(_at(turned, rows), _at(local, [bones.index(joint) for joint in inner]))
             place = _at(place, rows)
+
+        # the places of these children
         level = [joint for joint, parent in enumerate(parents) if parent in inner]
         rows = [inner.index(parents[joint]) for joint in level]
         turned = _at(turned, rows)
         place = _at(place, rows) + product(turned, offsets[level].T[:, None, :, None])
-        joints, places = joints + level, [*places, place]
-    rows = [joints.index(joint) + axis * len(joints) for joint in range(len(joints)) for axis in range(3)]
-    return torch.unflatten(_at(torch.cat(places, dim=2).flatten(0, 2), rows, dim=0).T, 1, (-1, 3))
+        joints = joints + level
+        places.append(place)
+
+    # in the order of the joints, three numbers each
+    order: list[int] = []
+    for joint in range(len(joints)):
+        order += [joints.index(joint) + axis * len(joints) for axis in range(3)]
+    return torch.unflatten(_at(torch.cat(places, dim=2).flatten(0, 2), order, dim=0).T, 1, (-1, 3))
 
 
 def _at(x: Tensor, rows: Sequence[int], dim: int = 2) -> Tensor:
@@ -46,12 +57,13 @@ def _at(x: Tensor, rows: Sequence[int], dim: int = 2) -> Tensor:
     return x if [*rows] == [*range(x.shape[dim])] else x.index_select(dim, torch.tensor(rows, device=x.device))
 
 
-def product(one: Tensor, other: Tensor) -> Tensor:
+def product(left: Tensor, right: Tensor) -> Tensor:
     """Matrices (3, 3, ...) times matrices (3, M, ...): sums of elementwise products, each of long rows.
 
     ONNX Runtime and torch multiply thousands of small matrices one by one.
     """
-    columns, rows = torch.split(one, 1, dim=1), torch.split(other, 1, dim=0)
+    columns = torch.split(left, 1, dim=1)
+    rows = torch.split(right, 1, dim=0)
     return columns[0] * rows[0] + columns[1] * rows[1] + columns[2] * rows[2]
 
 
@@ -84,13 +96,14 @@ class SixdPlaces(nn.Module):
     def __init__(self, tree: Tree) -> None:
         super().__init__()
         self.register_buffer("offsets", torch.tensor(tree.offsets), persistent=False)
-        self.bones, self.parents = tree.bones, tree.parents
+        self.bones = tree.bones
+        self.parents = tree.parents
 
     def forward(self, sixd: Tensor) -> Tensor:
         """Axes (..., 6 K) of the K bones to places (..., J, 3) in metres from the root, in the frame of the facing."""
         axes = torch.unflatten(sixd.reshape(-1, sixd.shape[-1]).T, 0, (-1, len(SIXD_KINDS))).transpose(0, 1)
-        found = forward_kinematics(self.parents, self.offsets, axes_to_rotmat(axes), self.bones)
-        return found.reshape(*sixd.shape[:-1], len(self.parents), 3)
+        joints = forward_kinematics(self.parents, self.offsets, axes_to_rotmat(axes), self.bones)
+        return joints.reshape(*sixd.shape[:-1], len(self.parents), 3)
 
 
 def axes_to_rotmat(axes: Tensor) -> Tensor:
@@ -99,8 +112,11 @@ def axes_to_rotmat(axes: Tensor) -> Tensor:
     y = axes[3:]
     y = functional.normalize(y - (x * y).sum(0) * x, dim=0, eps=1e-6)
     # torch.linalg.cross is exported as gathers of single numbers
-    onward, back = ([_at(axis, rows, dim=0) for axis in (x, y)] for rows in ([1, 2, 0], [2, 0, 1]))
-    return torch.stack([x, y, onward[0] * back[1] - back[0] * onward[1]], dim=1)
+    x_onward = _at(x, [1, 2, 0], dim=0)
+    y_onward = _at(y, [1, 2, 0], dim=0)
+    x_back = _at(x, [2, 0, 1], dim=0)
+    y_back = _at(y, [2, 0, 1], dim=0)
+    return torch.stack([x, y, x_onward * y_back - x_back * y_onward], dim=1)
 
 
 class VectorPlaces(nn.Module):
@@ -130,24 +146,27 @@ class VectorPlaces(nn.Module):
         root = frames[..., self.root]
         facing = root[..., 2].cumsum(1) / self.fps
         before = facing - root[..., 2] / self.fps
-        sin, cos = before.sin(), before.cos()
+        sin = before.sin()
+        cos = before.cos()
         x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / self.fps
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / self.fps
         turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
         vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(self.parents) - 1, 3)
         local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
-        found = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
-        return found.reshape(*frames.shape[:-1], -1, 3) + torch.stack([x, root[..., 3], z], dim=-1)[..., None, :]
+        joints = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
+        return joints.reshape(*frames.shape[:-1], -1, 3) + torch.stack([x, root[..., 3], z], dim=-1)[..., None, :]
 
 
 def _turn(angle: Tensor, axis: int) -> Tensor:
     """Rotations (3, 3, ...) by angles (...) in radians about the axis 0, 1 or 2."""
-    one, zero = torch.ones_like(angle), torch.zeros_like(angle)
-    sin, cos = angle.sin(), angle.cos()
+    unit = torch.ones_like(angle)
+    zero = torch.zeros_like(angle)
+    sin = angle.sin()
+    cos = angle.cos()
     rows = {
-        0: (one, zero, zero, zero, cos, -sin, zero, sin, cos),
-        1: (cos, zero, sin, zero, one, zero, -sin, zero, cos),
-        2: (cos, -sin, zero, sin, cos, zero, zero, zero, one),
+        0: (unit, zero, zero, zero, cos, -sin, zero, sin, cos),
+        1: (cos, zero, sin, zero, unit, zero, -sin, zero, cos),
+        2: (cos, -sin, zero, sin, cos, zero, zero, zero, unit),
     }
     return torch.unflatten(torch.stack(rows[axis]), 0, (3, 3))
 
@@ -215,7 +234,8 @@ class EulerPlaces(nn.Module):
 
     def __init__(self, figure: Figure) -> None:
         super().__init__()
-        self.parents, joints = figure.parents, len(figure.parents)
+        self.parents = figure.parents
+        joints = len(figure.parents)
         axes = torch.tensor([[AXES.index(axis) for axis in order] for order in figure.orders])
         # angles about axes that are a mirror image of x, y, z count the other way round
         signs = torch.linalg.det(torch.eye(3)[axes])
@@ -231,14 +251,18 @@ class EulerPlaces(nn.Module):
         """Frames (B, T, D), angles in degrees, to places (B, T, 3 (J - 1)) in metres from the root of the others."""
         padded = functional.pad(frames.flatten(0, 1).T, (0, 0, 0, 1))
         angles = torch.unflatten(padded.index_select(0, self.columns), 0, (3, -1)) * self.units
-        found = forward_kinematics(self.parents, self.offsets, self._local(angles), range(len(self.parents)))
-        return found[:, 1:].reshape(*frames.shape[:2], -1)
+        joints = forward_kinematics(self.parents, self.offsets, self._local(angles), range(len(self.parents)))
+        return joints[:, 1:].reshape(*frames.shape[:2], -1)
 
     def _local(self, angles: Tensor) -> Tensor:
         """Rotations (3, 3, J, N) by angles (3, J, N) in radians about the axes in each joint's order: Rx Ry Rz with
         rows and columns in that order."""
-        (sin_x, sin_y, sin_z), (cos_x, cos_y, cos_z) = angles.sin(), angles.cos()
-        sin_xz, cos_xz, sin_cos, cos_sin = sin_x * sin_z, cos_x * cos_z, sin_x * cos_z, cos_x * sin_z
+        sin_x, sin_y, sin_z = angles.sin()
+        cos_x, cos_y, cos_z = angles.cos()
+        sin_xz = sin_x * sin_z
+        cos_xz = cos_x * cos_z
+        sin_cos = sin_x * cos_z
+        cos_sin = cos_x * sin_z
         rows = [cos_y * cos_z, -cos_y * sin_z, sin_y]
         rows += [sin_y * sin_cos + cos_sin, cos_xz - sin_y * sin_xz, -sin_x * cos_y]
         rows += [sin_xz - sin_y * cos_xz, sin_y * cos_sin + sin_cos, cos_x * cos_y]
@@ -246,8 +270,10 @@ class EulerPlaces(nn.Module):
 
 
 def joint_weights(contract: MotionContract, parts: tuple[str, ...], times: float) -> Tensor:
-    """How much each joint counts in a loss (J,), mean 1: those of some parts of both sides so many times the others."""
+    """The weights (J,) of joints in a loss, mean 1: those of some parts of both sides weigh ``times`` the others."""
     assert contract.skeleton is not None
-    counted = tuple(sided(side, part) for side in LEFT_RIGHT for part in parts)
-    found = np.array([times if name.startswith(counted) else 1.0 for name in contract.skeleton.names])
-    return torch.from_numpy(found / found.mean()).float()
+    heavy: list[str] = []
+    for side in LEFT_RIGHT:
+        heavy += [sided(side, part) for part in parts]
+    weights = np.array([times if name.startswith(tuple(heavy)) else 1.0 for name in contract.skeleton.names])
+    return torch.from_numpy(weights / weights.mean()).float()

@@ -39,7 +39,8 @@ class KnownMotions(Net):
     def __init__(self, config: KnownMotionsConfig) -> None:
         super().__init__(config.writer.channels)
         self.config = config
-        self.writer, self.space = MotionToLanguage(config.writer), JointEmbedding(config.space)
+        self.writer = MotionToLanguage(config.writer)
+        self.space = JointEmbedding(config.space)
         shapes: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
             "vectors": ((config.motions, config.views, config.space.vector), torch.int8),
             "actions": ((config.motions,), torch.int16),
@@ -60,8 +61,10 @@ class KnownMotions(Net):
         motions, views, _ = known.vectors.shape
         counts = (motions, views, *known.shown.shape, len(known.sentences), len(letters))
         net = KnownMotions(KnownMotionsConfig(writer.config, space.config, *counts))
-        net.writer, net.space = writer, space
-        net.mean, net.scale = writer.mean.clone(), writer.scale.clone()
+        net.writer = writer
+        net.space = space
+        net.mean = writer.mean.clone()
+        net.scale = writer.scale.clone()
         for name in net.known_tables:
             table = letters if name == "sentences" else torch.from_numpy(getattr(known, name))
             getattr(net, f"known_{name}").copy_(table)

@@ -58,7 +58,9 @@ class Matching(Net):
     def __init__(self, config: MatchingConfig) -> None:
         super().__init__(config.channels)
         self.config = config
-        codes, poses, rows = config.even + config.odd, 4 * len(config.tree.bones) + 1, config.rows
+        codes = config.even + config.odd
+        poses = 4 * len(config.tree.bones) + 1
+        rows = config.rows
         self.codes = nn.Parameter(torch.zeros(rows, codes))
         self.pose_basis = nn.Parameter(torch.zeros(codes, poses))
         for name, width in {"moves": 6, "features": config.features, "shows": len(config.gaits)}.items():
@@ -80,8 +82,8 @@ class Matching(Net):
 
     def points(self, quats: Tensor, height: Tensor) -> Tensor:
         """Places (..., J', 3) of all joints in metres, seen from the facing, of poses as :meth:`poses` gives them."""
-        found = self.places(quat_to_sixd(quats).flatten(-2))
-        return torch.cat([found[..., :1], found[..., 1:2] + height[..., None], found[..., 2:]], dim=-1)
+        points = self.places(quat_to_sixd(quats).flatten(-2))
+        return torch.cat([points[..., :1], points[..., 1:2] + height[..., None], points[..., 2:]], dim=-1)
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """None: the loop is springs, a search and a linear map."""

@@ -47,34 +47,42 @@ class Block(nn.Module):
 
     slopes: Tensor
 
-    def __init__(self, width: int, heads: int, told: int) -> None:
+    def __init__(self, width: int, heads: int, condition: int) -> None:
         super().__init__()
         self.heads = heads
-        self.told = nn.Linear(told, 6 * width)
+        # weights keep the names that trained runs have: told is the modulation, asked is qkv, mixed is proj, and inward
+        # and outward are the MLP
+        self.told = nn.Linear(condition, 6 * width)
         nn.init.zeros_(self.told.weight)
         nn.init.zeros_(self.told.bias)
         self.asked = nn.Linear(width, 3 * width, bias=False)
         self.mixed = nn.Linear(width, width, bias=False)
-        self.inward, self.outward = nn.Linear(width, 4 * width), nn.Linear(4 * width, width)
+        self.inward = nn.Linear(width, 4 * width)
+        self.outward = nn.Linear(4 * width, width)
         slopes = 2.0 ** -torch.linspace(1, 8, heads)
         self.register_buffer("slopes", slopes[:, None, None], persistent=False)
 
-    def forward(self, x: Tensor, told: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, N, C) to the same; past: keys and values (B, H, M, 2 C / H) of the steps before, given back with new."""
-        shift, scale, gate, shift_2, scale_2, gate_2 = self.told(told).chunk(6, dim=-1)
-        found, past = self._attend(functional.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift, past)
-        x = x + (1 + gate) * self.mixed(found)
-        inner = gelu(self.inward(functional.layer_norm(x, x.shape[-1:]) * (1 + scale_2) + shift_2))
-        return x + (1 + gate_2) * self.outward(inner), past
+    def forward(self, x: Tensor, condition: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
+        """(B, N, C) to the same; past: keys and values (B, H, M, 2 C / H) of the steps before, returned with the new
+        ones."""
+        shift, scale, gate, shift_2, scale_2, gate_2 = self.told(condition).chunk(6, dim=-1)
+        attended, past = self._attend(functional.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift, past)
+        x = x + (1 + gate) * self.mixed(attended)
+        mlp = gelu(self.inward(functional.layer_norm(x, x.shape[-1:]) * (1 + scale_2) + shift_2))
+        return x + (1 + gate_2) * self.outward(mlp), past
 
     def _attend(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
-        asked, keys, values = self.asked(x).unflatten(-1, (3, self.heads, -1)).permute(2, 0, 3, 1, 4)
+        # queries of the new steps, keys and values of all
+        qkv = self.asked(x).unflatten(-1, (3, self.heads, -1))
+        queries, keys, values = qkv.permute(2, 0, 3, 1, 4)
         past = torch.cat([past, torch.cat([keys, values], dim=-1)], dim=2)
         keys, values = past.chunk(2, dim=-1)
+
+        # the past counts less the longer ago it is, the future not at all
         now = torch.arange(x.shape[1], device=x.device) + past.shape[2] - x.shape[1]
         ago = now[:, None] - torch.arange(past.shape[2], device=x.device)
         bias = torch.where(ago >= 0, -self.slopes * ago, -torch.inf)
-        scores = asked @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 + bias
+        scores = queries @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 + bias
         return (scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2), past
 
 
@@ -84,7 +92,9 @@ class CodeModel(nn.Module):
     def __init__(self, config: CodeModelConfig, sizes: tuple[int, ...], numbers: int) -> None:
         """sizes: how many codes each part has, the end being the last move. numbers: that a step's codes stand for."""
         super().__init__()
-        self.config, self.sizes, width = config, sizes, config.width
+        self.config = config
+        self.sizes = sizes
+        width = config.width
         self.actions = nn.Embedding(config.actions + 1, config.action)
         self.ages = nn.Embedding(config.ages, config.action)
         self.seen = nn.Linear(numbers, width)
@@ -111,26 +121,26 @@ class CodeModel(nn.Module):
         which their codes stand. action: (B, N) int64. age: (B, N) int64 steps since the action began. past: of
         :meth:`start`.
         """
-        told = self.actions(action) + self.ages(age.clamp_max(self.config.ages - 1))
+        condition = self.actions(action) + self.ages(age.clamp_max(self.config.ages - 1))
         x = self.moves(moves) + self.seen(numbers)
         if self.training:
             hidden = torch.rand(moves.shape, device=x.device) < self.config.hidden
             x = torch.where(hidden[..., None], self.masked, x)
         pasts = []
         for block, old in zip(self.blocks, past.unbind(1), strict=True):
-            x, new = block(x, told, old)
+            x, new = block(x, condition, old)
             pasts.append(new)
         return x, torch.stack(pasts, dim=1)
 
     def logits(self, known: Tensor, codes: Tensor) -> list[Tensor]:
         """For each part the logits (..., size) of its codes, from what is known (..., C) and the codes (..., P) of the
         step, of which each part sees those before it."""
-        found = []
+        logits = []
         for part, head in enumerate(self.heads):
-            found.append(head(known))
+            logits.append(head(known))
             if part < len(self.before):
                 known = known + self.before[part](codes[..., part])
-        return found
+        return logits
 
 
 @dataclass(frozen=True)
@@ -179,16 +189,16 @@ class MotionCodes(Net):
         self.scale.copy_(codec.scale)
 
     def losses(self, codes: Tensor, before: Tensor, action: Tensor, age: Tensor) -> Tensor:
-        """How surprising each part of each step is (B, N, P); of parts after an end, 0.
+        """The cross-entropy (B, N, P) of each part of each step, 0 for parts after an end.
 
-        codes, before: (B, N, P) int64 of the steps and of the steps before them. action, age: as the writer takes them.
+        codes, before: (B, N, P) int64 of the steps and of the steps before them. action, age: see the writer.
         """
         known, _ = self.writer(*self._seen(before), action, age, self.writer.start(len(codes)))
-        found = []
+        part_losses = []
         for part, logits in enumerate(self.writer.logits(known, codes)):
             target = codes[..., part].flatten()
-            found.append(functional.cross_entropy(logits.float().flatten(0, 1), target, reduction="none"))
-        losses = torch.stack(found, dim=-1).reshape(codes.shape)
+            part_losses.append(functional.cross_entropy(logits.float().flatten(0, 1), target, reduction="none"))
+        losses = torch.stack(part_losses, dim=-1).reshape(codes.shape)
         real = torch.ones_like(losses)
         real[..., 1:] = (codes[..., :1] != self.end).float()
         return losses * real
@@ -196,9 +206,10 @@ class MotionCodes(Net):
     def _seen(self, codes: Tensor) -> tuple[Tensor, Tensor]:
         """Moves (B, N) and numbers (B, N, L) of codes (B, N, P), numbers 0 where nothing was."""
         moves = codes[..., 0]
-        codec, there = self.codec, (moves < self.end)[..., None].float()
+        codec = self.codec
+        real = (moves < self.end)[..., None].float()
         way = codec.book[moves.clamp_max(self.end - 1)] / codec.book_scale
-        return moves, torch.cat([way, codec.from_codes(codes[..., 1:])], dim=-1) * there
+        return moves, torch.cat([way, codec.from_codes(codes[..., 1:])], dim=-1) * real
 
     def step(self, codes: Tensor, action: Tensor, age: Tensor, past: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """What is known of the next step (B, C), and the numbers (B, L) for which the step before stands.
@@ -211,25 +222,26 @@ class MotionCodes(Net):
 
     def part(self, known: Tensor, codes: Tensor) -> Tensor:
         """Log-probabilities (B, P, V) of the codes of each part, given those (B, P) of the parts before it."""
-        found = []
+        parts = []
         for logits in self.writer.logits(known, codes):
             missing = max(self.sizes) - logits.shape[-1]  # codes that this part lacks
-            found.append(functional.pad(functional.log_softmax(logits, dim=-1), (0, missing), value=-1e4))
-        return torch.stack(found, dim=1)
+            parts.append(functional.pad(functional.log_softmax(logits, dim=-1), (0, missing), value=-1e4))
+        return torch.stack(parts, dim=1)
 
     def decode(self, codes: Tensor) -> tuple[Tensor, Tensor]:
         """Codes (B, N, P) to the frames of each step (B, N, T / N, D), as :meth:`MotionCodec.decode`, and moves
         (B, N, 3)."""
         moves = codes[..., 0]
         frames = self.codec.decode(moves, self.codec.from_codes(codes[..., 1:]))
-        hop, channels = self.config.codec.hop, self.config.codec.channels
-        return frames.reshape(codes.shape[0], -1, hop, channels), self.codec.book[moves]
+        config = self.config.codec
+        return frames.reshape(codes.shape[0], -1, config.hop, config.channels), self.codec.book[moves]
 
     def tables(self) -> dict[str, NDArray[Any]]:
         """The memory, and the numbers that a move (M, 3) and a code of the body (V, L) stand for."""
         codec = self.config.codec
         every = torch.arange(codec.codes)[:, None].expand(-1, codec.groups)
-        moves, body = self.codec.book / self.codec.book_scale, self.codec.from_codes(every)[:, : len(codec.levels)]
+        moves = self.codec.book / self.codec.book_scale
+        body = self.codec.from_codes(every)[:, : len(codec.levels)]
         return {"memory": self.memory.numpy(), "moves": moves.numpy(), "body": body.numpy()}
 
     def to_codes(self, frames: Tensor) -> Tensor:
@@ -238,15 +250,24 @@ class MotionCodes(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder of sentences, the step and its parts, and the codec's two ways."""
-        writer, codec, parts = self.config.writer, self.config.codec, len(self.sizes)
+        writer = self.config.writer
+        codec = self.config.codec
+        parts = len(self.sizes)
+
+        # the step of the writer, and the parts of a step
         action, age = (TensorSpec(name, ("batch",), "int64") for name in ("action", "age"))
-        codes, known = TensorSpec("codes", ("batch", parts), "int64"), TensorSpec("known", ("batch", writer.width))
+        codes = TensorSpec("codes", ("batch", parts), "int64")
+        known = TensorSpec("known", ("batch", writer.width))
         numbers = TensorSpec("numbers", ("batch", self.writer.seen.in_features))
-        layers, heads, size = writer.layers, writer.heads, 2 * writer.width // writer.heads
-        past, longer = (TensorSpec(name, ("batch", layers, heads, "past", size)) for name in ("past", "next_past"))
-        start = {"past": (layers, heads, 0, size)}
+        size = 2 * writer.width // writer.heads
+        shape = ("batch", writer.layers, writer.heads, "past", size)
+        past = TensorSpec("past", shape)
+        longer = TensorSpec("next_past", shape)
+        start = {"past": (writer.layers, writer.heads, 0, size)}
         stepped = GraphSpec((codes, action, age, past), (known, numbers, longer), {"past": "next_past"}, start)
         chances = TensorSpec("log_probabilities", ("batch", parts, max(self.sizes)))
+
+        # codes to frames, and frames to codes
         frames = TensorSpec("frames", ("batch", "steps", codec.hop, codec.channels))
         written, body = (TensorSpec("codes", ("batch", "steps", count), "int64") for count in (parts, parts - 1))
         moves = TensorSpec("moves", ("batch", "steps", 3))

@@ -17,7 +17,9 @@ from motet_train.data.batches import Batch
 from motet_train.models.net import Net, Part, before, normalised
 from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding
 
-PAD, SOS, EOS = 0, 1, 2
+PAD = 0
+SOS = 1
+EOS = 2
 """Ids of the special words."""
 
 
@@ -36,15 +38,16 @@ class SummaryHead(nn.Module):
 
     def loss(self, context: Tensor, normal: Tensor, lengths: Tensor) -> Tensor:
         """Mean squared error for contexts (B, C) of normalised frames (B, T, D) of the given lengths (B,)."""
-        found: Tensor = self.layers(context)
-        return (found - summary(normal, lengths)).square().mean()
+        predicted: Tensor = self.layers(context)
+        return (predicted - summary(normal, lengths)).square().mean()
 
 
 def summary(normal: Tensor, lengths: Tensor) -> Tensor:
     """Mean, deviation and log-length (B, 2 D + 1) of normalised frames (B, T, D) of the given lengths (B,)."""
     real = before(lengths, normal.shape[1])[..., None]
-    # within 5 deviations: a few wild frames would else outweigh the motion
-    frames, count = torch.where(real, normal.clamp(-5.0, 5.0), 0.0), lengths[:, None]
+    # within 5 deviations, or a few wild frames would outweigh the motion
+    frames = torch.where(real, normal.clamp(-5.0, 5.0), 0.0)
+    count = lengths[:, None]
     mean = frames.sum(dim=1) / count
     square = torch.where(real, (frames - mean[:, None]).square(), 0.0).sum(dim=1) / count
     return torch.cat([mean, square.sqrt(), count.log()], dim=1)
@@ -97,7 +100,8 @@ class MotionToLanguage(LanguageNet):
     def __init__(self, config: MotionToLanguageConfig) -> None:
         super().__init__(config.channels)
         self.config = config
-        context, shared = 2 * config.encoder_units[-1], (config.gates, config.dropout)
+        context = 2 * config.encoder_units[-1]
+        shared = (config.gates, config.dropout)
         self.encoder = Encoder(GRU, config.channels + config.travelled + 1, config.encoder_units, *shared)
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.decoder = Decoder(GRU, config.embedding, context, config.decoder_units, False, *shared)
@@ -117,8 +121,8 @@ class MotionToLanguage(LanguageNet):
 
     def outputs(self, words: Tensor, context: Tensor) -> Tensor:
         """Outputs of the decoder (B, W, S) after each of the words (B, W) and all before it."""
-        found: Tensor = self.decoder(self.embedding(words), context)
-        return found
+        outputs: Tensor = self.decoder(self.embedding(words), context)
+        return outputs
 
     def log_probabilities(self, outputs: Tensor) -> Tensor:
         """Outputs of the decoder (..., S) to log-probabilities of the next word (..., V), eq. 5 and 6."""
@@ -146,7 +150,8 @@ class MotionToLanguage(LanguageNet):
         """The encoder and the step, each with its contract."""
         context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
         frames = TensorSpec("frames", ("batch", "time", self.config.channels))
-        lengths, word = TensorSpec("lengths", ("batch",), "int64"), TensorSpec("word", ("batch",), "int64")
+        lengths = TensorSpec("lengths", ("batch",), "int64")
+        word = TensorSpec("word", ("batch",), "int64")
         state, following = (TensorSpec(n, ("batch", sum(self.config.decoder_units))) for n in ("state", "next_state"))
         scores = TensorSpec("log_probabilities", ("batch", self.config.words))
         step = GraphSpec((word, context, state), (scores, following), {"state": "next_state"})

@@ -57,7 +57,8 @@ class Part(nn.Module):
 
     def __init__(self, net: nn.Module, function: Callable[..., Any]) -> None:
         super().__init__()
-        self.net, self.forward = net, function
+        self.net = net
+        self.forward = function
 
 
 def tuples(value: Any) -> Any:

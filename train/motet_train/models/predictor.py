@@ -70,8 +70,11 @@ class Trajectory(nn.Module):
 
     def __init__(self, config: PredictorConfig) -> None:
         super().__init__()
-        self.config, steps, seen = config, config.seed_frames - 1, len(config.kept)
-        moved, k = seen - config.held, config.polynomials
+        self.config = config
+        steps = config.seed_frames - 1
+        seen = len(config.kept)
+        moved = seen - config.held
+        k = config.polynomials
 
         def polynomials(points: Tensor, count: int) -> Tensor:
             """Orthonormal ones (T, count) at points (T), all 0 at 0."""
@@ -112,9 +115,9 @@ def error_signs(seed: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     """
     velocity = seed.diff(dim=1)
     shared = [size(velocity[:, -1]), size(velocity).mean(1), size(velocity.diff(dim=1)[:, -2:]).mean(1)]
-    own = [size(steps), disagreement, size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1])))]
-    alike = [sign[:, None].expand(disagreement.shape) for sign in shared]
-    return torch.log(torch.stack([*alike, *own], dim=-1) + LEAST)
+    by_frame = [size(steps), disagreement, size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1])))]
+    at_all_frames = [sign[:, None].expand(disagreement.shape) for sign in shared]
+    return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1) + LEAST)
 
 
 def size(values: Tensor) -> Tensor:
@@ -147,7 +150,8 @@ class ErrorHead(nn.Module):
 
         It is the likeliest one if errors are distributed exponentially, so their largest values do not lead it.
         """
-        middle, spread = logarithms.mean(0), logarithms.std(0).clamp_min(1e-3)
+        middle = logarithms.mean(0)
+        spread = logarithms.std(0).clamp_min(1e-3)
         signs = ((logarithms - middle) / spread).double()
         law = torch.zeros(len(self.bias), self.weight.shape[1] + 1, dtype=torch.float64, requires_grad=True)
         law.data[:, -1] = errors.double().mean(0).log()
@@ -162,9 +166,9 @@ class ErrorHead(nn.Module):
 
         with torch.enable_grad():
             descent.step(loss)  # type: ignore[no-untyped-call]
-        found = law.detach()
-        self.weight.copy_(found[:, :-1] / spread)
-        self.bias.copy_(found[:, -1] - (found[:, :-1] * middle / spread).sum(-1))
+        fitted = law.detach()
+        self.weight.copy_(fitted[:, :-1] / spread)
+        self.bias.copy_(fitted[:, -1] - (fitted[:, :-1] * middle / spread).sum(-1))
 
 
 class Predictor(Net):
@@ -187,7 +191,8 @@ class Predictor(Net):
         self.config = config
         self.trajectory = Trajectory(config)
         self.doubt = ErrorHead(config.frames) if config.doubts else None
-        kept, channels = list(config.kept), config.channels
+        kept = list(config.kept)
+        channels = config.channels
         self.register_buffer("kept", torch.tensor(kept), persistent=False)
         self.register_buffer("relative", (torch.arange(len(kept)) < config.held).float(), persistent=False)
         self.register_buffer("placing", torch.eye(channels)[kept[config.held :]], persistent=False)
@@ -210,23 +215,23 @@ class Predictor(Net):
         return frames[..., self.mirrored] * self.signs
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the next (B, N, C): the mean of the two ways of looking at them."""
+        """Frames (B, L, C) to the next (B, N, C): the mean of those for them and for their mirror image."""
         if not self.config.mirrored:
             return self.plain(frames)
-        one, other = self._both(frames)
-        return (one + other) / 2
+        plain, mirrored = self._both(frames)
+        return (plain + mirrored) / 2
 
     def _both(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """What follows (B, N, C) by the frames, and by their mirror image, mirrored back."""
         # rows and their mirror images in one batch, side by side
-        found = self.plain(torch.stack([frames, self.mirror(frames)], dim=1).flatten(0, 1))
-        both = found.reshape(-1, 2, self.config.frames, self.config.channels)
+        predicted = self.plain(torch.stack([frames, self.mirror(frames)], dim=1).flatten(0, 1))
+        both = predicted.reshape(-1, 2, self.config.frames, self.config.channels)
         return both[:, 0], self.mirror(both[:, 1])
 
     def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them."""
-        one, other = self._both(frames)
-        return (one + other) / 2, size(self._moved(one - other) / 2)
+        plain, mirrored = self._both(frames)
+        return (plain + mirrored) / 2, size(self._moved(plain - mirrored) / 2)
 
     def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
         """The signs (B, N, S) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
@@ -245,7 +250,8 @@ class Predictor(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder, the step and, where the net knows its errors, those: each with its contract."""
-        channels, count = self.config.channels, self.config.frames
+        channels = self.config.channels
+        count = self.config.frames
         frames = TensorSpec("frames", ("batch", self.config.seed_frames, channels))
         coming, left = (TensorSpec(name, ("batch", count, channels)) for name in ("trajectory", "next_trajectory"))
         frame = TensorSpec("frame", ("batch", channels))

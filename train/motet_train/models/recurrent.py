@@ -53,17 +53,20 @@ class GRU(nn.Module):
 
     def __init__(self, inputs: int, units: int, directions: int, gates: str, dropout: float) -> None:
         super().__init__()
-        self.units, self.gates, self.dropout = units, gates, dropout
+        self.units = units
+        self.gates = gates
+        self.dropout = dropout
         self.weight = nn.Parameter(torch.empty(directions, inputs, 3 * units))
         self.bias = nn.Parameter(torch.zeros(directions, 1, 3 * units))
         self.gate_recurrence = nn.Parameter(torch.empty(directions, units, 2 * units))
         self.candidate_recurrence = nn.Parameter(torch.empty(directions, units, units))
         for weight in (self.weight, self.gate_recurrence, self.candidate_recurrence):
-            for gate in (gate for direction in weight.detach() for gate in direction.split(units, dim=-1)):
-                if weight is self.weight:
-                    nn.init.xavier_uniform_(gate)
-                else:
-                    nn.init.orthogonal_(gate, gain=1.1)
+            for direction in weight.detach():
+                for gate in direction.split(units, dim=-1):
+                    if weight is self.weight:
+                        nn.init.xavier_uniform_(gate)
+                    else:
+                        nn.init.orthogonal_(gate, gain=1.1)
 
     def forward(self, x: Tensor, active: Tensor | None = None) -> Tensor:
         """A sequence (G, T, B, I) to the state after each step (G, T, B, N), from a state of zeros.
@@ -73,15 +76,15 @@ class GRU(nn.Module):
         directions, steps, rows, inputs = x.shape
         keep = mask(self, self.dropout, x, directions, 1, rows, inputs)
         x = x if keep is None else x * keep
-        given = [y.reshape(directions, steps, rows, -1) for y in self.project(x.flatten(1, 2))]
+        projected = [y.reshape(directions, steps, rows, -1) for y in self.project(x.flatten(1, 2))]
         keep = mask(self, self.dropout, x, directions, rows, self.units)
 
-        def advance(state: Tensor, given: list[Tensor]) -> Tensor:
-            new = self.cell(state, given[0], given[1], keep)
-            return new if active is None else torch.where(given[2], new, state)
+        def advance(state: Tensor, inputs: list[Tensor]) -> Tensor:
+            new = self.cell(state, inputs[0], inputs[1], keep)
+            return new if active is None else torch.where(inputs[2], new, state)
 
         start = x.new_zeros(directions, rows, self.units)
-        return recur(advance, start, given if active is None else [*given, active])
+        return recur(advance, start, projected if active is None else [*projected, active])
 
     def exported(self, x: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """Both directions over sequences (T, B, I) of the given lengths (B,), as ONNX's own GRU: one kernel.
@@ -90,7 +93,7 @@ class GRU(nn.Module):
         """
         weight = torch.cat([self.gate_recurrence, self.candidate_recurrence], dim=-1).mT
         bias = functional.pad(self.bias[:, 0], (0, 3 * self.units))
-        found, last = torch.onnx.ops.symbolic_multi_out(
+        states, last = torch.onnx.ops.symbolic_multi_out(
             "GRU",
             (x, self.weight.mT, weight, bias, lengths.int()),
             {"hidden_size": self.units, "direction": "bidirectional", "activations": 2 * [ONNX[self.gates], "Tanh"]},
@@ -98,7 +101,7 @@ class GRU(nn.Module):
             shapes=((x.shape[0], 2, x.shape[1], self.units), (2, x.shape[1], self.units)),
             version=18,
         )
-        return found.transpose(1, 2).flatten(2), last.transpose(0, 1).flatten(1)
+        return states.transpose(1, 2).flatten(2), last.transpose(0, 1).flatten(1)
 
     def step(self, x: Tensor, state: Tensor) -> Tensor:
         """One step of a layer of one direction: inputs (B, I) and state (B, N) to the next state (B, N)."""
@@ -127,15 +130,15 @@ def recur(advance: Callable[[Tensor, list[Tensor]], Tensor], start: Tensor, sequ
     if torch.compiler.is_exporting():
         from torch._higher_order_ops.scan import scan  # private, so only the export needs it
 
-        def body(state: Tensor, given: list[Tensor]) -> tuple[Tensor, Tensor]:
-            new = advance(state, given)
+        def body(state: Tensor, inputs: list[Tensor]) -> tuple[Tensor, Tensor]:
+            new = advance(state, inputs)
             return new, new.clone()
 
-        found: Tensor = scan(body, start, [sequence.transpose(0, 1) for sequence in sequences])[1]
-        return found.transpose(0, 1)
+        scanned: Tensor = scan(body, start, [sequence.transpose(0, 1) for sequence in sequences])[1]
+        return scanned.transpose(0, 1)
     states = []
-    for given in zip(*(sequence.unbind(1) for sequence in sequences), strict=True):
-        start = advance(start, list(given))
+    for inputs in zip(*(sequence.unbind(1) for sequence in sequences), strict=True):
+        start = advance(start, list(inputs))
         states.append(start)
     return torch.stack(states, dim=1)
 
@@ -177,7 +180,8 @@ class Decoder(nn.Module):
         self, layer: type[GRU], token: int, context: int, units: Sequence[int], twice: bool, gates: str, dropout: float
     ) -> None:
         super().__init__()
-        self.units, self.twice = tuple(units), twice
+        self.units = tuple(units)
+        self.twice = twice
         below = [token if twice else 0, *units]
         self.layers = nn.ModuleList(
             layer(size + context + token, n, 1, gates, dropout) for size, n in zip(below, units, strict=False)
