@@ -13,9 +13,9 @@ LARGE_FUNCTION = 250
 MOST_LARGE_FUNCTIONS = 250
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 490
-MOST_TUPLE_ASSIGNMENTS = 139
-MOST_NESTED_COMPREHENSIONS = 140
+MOST_BANNED_NAMES = 445
+MOST_TUPLE_ASSIGNMENTS = 87
+MOST_NESTED_COMPREHENSIONS = 136
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -109,7 +109,7 @@ CEILINGS = {
     "motet_train.cli": 8_400,
     "motet_train.data": 21_900,
     "motet_train.evaluate": 44_900,
-    "motet_train.models": 20_400,
+    "motet_train.models": 20_300,
     "motet_train.papers": 41_400,
     "motet_train.recipes": 14_900,
 }
