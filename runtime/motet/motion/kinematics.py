@@ -37,26 +37,38 @@ def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Arra
     wanted = range(len(skeleton.joints)) if joints is None else joints
     rotations = frames_last((len(motion), len(wanted), 3, 3))
     rotations[:] = np.eye(3)
+    # joints with channels, those of one Euler order together
     for order, places in _by_order([skeleton.joints[i] for i in wanted], columns).items():
         turning = [skeleton.joints[wanted[place]] for place in places]
-        # each joint's angles in its order, 0 without a channel
-        angles = frames_last((len(motion), len(places), 3))
-        angles[:] = 0.0
-        found = [(place, column) for place, joint in enumerate(turning) for column in columns[joint.name]]
-        of, taken = (list(part) for part in zip(*found, strict=True))
-        axes = [order.index(motion.channels[column][-1]) for column in taken]
-        angles[:, of, axes] = motion.values[:, taken] * [2 * np.pi / TURN[motion.units[column]] for column in taken]
+        angles = _angles(motion, turning, order)
         rotations[:, places] = _about_axes(euler_to_rotmat(angles, order), turning)
     return rotations
 
 
+def _angles(motion: Motion, joints: Sequence[Joint], order: str) -> Array:
+    """Angles (T, J, 3) in radians of joints of one Euler order, in this order, 0 without a channel."""
+    columns = motion.rotation_columns()
+    joint_of_angle = []
+    column_of_angle = []
+    for place, joint in enumerate(joints):
+        for column in columns[joint.name]:
+            joint_of_angle.append(place)
+            column_of_angle.append(column)
+    axes = [order.index(motion.channels[column][-1]) for column in column_of_angle]
+    to_radians = [2 * np.pi / TURN[motion.units[column]] for column in column_of_angle]
+    angles = frames_last((len(motion), len(joints), 3))
+    angles[:] = 0.0
+    angles[:, joint_of_angle, axes] = motion.values[:, column_of_angle] * to_radians
+    return angles
+
+
 def _by_order(joints: Sequence[Joint], names: Container[str] | None = None) -> dict[str, list[int]]:
     """The places in a list of joints, of these names, by Euler order: joints of one order are processed together."""
-    found: dict[str, list[int]] = {}
+    places: dict[str, list[int]] = {}
     for place, joint in enumerate(joints):
         if names is None or joint.name in names:
-            found.setdefault(joint.order, []).append(place)
-    return found
+            places.setdefault(joint.order, []).append(place)
+    return places
 
 
 def local_translations(motion: Motion) -> Array:
@@ -111,18 +123,18 @@ def eulers_of(rotations: Array, joints: Sequence[Joint], leaps: bool = False) ->
 
 def _about_axes(turns: Array, joints: Sequence[Joint], back: bool = False) -> Array:
     """C M C^T (T, J, 3, 3) of each joint's turns M, or M of these."""
-    own = [place for place, joint in enumerate(joints) if any(joint.axis)]
-    if own:
-        frames = np.array([joints[place].frame.T if back else joints[place].frame for place in own])
-        turns[:, own] = product(product(frames, turns[:, own]), inverse(frames))
+    with_axis = [place for place, joint in enumerate(joints) if any(joint.axis)]
+    if with_axis:
+        frames = np.array([joints[place].frame.T if back else joints[place].frame for place in with_axis])
+        turns[:, with_axis] = product(product(frames, turns[:, with_axis]), inverse(frames))
     return turns
 
 
 def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
     """Rotations (T, J, 3, 3) of joints from those of each (T, 3, 3)."""
     stacked = frames_last((frames, len(rotations), 3, 3))
-    for i, of_one in enumerate(rotations):
-        stacked[:, i] = of_one
+    for joint, of_joint in enumerate(rotations):
+        stacked[:, joint] = of_joint
     return stacked
 
 
@@ -159,20 +171,31 @@ def posed(
     :func:`continued` takes them. leaps: their angles may leap from frame to frame."""
     skeleton = skeleton_of(motion)
     values = np.array(motion.values)
-    columns = motion.rotation_columns()
-    turned = [name for name in columns if name in rotations]
-    joints = [skeleton.joints[skeleton.index(name)] for name in turned]
-    angles = eulers_of(side_by_side([rotations[name] for name in turned], len(motion)), joints, leaps)
-    places = [place for place, name in enumerate(turned) for _ in columns[name]]
-    taken = [column for name in turned for column in columns[name]]
-    axes = [AXES.index(motion.channels[column][-1]) for column in taken]
-    values[:, taken] = angles[:, places, axes] * [TURN[motion.units[column]] for column in taken] / (2 * np.pi)
+    _set_angles(values, motion, rotations, leaps)
     for column, channel in enumerate(motion.channels):
         name, _, kind = channel.rpartition(".")
         if name in translations and kind in ("tx", "ty", "tz"):
             factor = 1.0 if motion.units[column] == "length" else skeleton.unit_factor(1.0)
             values[:, column] = translations[name][:, AXES.index(kind[1])] * factor
     return replace(motion, values=values)
+
+
+def _set_angles(values: Array, motion: Motion, rotations: Mapping[str, Array], leaps: bool) -> None:
+    """Set the angles in values (T, D) of a motion's channels to local rotations (T, 3, 3) of joints."""
+    skeleton = skeleton_of(motion)
+    columns = motion.rotation_columns()
+    names = [name for name in columns if name in rotations]
+    joints = [skeleton.joints[skeleton.index(name)] for name in names]
+    angles = eulers_of(side_by_side([rotations[name] for name in names], len(motion)), joints, leaps)
+    joint_of_angle = []
+    column_of_angle = []
+    for place, name in enumerate(names):
+        for column in columns[name]:
+            joint_of_angle.append(place)
+            column_of_angle.append(column)
+    axes = [AXES.index(motion.channels[column][-1]) for column in column_of_angle]
+    turns = [TURN[motion.units[column]] for column in column_of_angle]
+    values[:, column_of_angle] = angles[:, joint_of_angle, axes] * turns / (2 * np.pi)
 
 
 def places_of(skeleton: Skeleton, turned: Array) -> Array:
@@ -188,15 +211,27 @@ def places_of(skeleton: Skeleton, turned: Array) -> Array:
 def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: float) -> Motion:
     """The motion of rotations in the world (T, J, 3, 3) and of translations (T, 3) of some joints in their parents'
     frames: all in "deg" and "length", with continuous angles."""
-    kept = [i for i, j in enumerate(skeleton.joints) if skeleton.children[i] or not j.name.endswith(END_SUFFIX)]
+    # tips have no rotation
+    turning = []
+    for i, name in enumerate(skeleton.names):
+        if skeleton.children[i] or not name.endswith(END_SUFFIX):
+            turning.append(i)
     local = turned.copy(order="K")
     local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
-    angles = np.degrees(eulers_of(local[:, kept], [skeleton.joints[i] for i in kept]))
-    found = {"t": moved, "r": dict(zip(kept, np.moveaxis(angles, 1, 0), strict=True))}
-    parts = [(i, kind) for i in range(len(skeleton.joints)) for kind in "tr" if i in found[kind]]
-    names = tuple(f"{skeleton.names[i]}.{kind}{axis}" for i, kind in parts for axis in AXES)
-    units = tuple("deg" if kind == "r" else "length" for _, kind in parts for _ in AXES)
-    return Motion(np.concatenate([found[kind][i] for i, kind in parts], axis=1), names, units, fps, skeleton)
+    angles = np.degrees(eulers_of(local[:, turning], [skeleton.joints[i] for i in turning]))
+    angles_of = dict(zip(turning, np.moveaxis(angles, 1, 0), strict=True))
+
+    # of each joint first the translation, then the angles
+    names: list[str] = []
+    units: list[str] = []
+    columns = []
+    for i, name in enumerate(skeleton.names):
+        for letter, unit, values_of in (("t", "length", moved), ("r", "deg", angles_of)):
+            if i in values_of:
+                names += [f"{name}.{letter}{axis}" for axis in AXES]
+                units += [unit] * 3
+                columns.append(values_of[i])
+    return Motion(np.concatenate(columns, axis=1), tuple(names), tuple(units), fps, skeleton)
 
 
 def heading(motion: Motion) -> Array:

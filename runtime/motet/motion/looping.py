@@ -6,6 +6,7 @@ longest is taken. A part in which the figure hardly moves beside the rest is non
 nothing. The remaining difference is spread over the loop: rotations by rotation vectors, all else linearly.
 """
 
+from collections.abc import Set
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,18 @@ from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
 
 LIVELY = 0.6
-"""Least energy of a loop beside the mean of the whole motion's."""
+"""Least energy of a loop, relative to the mean of the whole motion."""
+
+LONGEST_COMPARED = 1500
+"""Frames that are compared pairwise at most; of longer motions every second or third, then the frames in between."""
+
+SECONDS_APART = 0.1
+"""Seconds: velocities count by how far they diverge in this time."""
+
+FARTHEST_ENDS = 0.04
+"""Largest difference of a loop's ends, as a share of the figure's height. Of 40 recorded walks, on the humanoid at 30
+fps, nine in ten repeat within 0.03 of the height, steady strides within 0.01 to 0.02; half of the running takes, which
+are short and turn or leap, repeat only within 0.06."""
 
 
 def looped(motion: Motion, shortest: float = 0.7) -> Motion:
@@ -30,31 +42,55 @@ def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     hips = _hips(motion)
     start, stop = _repetition(motion, hips, shortest)
     part = motion[start : stop + 1]
-    turned = global_transforms(part)[0]
-    local = local_rotations(part)
-    moved = local_translations(part)[:, hips]
-    above = turned[:, skeleton.joints[hips].parent] if hips else np.broadcast_to(np.eye(3), turned[:, 0].shape)
-    heading = twist(turned[:, hips], UP)
-    # joints with all three angles turn, by a share from -1/2 to 1/2 of what is left, so that both ends change equally
-    columns = part.rotation_columns()
+    # a share from -1/2 to 1/2 of the difference of the ends is taken off, so that both ends change equally
     share = np.linspace(-0.5, 0.5, len(part))[:, None]
-    whole = [i for i, name in enumerate(skeleton.names) if len(columns.get(name, ())) == 3]
-    rotations = {skeleton.names[i]: _closed(local[:, i], share) for i in whole if i != hips}
-    if hips in whole:  # the heading stays: only the tilt of the hips is made to repeat
-        own = product(heading, _closed(product(inverse(heading), turned[:, hips]), share))
-        rotations[skeleton.names[hips]] = product(inverse(above), own)
-    height = rotated(above, moved)[:, 1:2]
-    risen = rotated(inverse(above), share * (height[-1] - height[0]) * UP)
-    # other channels end as they begin, up to whole turns
-    stay = {f"{name}.r{axis}" for name in rotations for axis in AXES}
-    stay |= {f"{skeleton.names[hips]}.{kind}" for kind in ("tx", "ty", "tz", "ry")}
+    world = global_transforms(part)[0]
+    above = world[:, skeleton.joints[hips].parent] if hips else np.broadcast_to(np.eye(3), world[:, 0].shape)
+
+    # joints with all three angles turn; all other channels change by their differences
+    rotations = _closed_rotations(part, hips, world[:, hips], above, share)
+    hips_name = skeleton.names[hips]
+    left_open = {f"{hips_name}.{kind}" for kind in ("tx", "ty", "tz", "ry")}
+    for name in rotations:
+        left_open |= {f"{name}.r{axis}" for axis in AXES}
+    closed = replace(part, values=part.values - share * _difference(part, left_open))
+
+    # the hips end at the height at which they begin
+    translation = local_translations(part)[:, hips]
+    height = rotated(above, translation)[:, 1:2]
+    rise = rotated(inverse(above), share * (height[-1] - height[0]) * UP)
+    return posed(closed, rotations, {hips_name: translation - rise})[:-1]
+
+
+def _closed_rotations(part: Motion, hips: int, hips_world: Array, above: Array, share: Array) -> dict[str, Array]:
+    """By joint local rotations (T, 3, 3) that end as they begin, of joints with all three angles.
+
+    hips_world, above: rotations (T, 3, 3) in the world of the hips and of the joint above. share: (T, 1), the part of
+    the difference of the ends that is taken off in each frame.
+    """
+    local = local_rotations(part)
+    columns = part.rotation_columns()
+    rotations = {}
+    for i, name in enumerate(skeleton_of(part).names):
+        if len(columns.get(name, ())) != 3:
+            continue
+        if i == hips:  # the heading stays: only the tilt of the hips is made to repeat
+            heading = twist(hips_world, UP)
+            tilt = _closed(product(inverse(heading), hips_world), share)
+            rotations[name] = product(inverse(above), product(heading, tilt))
+        else:
+            rotations[name] = _closed(local[:, i], share)
+    return rotations
+
+
+def _difference(part: Motion, open_channels: Set[str]) -> Array:
+    """How much each channel (D,) differs at the end from the beginning, up to whole turns; 0 of channels left open."""
     turns = np.array([TURN.get(unit, np.inf) for unit in part.units])
-    off = part.values[-1] - part.values[0]
+    difference: Array = part.values[-1] - part.values[0]
     angles = np.isfinite(turns)
-    off[angles] -= np.round(off[angles] / turns[angles]) * turns[angles]
-    off[[name in stay for name in part.channels]] = 0
-    closed = replace(part, values=part.values - share * off)
-    return posed(closed, rotations, {skeleton.names[hips]: moved - risen})[:-1]
+    difference[angles] -= np.round(difference[angles] / turns[angles]) * turns[angles]
+    difference[[name in open_channels for name in part.channels]] = 0
+    return difference
 
 
 def _hips(motion: Motion) -> int:
@@ -65,13 +101,13 @@ def _hips(motion: Motion) -> int:
 
 
 def _closed(rotations: Array, share: Array) -> Array:
-    """Rotations (T, 3, 3) adjusted, by a share (T, 1) of what is left, so that the last equals the first."""
-    off = rotmat_to_rotvec(product(rotations[:1], inverse(rotations[-1:])))
-    return product(rotvec_to_rotmat(share * off), rotations)
+    """Rotations (T, 3, 3) adjusted by a share (T, 1) of the difference so that the last equals the first."""
+    difference = rotmat_to_rotvec(product(rotations[:1], inverse(rotations[-1:])))
+    return product(rotvec_to_rotmat(share * difference), rotations)
 
 
 def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
-    """The first frame of the loop and the one that repeats it."""
+    """The first frame of the loop and the frame that repeats it."""
     if not 0 < shortest < np.inf:
         raise MotionError(f"a loop must be longer than 0 seconds, not {shortest}")
     least = max(1, int(np.ceil(shortest * motion.fps - 1e-9)))
@@ -79,71 +115,84 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
         raise MotionError(
             f"a motion of {motion.duration:.2g} s is too short for a loop of {shortest:g} s: use a longer one"
         )
-    # at most 1,500 frames are compared pairwise: in longer motions every second or third, then those in between
-    seen = _seen(motion, hips)
-    step = -(-len(motion) // 1500)
-    lengths = range(-(-least // step), -(-len(motion) // step))
-    apart = _apart(seen[::step], seen[::step])
-    energy = _energy(seen)[::step]
-    along = [np.where(_means(energy, length) >= LIVELY, apart.diagonal(length), np.inf) for length in lengths]
-    best = np.array([each.min() for each in along])
-    low = np.zeros(len(best), dtype=bool)  # the ends do not count as minima
-    low[1:-1] = (best[1:-1] <= best[:-2]) & (best[1:-1] <= best[2:])
-    low[best.argmin()] = True
-    # nearly as good: 1.25 times the best difference, or .01 of the height, the variation of a steady walk
-    length = int(np.flatnonzero(low & (best <= max(1.25 * best.min(), 0.01)))[-1])
-    start = int(along[length].argmin()) * step
-    ends = (start, start + lengths[length] * step)
-    first, last = (np.arange(max(0, at - step + 1), min(len(seen), at + step)) for at in ends)
-    apart = np.where(last - first[:, None] >= least, _apart(seen[first], seen[last]), np.inf)
-    i, j = np.unravel_index(apart.argmin(), apart.shape)
-    start = int(first[i])
-    stop = int(last[j])
-    off = float(np.linalg.norm(seen[start] - seen[stop]))
-    most = 0.04
-    # of 40 recorded walks, on the humanoid at 30 fps, nine in ten repeat within 0.03 of the height, steady strides
-    # within 0.01 to 0.02; half of the running takes, which are short and turn or leap, repeat only within 0.06
-    if off > most:
+    poses = _poses(motion, hips)
+    step = -(-len(motion) // LONGEST_COMPARED)
+    start, stop = _coarse_repetition(poses, least, step)
+    start, stop = _nearest_pair(poses, start, stop, least, step)
+    difference = float(np.linalg.norm(poses[start] - poses[stop]))
+    if difference > FARTHEST_ENDS:
         raise MotionError(
             f"no loop found: the closest pair, {start / motion.fps:.2f} s and {stop / motion.fps:.2f} s, differs by "
-            f"{off:.1%} of the figure's height, more than {most:.0%}; cut the motion to repeating parts, or use a "
-            f"longer one of two strides or more"
+            f"{difference:.1%} of the figure's height, more than {FARTHEST_ENDS:.0%}; cut the motion to repeating "
+            f"parts, or use a longer one of two strides or more"
         )
     return start, stop
 
 
-def _energy(seen: Array) -> Array:
-    """The squared speed (T,) of rows as :func:`_seen` gives them, beside its mean."""
-    speeds = seen[:, seen.shape[1] // 2 :]
+def _coarse_repetition(poses: Array, least: int, step: int) -> tuple[int, int]:
+    """The first and last frame of the longest loop nearly as good as the best, among every ``step``-th frame."""
+    # for each length of a loop the best difference of its ends, where the loop is lively
+    lengths = range(-(-least // step), -(-len(poses) // step))
+    distances = _distances(poses[::step], poses[::step])
+    energy = _energy(poses)[::step]
+    by_start = []
+    for length in lengths:
+        is_lively = _means(energy, length) >= LIVELY
+        by_start.append(np.where(is_lively, distances.diagonal(length), np.inf))
+    best = np.array([values.min() for values in by_start])
+
+    # of the lengths that are better than those beside them (the ends do not count as minima) the longest that is
+    # nearly as good: 1.25 times the best difference, or .01 of the height, the variation of a steady walk
+    is_minimum = np.zeros(len(best), dtype=bool)
+    is_minimum[1:-1] = (best[1:-1] <= best[:-2]) & (best[1:-1] <= best[2:])
+    is_minimum[best.argmin()] = True
+    longest = int(np.flatnonzero(is_minimum & (best <= max(1.25 * best.min(), 0.01)))[-1])
+    start = int(by_start[longest].argmin()) * step
+    return start, start + lengths[longest] * step
+
+
+def _nearest_pair(poses: Array, start: int, stop: int, least: int, step: int) -> tuple[int, int]:
+    """The two frames with the nearest poses less than ``step`` frames from two frames, at least ``least`` apart."""
+    first = np.arange(max(0, start - step + 1), min(len(poses), start + step))
+    last = np.arange(max(0, stop - step + 1), min(len(poses), stop + step))
+    is_long = last - first[:, None] >= least
+    distances = np.where(is_long, _distances(poses[first], poses[last]), np.inf)
+    i, j = np.unravel_index(distances.argmin(), distances.shape)
+    return int(first[i]), int(last[j])
+
+
+def _energy(poses: Array) -> Array:
+    """The squared speed (T,) of rows as :func:`_poses` makes them, relative to its mean."""
+    speeds = poses[:, poses.shape[1] // 2 :]
     squares = (speeds**2).sum(axis=1)
-    found: Array = squares / max(float(squares.mean()), 1e-12)
-    return found
+    energy: Array = squares / max(float(squares.mean()), 1e-12)
+    return energy
 
 
 def _means(values: Array, length: int) -> Array:
     """The means (T - length,) of ``length`` values each of (T,)."""
     sums = np.cumsum(np.insert(values, 0, 0.0))
-    found: Array = (sums[length:-1] - sums[: -length - 1]) / length
-    return found
+    means: Array = (sums[length:-1] - sums[: -length - 1]) / length
+    return means
 
 
-def _apart(one: Array, other: Array) -> Array:
-    """Distances (T, S) between rows (T, D) and rows (S, D)."""
-    squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2 * one @ other.T
-    found: Array = np.sqrt(np.maximum(squares, 0))
-    return found
+def _distances(rows: Array, others: Array) -> Array:
+    """Distances (T, S) between rows (T, D) and others (S, D)."""
+    squares = (rows**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * rows @ others.T
+    distances: Array = np.sqrt(np.maximum(squares, 0))
+    return distances
 
 
-def _seen(motion: Motion, hips: int) -> Array:
+def _poses(motion: Motion, hips: int) -> Array:
     """Rows (T, D) of joints' positions and velocities seen from the hips without their heading: their distance is the
     root mean square over the joints, as a share of the figure's height.
     """
-    skeleton, (turned, places) = skeleton_of(motion), global_transforms(motion)
-    facing = inverse(twist(turned[:, hips], UP))[:, None]
+    skeleton = skeleton_of(motion)
+    rotations, places = global_transforms(motion)
+    to_facing = inverse(twist(rotations[:, hips], UP))[:, None]
     ground = places[:, [hips]] * (1 - UP)
     places = places[:, skeleton.subtree(skeleton.names[hips])]
-    # velocities count by how far they diverge in .1 s
-    moved = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * 0.1
-    points = np.concatenate([rotated(facing, places - ground), rotated(facing, moved)], axis=1)
-    found: Array = points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height)
-    return found
+    velocities = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * SECONDS_APART
+    points = np.concatenate([rotated(to_facing, places - ground), rotated(to_facing, velocities)], axis=1)
+    rows: Array = points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height)
+    return rows

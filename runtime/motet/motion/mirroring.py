@@ -15,7 +15,7 @@ from motet.errors import MotionError
 from motet.motion.kinematics import AXES, euler_of, local_rotations, local_translations, skeleton_of, with_channels
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton, partners_of
+from motet.motion.skeleton import Joint, Skeleton, partners_of
 
 
 def lateral_axis(skeleton: Skeleton) -> int:
@@ -45,52 +45,83 @@ def mirror(motion: Motion) -> Motion:
     than Euler angles and translations of joints.
     """
     skeleton = skeleton_of(motion)
-    units = dict(zip(motion.channels, motion.units, strict=True))
-    parts = [(name, *name.rpartition(".")[::2]) for name in motion.channels]
-    bad = [name for name, joint, kind in parts if joint not in skeleton.names or not re.fullmatch("[rt][xyz]", kind)]
+    bad = [name for name in motion.channels if not _is_mirrored(name, skeleton)]
     if bad:
         raise MotionError(f"only Euler angles and translations of joints can be mirrored, not {', '.join(bad)}")
-    axis = lateral_axis(skeleton)
-    signs = np.where(np.arange(3) == axis, -1.0, 1.0)
+    signs = np.where(np.arange(3) == lateral_axis(skeleton), -1.0, 1.0)
     values = np.array(motion.values)
+
+    # channels are swapped where the partner has the same ones and its axes are the mirror image
     harder = []
     for i, partner in enumerate(partners_of(skeleton.names)):
-        joint = skeleton.joints[i]
-        other = skeleton.joints[partner]
-        same = signs[:, None] * other.frame * signs
-        alike = joint.order == other.order and np.allclose(same, joint.frame, rtol=0, atol=1e-6)
         for letter in "rt":
-            own, its = ([units.get(f"{j.name}.{letter}{axis}") for axis in AXES] for j in (joint, other))
-            if own != its or (letter == "r" and not alike):
+            channels = _same_channels(motion, i, partner, letter)
+            is_same = letter == "t" or _turns_alike(skeleton.joints[i], skeleton.joints[partner], signs)
+            if channels is None or not is_same:
                 harder.append((i, partner, letter))
                 continue
             # a translation along the lateral axis changes its sign, and so do the turns about the other two axes
             factors = signs if letter == "t" else -signs
-            for kind, unit, factor in zip(AXES, own, factors, strict=True):
-                if unit is not None:
-                    column = motion.channels.index(f"{other.name}.{letter}{kind}")
-                    place = motion.channels.index(f"{joint.name}.{letter}{kind}")
-                    values[:, place] = factor * motion.values[:, column]
+            for axis, column, partner_column in channels:
+                values[:, column] = factors[axis] * motion.values[:, partner_column]
+
+    # all others go by rotations and translations
     result = replace(motion, values=values)
     for i, partner, letter in harder:
         result = _with_mirrored(result, motion, i, partner, letter, signs)
     return result
 
 
+def _is_mirrored(channel: str, skeleton: Skeleton) -> bool:
+    """Whether a channel is an Euler angle or a translation of a joint."""
+    joint, _, kind = channel.rpartition(".")
+    return joint in skeleton.names and re.fullmatch("[rt][xyz]", kind) is not None
+
+
+def _turns_alike(joint: Joint, partner: Joint, signs: Array) -> bool:
+    """Whether the axes of a joint's partner are the mirror image of its own, with signs (3,) of the axes."""
+    mirrored = signs[:, None] * partner.frame * signs
+    return joint.order == partner.order and np.allclose(mirrored, joint.frame, rtol=0, atol=1e-6)
+
+
+def _same_channels(motion: Motion, i: int, partner: int, letter: str) -> list[tuple[int, int, int]] | None:
+    """The axis, column and partner's column of each channel of joint i's rotation ("r") or translation ("t"); None if
+    its partner has other channels or units."""
+    names = skeleton_of(motion).names
+    columns = {name: column for column, name in enumerate(motion.channels)}
+    channels = []
+    for axis, axis_name in enumerate(AXES):
+        column = columns.get(f"{names[i]}.{letter}{axis_name}")
+        partner_column = columns.get(f"{names[partner]}.{letter}{axis_name}")
+        if column is None and partner_column is None:
+            continue
+        if column is None or partner_column is None or motion.units[column] != motion.units[partner_column]:
+            return None
+        channels.append((axis, column, partner_column))
+    return channels
+
+
 def _with_mirrored(result: Motion, motion: Motion, i: int, partner: int, letter: str, signs: Array) -> Motion:
-    """The result with rotation ("r") or translation ("t") of joint i that of its partner in the motion, mirrored: in
-    the channels that it has, and in others that would leave their rest value."""
+    """The result with joint i's rotation ("r") or translation ("t") mirrored from its partner's in the motion: in the
+    channels that it has, and in others that would leave their rest value."""
     joint = skeleton_of(motion).joints[i]
-    units = dict(zip(motion.channels, motion.units, strict=True))
     names = [f"{joint.name}.{letter}{axis}" for axis in AXES]
-    usual = next((units[name] for name in names if name in units), "deg") if letter == "r" else "length"
-    own = [units.get(name, usual) if letter == "r" else usual for name in names]
+    known = dict(zip(motion.channels, motion.units, strict=True))
+    rest = (0.0, 0.0, 0.0)
+    units = ["length"] * 3
     if letter == "r":
+        usual = next((known[name] for name in names if name in known), "deg")
+        units = [known.get(name, usual) for name in names]
         rotations = signs[:, None] * local_rotations(motion, [partner])[:, 0] * signs
-        rest = (0.0, 0.0, 0.0)
-        values = euler_of(rotations, joint) * [TURN[unit] / (2 * np.pi) for unit in own]
+        values = euler_of(rotations, joint) * [TURN[unit] / (2 * np.pi) for unit in units]
     else:
         rest = joint.offset
         values = local_translations(motion)[:, partner] * signs
-    needed = [n for n in range(3) if names[n] in units or (np.abs(values[:, n] - rest[n]) > 1e-9).any()]
-    return with_channels(result, tuple(names[n] for n in needed), values[:, needed], tuple(own[n] for n in needed))
+    needed = [axis for axis in range(3) if names[axis] in known or _leaves(values[:, axis], rest[axis])]
+    channels = tuple(names[axis] for axis in needed)
+    return with_channels(result, channels, values[:, needed], tuple(units[axis] for axis in needed))
+
+
+def _leaves(values: Array, rest: float) -> bool:
+    """Whether any of the values (T,) differs from a rest value by more than rounding."""
+    return bool((np.abs(values - rest) > 1e-9).any())

@@ -20,9 +20,9 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib.resources import files
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,14 +36,36 @@ Triple = tuple[float, float, float]
 NEEDED = ("hips", "spine", *(sided(side, part) for side in LEFT_RIGHT for part in (*LEG[:3], *ARM[1:3])))
 """Bones without which a figure is not taken for a human's; the others stay at rest where it lacks them."""
 
-PARTNERS = {
-    sided(side, part): sided(other, part) for part in (*LEG, *ARM) for side, other in (LEFT_RIGHT, LEFT_RIGHT[::-1])
-}
+
+def _partners() -> dict[str, str]:
+    """For each bone of one side its partner."""
+    partners = {}
+    for part in (*LEG, *ARM):
+        left = sided("left", part)
+        right = sided("right", part)
+        partners[left] = right
+        partners[right] = left
+    return partners
+
+
+PARTNERS = _partners()
 """For each bone of one side its partner."""
 
-LIMB_BONES = tuple(tuple(sided(side, part) for part in limb) for side in LEFT_RIGHT for limb in (LEG, ARM[1:]))
+
+def _limb_bones() -> tuple[tuple[str, ...], ...]:
+    """Legs and arms without shoulders of both sides, each from the trunk outwards."""
+    limbs = []
+    for side in LEFT_RIGHT:
+        for parts in (LEG, ARM[1:]):
+            limbs.append(tuple(sided(side, part) for part in parts))
+    return tuple(limbs)
+
+
+LIMB_BONES = _limb_bones()
+"""Legs and arms without shoulders of both sides, each from the trunk outwards."""
 
 UNSIDED = ("hips", "head", "spine", "neck")
+"""Keys of tables that have no side."""
 
 NO_PREFIX = "(?!)"
 """A pattern that nothing fits."""
@@ -65,30 +87,36 @@ class HalfKnownError(MotionError):
 
 @dataclass(frozen=True)
 class JointMap:
-    """The joints of a skeleton that are bones of the humanoid.
-
-    joints: bone -> index of its joint, for the hips, the head and the limbs.
-    spine, neck: the joints between the hips and the arms, and between the arms and the head, upwards; any number.
-    convention: the name of the convention, "by the tree" or the name of the user's file.
-    confidence: from 0 to 1, how certain the assignment of joints is.
-    rest: where the convention is known to rest in a pose of its own: bone -> the rotation vector in degrees by which
-        the humanoid's bone is turned in that pose; a bone that is not named is not turned.
-    points: bone -> where it points in that pose (3), left, up and forward: a skeleton that rests otherwise is another.
-    axes: where the convention is known to rest in no body's pose: joint -> its axes that point to the humanoid's left,
-        up and forward in a T-pose, such as "-z x -y".
-    """
+    """The joints of a skeleton that are bones of the humanoid."""
 
     joints: Mapping[str, int]
+    """Bone -> index of its joint, for the hips, the head and the limbs."""
+
     spine: tuple[int, ...]
+    """The joints between the hips and the arms, upwards; any number."""
+
     neck: tuple[int, ...]
+    """The joints between the arms and the head, upwards; any number."""
+
     convention: str
+    """The name of the convention, "by the tree" or the name of the user's file."""
+
     confidence: float
+    """From 0 to 1, how certain the assignment of joints is."""
+
     rest: Mapping[str, Triple] | None = None
+    """Where the convention is known to rest in a pose of its own: bone -> the rotation vector in degrees by which the
+    humanoid's bone is turned in that pose; a bone that is not named is not turned."""
+
     points: Mapping[str, Triple] = field(default_factory=dict)
+    """Bone -> the direction (3), left, up and forward, in that pose: a skeleton that rests otherwise is another."""
+
     axes: Mapping[int, str] = field(default_factory=dict)
+    """Where the convention is known to rest in no body's pose: joint -> its axes that point to the humanoid's left, up
+    and forward in a T-pose, such as "-z x -y"."""
 
     def carrier(self, skeleton: Skeleton) -> int:
-        """The joint that carries legs and back: the hips, or what they hang on where the back is not theirs."""
+        """The joint that carries legs and back: the hips, or their ancestor where the back is not theirs."""
         joint = self.joints["hips"]
         while self.spine[0] not in skeleton.subtree(skeleton.names[joint]):
             joint = skeleton.joints[joint].parent
@@ -96,8 +124,12 @@ class JointMap:
 
     def names(self, skeleton: Skeleton) -> dict[str, tuple[str, ...]]:
         """For each bone ("spine" and "neck" for all of the back and of the neck) the names of its joints."""
-        found = {bone: (joint,) for bone, joint in self.joints.items()} | {"spine": self.spine, "neck": self.neck}
-        return {bone: tuple(skeleton.names[joint] for joint in joints) for bone, joints in found.items()}
+        names: dict[str, tuple[str, ...]] = {}
+        for bone, joint in self.joints.items():
+            names[bone] = (skeleton.names[joint],)
+        names["spine"] = tuple(skeleton.names[joint] for joint in self.spine)
+        names["neck"] = tuple(skeleton.names[joint] for joint in self.neck)
+        return names
 
 
 class Body:
@@ -115,24 +147,35 @@ class Body:
         for limb in LIMB_BONES:
             for bone, after in zip(limb, (*limb[1:], ""), strict=True):
                 if bone in self.joints:
-                    ends = (self.joints[after],) if after in self.joints else self._ends(self.joints[bone])
-                    self.aims[bone] = ends
-        rest = skeleton.rest_positions
-        for shin, foot, toes in ([sided(side, part) for part in LEG[1:]] for side in LEFT_RIGHT):
-            # a foot without toes that continues the shin within 15 degrees, as in old files, has no own direction
-            if self.aims.get(foot) and toes not in self.joints:
-                straight = self.direction(rest, shin) @ self.direction(rest, foot) > np.cos(np.radians(15))
-                self.aims[foot] = () if straight else self.aims[foot]
+                    is_last = after not in self.joints
+                    self.aims[bone] = self._ends(self.joints[bone]) if is_last else (self.joints[after],)
+        for side in LEFT_RIGHT:
+            foot = sided(side, "Foot")
+            if self.aims.get(foot) and sided(side, "Toes") not in self.joints and self._continues_shin(side):
+                self.aims[foot] = ()
+
+    def _continues_shin(self, side: str) -> bool:
+        """Whether a foot continues the shin at rest within 15 degrees, as in old files, so that it has no direction."""
+        rest = self.skeleton.rest_positions
+        cosine = self.direction(rest, sided(side, "LowerLeg")) @ self.direction(rest, sided(side, "Foot"))
+        return bool(cosine > np.cos(np.radians(15)))
 
     def _ends(self, joint: int) -> tuple[int, ...]:
+        """The nearest joints below one that lie apart from it, without thumbs."""
         children = [i for i in self.skeleton.children[joint] if "thumb" not in self.skeleton.names[i].lower()]
         apart = tuple(child for child in children if np.any(self.skeleton.offsets[child]))
-        return apart or next((ends for child in children if (ends := self._ends(child))), ())
+        if apart:
+            return apart
+        for child in children:
+            ends = self._ends(child)
+            if ends:
+                return ends
+        return ()
 
     def along(self, positions: Array, bone: str) -> Array:
-        """Vectors (..., 3) from the joint of a bone to the middle of what it points to."""
-        found: Array = positions[..., list(self.aims[bone]), :].mean(axis=-2) - positions[..., self.joints[bone], :]
-        return found
+        """Vectors (..., 3) from the joint of a bone to the middle of the joints that it points to."""
+        vectors: Array = positions[..., list(self.aims[bone]), :].mean(axis=-2) - positions[..., self.joints[bone], :]
+        return vectors
 
     def direction(self, positions: Array, bone: str) -> Array:
         """Directions (..., 3) in which a bone points."""
@@ -140,13 +183,13 @@ class Body:
 
     def middle(self, positions: Array, part: str) -> Array:
         """The middle (..., 3) between a joint of the left and its partner."""
-        left, right = (positions[..., self.joints[sided(side, part)], :] for side in LEFT_RIGHT)
-        return (left + right) / 2
+        left = self._position(positions, "left", part)
+        right = self._position(positions, "right", part)
+        return np.asarray((left + right) / 2)
 
     def to_left(self, positions: Array, part: str) -> Array:
         """Vectors (..., 3) from a joint of the right to its partner on the left."""
-        left, right = (positions[..., self.joints[sided(side, part)], :] for side in LEFT_RIGHT)
-        return left - right
+        return np.asarray(self._position(positions, "left", part) - self._position(positions, "right", part))
 
     def trunk_up(self, positions: Array) -> Array:
         """Directions (..., 3) from the middle of the legs' joints to that of the arms'."""
@@ -154,8 +197,15 @@ class Body:
 
     def legs_up(self, positions: Array) -> Array:
         """Directions (..., 3) from the feet to the legs' joints, the mean of both sides."""
-        legs = [[positions[..., self.joints[sided(side, part)], :] for part in LEG[:3]] for side in LEFT_RIGHT]
-        return unit(unit(legs[0][0] - legs[0][2]) + unit(legs[1][0] - legs[1][2]))
+        directions = []
+        for side in LEFT_RIGHT:
+            leg = self._position(positions, side, "UpperLeg") - self._position(positions, side, "Foot")
+            directions.append(unit(leg))
+        return unit(directions[0] + directions[1])
+
+    def _position(self, positions: Array, side: str, part: str) -> Array:
+        """Positions (..., 3) of the joint of a bone."""
+        return np.asarray(positions[..., self.joints[sided(side, part)], :])
 
 
 def humanoid_direction(bone: str) -> Array:
@@ -180,14 +230,7 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
     missing = missing_bones(joint_map)
     if missing:
         raise MotionError(missing_reason(missing, joint_map))
-    back = joint_map.spine[0]
-    # the joint that carries the legs may hang beside the back, below what carries both
-    limbs = {"back": joint_map.spine, "neck": (back, *joint_map.neck)}
-    for side in LEFT_RIGHT:
-        for limb, first, parts in (("leg", joint_map.joints["hips"], LEG), ("arm", back, ARM)):
-            bones = (bone for part in parts if (bone := sided(side, part)) in joint_map.joints)
-            limbs[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones))
-    for limb, joints in limbs.items():
+    for limb, joints in _chains(joint_map).items():
         for upper, lower in pairwise(joints):
             if lower not in skeleton.subtree(skeleton.names[upper]) or lower == upper:
                 names = f"{skeleton.names[lower]!r} does not hang on {skeleton.names[upper]!r}"
@@ -195,10 +238,22 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
     return joint_map
 
 
+def _chains(joint_map: JointMap) -> dict[str, tuple[int, ...]]:
+    """Back, neck, legs and arms, each as joints of which every next one hangs on the one before."""
+    back = joint_map.spine[0]
+    # the joint that carries the legs may hang beside the back, below an ancestor of both
+    chains = {"back": joint_map.spine, "neck": (back, *joint_map.neck)}
+    for side in LEFT_RIGHT:
+        for limb, first, parts in (("leg", joint_map.joints["hips"], LEG), ("arm", back, ARM)):
+            bones = [sided(side, part) for part in parts]
+            chains[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones if bone in joint_map.joints))
+    return chains
+
+
 def missing_reason(missing: list[str], joint_map: JointMap) -> str:
     """A sentence naming the bones a skeleton lacks."""
     remedy = "export them, too, or name them in a map"
-    if {sided(side, part) for side in LEFT_RIGHT for part in LEG[:3]} <= set(missing):
+    if {bone for bone in NEEDED if bone.endswith(("Leg", "Foot"))} <= set(missing):
         return f"this skeleton has no legs: a human needs hips with two legs, a spine and two arms; {remedy}"
     if missing_on_one_side(missing, joint_map):
         there = ", ".join(PARTNERS[bone] for bone in missing)
@@ -214,21 +269,9 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     the fault: an unknown bone or joint, a joint named twice, a required bone that is missing.
     """
     path = Path(path)
-    known = (*(bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1])), "neck")
-    places: dict[str, tuple[int, ...]] = {}
-    for bone, names in _entries(path).items():
-        if bone not in known:
-            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
-        unknown = [name for name in names if name not in skeleton.names]
-        if unknown:
-            its = ", ".join(skeleton.names)
-            raise FormatError(path, f"{bone}: the skeleton has no joint {unknown[0]!r}; it has {its}")
-        places[bone] = tuple(skeleton.index(name) for name in names)
-    used = [joint for joints in places.values() for joint in joints]
-    twice = sorted({skeleton.names[joint] for joint in used if used.count(joint) > 1})
-    if twice:
-        raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
-    spine, neck = (places.pop(chain, ()) for chain in ("spine", "neck"))
+    places = _joints_of_entries(path, skeleton)
+    spine = places.pop("spine", ())
+    neck = places.pop("neck", ())
     longer = [bone for bone, joints in places.items() if len(joints) != 1]
     if longer:
         raise FormatError(path, f"{longer[0]}: expected one joint; only spine and neck take a list")
@@ -239,16 +282,29 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
         raise FormatError(path, str(error)) from error
 
 
-def _entries(path: Path) -> dict[str, list[str]]:
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        keys = [key for key, _ in pairs]
-        twice = sorted({key for key in keys if keys.count(key) > 1})
-        if twice:
-            raise ValueError(f"{', '.join(twice)} appears twice")
-        return dict(pairs)
+def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
+    """For each bone of a user's map its joints, each of them one bone's."""
+    known = [bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1])] + ["neck"]
+    places: dict[str, tuple[int, ...]] = {}
+    for bone, names in _entries(path).items():
+        if bone not in known:
+            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
+        unknown = [name for name in names if name not in skeleton.names]
+        if unknown:
+            its = ", ".join(skeleton.names)
+            raise FormatError(path, f"{bone}: the skeleton has no joint {unknown[0]!r}; it has {its}")
+        places[bone] = tuple(skeleton.index(name) for name in names)
+    counts = Counter(chain.from_iterable(places.values()))
+    twice = sorted(skeleton.names[joint] for joint, count in counts.items() if count > 1)
+    if twice:
+        raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
+    return places
 
+
+def _entries(path: Path) -> dict[str, list[str]]:
+    """A user's map as it is written: for each bone the names of its joints."""
     try:
-        content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=once)
+        content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=_unique_keys)
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
@@ -262,46 +318,71 @@ def _entries(path: Path) -> dict[str, list[str]]:
     return entries
 
 
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; ValueError where a key appears twice, which json takes silently."""
+    counts = Counter(key for key, _ in pairs)
+    twice = sorted(key for key, count in counts.items() if count > 1)
+    if twice:
+        raise ValueError(f"{', '.join(twice)} appears twice")
+    return dict(pairs)
+
+
 @dataclass(frozen=True)
 class Convention:
-    """One table: for each bone the plain names that its joint can have; the same of joints that are no bones.
-
-    spelled: names of bones as files write them. marks: plain names of which each file has one, if there are any.
-    optional: bones that only some files have.
-    """
+    """A convention of joint names, with one of its ways to write the sides. A plain name is one as :func:`_plain` makes
+    it."""
 
     title: str
+    """The name of the convention."""
+
     names: dict[str, tuple[str, ...]]
+    """For each bone the plain names that its joint can have."""
+
     spelled: frozenset[str]
+    """Names of bones as files write them."""
+
     aside: frozenset[str]
+    """Plain names of joints that are no bones."""
+
     marks: frozenset[str]
+    """Plain names of which each file has at least one; empty if there are none."""
+
     optional: frozenset[str]
+    """Bones that only some files have."""
+
     prefixes: tuple[str, ...]
+    """Regular expressions of prefixes that every name can have."""
+
     rest: dict[str, Triple] | None
+    """As :attr:`JointMap.rest`."""
+
     points: dict[str, Triple]
+    """As :attr:`JointMap.points`."""
+
     axes: dict[str, str]
+    """Plain name of a joint -> its axes, as in :attr:`JointMap.axes`."""
 
 
 @cache
 def conventions() -> tuple[Convention, ...]:
     """All tables; one with several ways to write the sides comes once for each."""
     tables = sorted((files("motet.figures.humanoid") / "conventions").iterdir(), key=lambda table: table.name)
-    contents = [json.loads(table.read_text("utf-8")) for table in tables]
-    return tuple(_convention(content, sides) for content in contents for sides in content["sides"])
+    all_conventions = []
+    for table in tables:
+        content = json.loads(table.read_text("utf-8"))
+        for sides in content["sides"]:
+            all_conventions.append(_convention(content, sides))
+    return tuple(all_conventions)
 
 
 def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
-    def of_both(key: str) -> frozenset[str]:
-        known = content.get(key, [])
-        return frozenset(_plain(name.replace("{s}", word)) for name in known for word in sides)
-
     names, spelled, optional = _bones(content, sides)
     return Convention(
         content["title"],
         names,
         spelled,
-        of_both("aside"),
-        of_both("marks"),
+        _of_both_sides(content.get("aside", []), sides),
+        _of_both_sides(content.get("marks", []), sides),
         optional,
         tuple(content.get("prefixes", ())),
         _both_sides(content["rest"], (1, -1, -1)) if "rest" in content else None,
@@ -310,10 +391,19 @@ def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
     )
 
 
+def _of_both_sides(names: Sequence[str], sides: Sequence[str]) -> frozenset[str]:
+    """Plain names of both sides."""
+    plain = set()
+    for name in names:
+        for word in sides:
+            plain.add(_plain(name.replace("{s}", word)))
+    return frozenset(plain)
+
+
 def _bones(
     content: dict[str, Any], sides: Sequence[str]
 ) -> tuple[dict[str, tuple[str, ...]], frozenset[str], frozenset[str]]:
-    """Of each bone the plain names, all names as they are written, and the bones that only some files have."""
+    """For each bone the plain names, all names as they are written, and the bones that only some files have."""
     names = {}
     spelled = set()
     optional = set()
@@ -330,15 +420,18 @@ def _bones(
 
 def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) -> dict[str, Triple]:
     """Vectors of bones of both sides: those of the right are those of the left with signs, which mirror them."""
-    found: dict[str, Triple] = {}
+    vectors: dict[str, Triple] = {}
     for bone, (x, y, z) in of_left.items():
-        right = (signs[0] * x, signs[1] * y, signs[2] * z)
-        found |= {bone: (x, y, z)} if bone in UNSIDED else {sided("left", bone): (x, y, z), sided("right", bone): right}
-    return found
+        if bone in UNSIDED:
+            vectors[bone] = (x, y, z)
+        else:
+            vectors[sided("left", bone)] = (x, y, z)
+            vectors[sided("right", bone)] = (signs[0] * x, signs[1] * y, signs[2] * z)
+    return vectors
 
 
 @lru_cache(maxsize=2**12)  # names of joints recur from file to file
-def _own(name: str, prefix: str = NO_PREFIX) -> str:
+def _without_prefix(name: str, prefix: str = NO_PREFIX) -> str:
     """A name without prefixes (a regular expression) and the namespace before a colon or a bar."""
     name = re.sub(f"^(?:{prefix})(?=.)", "", name, flags=re.IGNORECASE)
     return re.split("[:|]", name)[-1]
@@ -346,8 +439,18 @@ def _own(name: str, prefix: str = NO_PREFIX) -> str:
 
 @lru_cache(maxsize=2**12)
 def _plain(name: str) -> str:
-    """A name without what differs between files: case, separators, and how letters are encoded."""
+    """A name without the differences between files: case, separators, and the encoding of letters."""
     return re.sub(r"[\W_]", "", unicodedata.normalize("NFKC", name).lower())
+
+
+class _Match(NamedTuple):
+    """The map that a convention makes of a skeleton's names, and how well it fits."""
+
+    score: tuple[int, int, int]
+    """The number of joints that the convention has names for, of those spelled as it spells them, and less the number
+    of its bones that are absent."""
+
+    joint_map: JointMap
 
 
 @lru_cache(maxsize=256)
@@ -357,20 +460,25 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
     HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where two joints
     are the hips.
     """
-    written = _written(skeleton.names)
-    matches = [_match(convention, skeleton, names) for names in written for convention in conventions()]
-    matches = sorted(matches, key=lambda match: match[0], reverse=True)
-    fullest = matches[0][1]
-    whole = (match for match in matches if not missing_bones(match[1]))
+    matches = []
+    for names in _written(skeleton.names):
+        for convention in conventions():
+            matches.append(_match(convention, skeleton, names))
+    matches.sort(key=lambda match: match.score, reverse=True)
+
+    # the fullest map, where only bones of one side are missing; else the fullest with all bones
+    fullest = matches[0].joint_map
     one_sided = missing_on_one_side(missing_bones(fullest), fullest)
-    (known, _, _), best = matches[0] if one_sided else next(whole, matches[0])
-    missing = missing_bones(best)
+    whole = [match for match in matches if not missing_bones(match.joint_map)]
+    best = matches[0] if one_sided or not whole else whole[0]
+    missing = missing_bones(best.joint_map)
+    joints = best.joint_map.joints
     if missing:
-        if len(best.joints) >= 6 and known > 0.5 * len(skeleton.names):
-            raise HalfKnownError(missing_reason(missing, best), best.joints if one_sided else None)
+        if len(joints) >= 6 and best.score[0] > 0.5 * len(skeleton.names):
+            raise HalfKnownError(missing_reason(missing, best.joint_map), joints if one_sided else None)
         return None
     try:
-        return check_map(skeleton, best)
+        return check_map(skeleton, best.joint_map)
     except MotionError as error:
         raise HalfKnownError(str(error)) from error
 
@@ -414,8 +522,8 @@ def _without_first_words(names: tuple[str, ...]) -> tuple[str, ...]:
         names = tuple(name.removeprefix(common) or name for name in names)
 
 
-def _absent(convention: Convention, chain: str, names: Set[str]) -> int:
-    """How many bones of back or neck are absent, and one more without any."""
+def _absent_in_chain(convention: Convention, chain: str, names: Set[str]) -> int:
+    """The number of bones of back or neck that are absent, and one more if none is there."""
     known = convention.names.get(chain, ())
     absent = sum(name not in names for name in known)
     if absent < len(known):
@@ -423,34 +531,72 @@ def _absent(convention: Convention, chain: str, names: Set[str]) -> int:
     return 0 if chain in convention.optional or not known else 1 + absent
 
 
-def _match(
-    convention: Convention, skeleton: Skeleton, written: tuple[str, ...]
-) -> tuple[tuple[int, int, int], JointMap]:
-    """The map that a convention makes of a skeleton's names, and how well it fits: how many joints the convention has
-    names for, how many are spelled as it spells them, and less how many of its bones are absent."""
+def _match(convention: Convention, skeleton: Skeleton, written: tuple[str, ...]) -> _Match:
+    """The map that a convention makes of a skeleton's names, as they are written."""
     pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in convention.prefixes) or NO_PREFIX
-    own = [_own(name, pattern) for name in written]
-    names = [_plain(name) for name in own]
-    hips = [i for i, name in enumerate(names) if name == convention.names["hips"][0] and len(skeleton.children[i]) >= 3]
-    if len(hips) > 1:
-        both = " and ".join(repr(skeleton.names[i]) for i in hips)
-        raise MotionError(f"this file has two hips, {both}: put each figure in a file of its own")
-    places = {name: i for i, name in reversed(list(enumerate(names)))}
-    chains = {chain: convention.names.get(chain, ()) for chain in ("spine", "neck")}
-    spine, neck = (tuple(sorted(places[name] for name in chain if name in places)) for chain in chains.values())
-    limbs = {bone: known for bone, known in convention.names.items() if bone not in chains}
-    found = {bone: [name for name in known if name in places] for bone, known in limbs.items()}
-    joints = {bone: places[there[0]] for bone, there in found.items() if there}
-    known = {name for bone in convention.names.values() for name in bone} | convention.aside
-    count = sum(name in known for name in names)
-    if convention.marks and not convention.marks & places.keys():
-        count = 0
-    spelled = sum(name in convention.spelled for name in own)
-    absent = sum(bone not in joints and bone not in convention.optional for bone in limbs)
-    absent += sum(_absent(convention, chain, places.keys()) for chain in chains)
+    bare = [_without_prefix(name, pattern) for name in written]
+    names = [_plain(name) for name in bare]
+    _check_hips(convention, skeleton, names)
+
+    # the first joint of each name that a bone can have; of back and neck all joints
+    places: dict[str, int] = {}
+    for i, name in enumerate(names):
+        places.setdefault(name, i)
+    joints = _limb_joints(convention, places)
+    spine = _chain(convention, "spine", places)
+    neck = _chain(convention, "neck", places)
+
+    score = _score(convention, names, bare, joints)
     # other makers' figures of these names have joints besides, or rest in another pose
-    rest = convention.rest if count >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names) else None
+    is_whole = score[0] >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names)
+    rest = convention.rest if is_whole else None
     axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
-    confidence = round(1.0 - 0.3 * absent / max(absent + count, 1), 2)
-    found_map = JointMap(joints, spine, neck, convention.title, confidence, rest, convention.points, axes)
-    return (count, spelled, -absent), found_map
+    absent = -score[2]
+    confidence = round(1.0 - 0.3 * absent / max(absent + score[0], 1), 2)
+    joint_map = JointMap(joints, spine, neck, convention.title, confidence, rest, convention.points, axes)
+    return _Match(score, joint_map)
+
+
+CHAINS = ("spine", "neck")
+"""Keys of tables that stand for any number of joints."""
+
+
+def _limb_joints(convention: Convention, places: Mapping[str, int]) -> dict[str, int]:
+    """For each bone but back and neck its joint, from the joint of each plain name."""
+    joints = {}
+    for bone, known in convention.names.items():
+        present = [name for name in known if name in places]
+        if bone not in CHAINS and present:
+            joints[bone] = places[present[0]]
+    return joints
+
+
+def _check_hips(convention: Convention, skeleton: Skeleton, names: Sequence[str]) -> None:
+    """MotionError where two joints with plain names are hips that carry three joints and more."""
+    hips = []
+    for i, name in enumerate(names):
+        if name == convention.names["hips"][0] and len(skeleton.children[i]) >= 3:
+            hips.append(repr(skeleton.names[i]))
+    if len(hips) > 1:
+        raise MotionError(f"this file has two hips, {' and '.join(hips)}: put each figure in a file of its own")
+
+
+def _chain(convention: Convention, chain: str, places: Mapping[str, int]) -> tuple[int, ...]:
+    """The joints of back or neck, in the skeleton's order, from the joint of each plain name."""
+    return tuple(sorted(places[name] for name in convention.names.get(chain, ()) if name in places))
+
+
+def _score(
+    convention: Convention, names: Sequence[str], bare: Sequence[str], joints: Mapping[str, int]
+) -> tuple[int, int, int]:
+    """How well a convention fits (:attr:`_Match.score`) plain names, written ones without prefixes, and the joints
+    of limbs."""
+    known = convention.aside.union(*convention.names.values())
+    is_marked = not convention.marks or not convention.marks.isdisjoint(names)
+    count = sum(name in known for name in names) if is_marked else 0
+    spelled = sum(name in convention.spelled for name in bare)
+    absent = sum(_absent_in_chain(convention, chain, set(names)) for chain in CHAINS)
+    for bone in convention.names:
+        if bone not in CHAINS and bone not in joints and bone not in convention.optional:
+            absent += 1
+    return count, spelled, -absent

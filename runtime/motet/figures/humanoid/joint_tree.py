@@ -38,13 +38,22 @@ Limbs = list[dict[str, int]]
 
 @dataclass(frozen=True)
 class _Fork:
-    """A joint and two similar limbs below it, by their first joints; whether names say so, and how unlike they are."""
+    """A joint and two similar limbs below it."""
 
     joint: int
+    """Index of the joint that carries both limbs."""
+
     limbs: tuple[int, int]
+    """The first joints of the limbs."""
+
     length: float
+    """Length of the longer limb."""
+
     is_named: bool
+    """Whether the names of the limbs are partners."""
+
     unlike: float
+    """How unlike the limbs are, 0 for equal ones; less where names are partners."""
 
 
 class _Tree:
@@ -62,7 +71,7 @@ class _Tree:
             self.reach[parent] = max(self.reach[parent], self.lengths[i] + self.reach[i])
 
     def longest(self, joints: list[int] | tuple[int, ...]) -> int:
-        """That of some joints from whose parent the path over it is longest."""
+        """Of some joints of one parent the joint with the longest path from that parent."""
         return max(joints, key=lambda joint: float(self.lengths[joint] + self.reach[joint]))
 
     def path(self, joint: int) -> list[int]:
@@ -83,66 +92,74 @@ class _Tree:
 
     def _fork(self, joint: int, pair: tuple[int, int]) -> _Fork | None:
         shorter, longer = sorted(float(self.lengths[i] + self.reach[i]) for i in pair)
-        counts = [len(self.path(limb)) for limb in pair]
         # two limbs of a pair may differ in length by 15 %
         if not longer or 1 - shorter / longer > 0.15:
             return None
         is_named = self.partners[pair[0]] == pair[1]
-        unlike = 1 - shorter / longer + 0.1 * abs(counts[0] - counts[1]) - (1.0 if is_named else 0.0)
+        difference = abs(len(self.path(pair[0])) - len(self.path(pair[1])))
+        unlike = 1 - shorter / longer + 0.1 * difference - (1.0 if is_named else 0.0)
         return _Fork(joint, pair, longer, is_named, unlike)
 
     def legs_and_arms(self) -> tuple[_Fork, _Fork]:
-        """The two forks with the longest limbs, of those whose names say so if there are, nearer to the root first."""
-        forks = [fork for joint in range(len(self.lengths)) for fork in self.forks(joint)[:1]]
+        """The two forks with the longest limbs, named ones if there are any, the one nearer to the root first."""
+        forks = []
+        for joint in range(len(self.lengths)):
+            forks += self.forks(joint)[:1]
         forks.sort(key=lambda fork: -fork.length)
         limbs = self._apart([fork for fork in forks if fork.is_named])
         if len(limbs) < 2 or limbs[1].length < 0.3 * forks[0].length:
             limbs = self._apart(forks)
         if len(limbs) < 2 or limbs[1].length < 0.3 * limbs[0].length:
-            found = f"one pair of limbs, at {self.skeleton.names[limbs[0].joint]!r}" if limbs else "no pair of limbs"
-            raise MotionError(f"{NO_HUMAN}; found {found}")
+            pairs = f"one pair of limbs, at {self.skeleton.names[limbs[0].joint]!r}" if limbs else "no pair of limbs"
+            raise MotionError(f"{NO_HUMAN}; found {pairs}")
         first, second = sorted(limbs[:2], key=lambda fork: len(self.skeleton.ancestors(fork.joint)))
         return first, second
 
     def _apart(self, forks: list[_Fork]) -> list[_Fork]:
-        """Those forks that are not on the limbs of one before them."""
+        """The forks that are not on the limbs of one before them."""
         limbs: list[_Fork] = []
+        taken: set[int] = set()
         for fork in forks:
-            above = self.skeleton.ancestors(fork.joint)
-            if not any(limb in above for other in limbs for limb in other.limbs):
+            if taken.isdisjoint(self.skeleton.ancestors(fork.joint)):
                 limbs.append(fork)
+                taken.update(fork.limbs)
         return limbs
 
     def mirrored_legs_and_arms(self) -> Iterator[tuple[_Fork, _Fork]]:
         """Other choices of legs and arms, the longest first: pairs of limbs whose bones are equally long one by one."""
-        forks = [fork for joint in range(len(self.lengths)) for fork in self.forks(joint) if self._is_mirrored(fork)]
+        forks = []
+        for joint in range(len(self.lengths)):
+            forks += [fork for fork in self.forks(joint) if self._is_mirrored(fork)]
         forks.sort(key=lambda fork: -fork.length)
         forks = forks[:12]  # of many strands of hair the longest
         for legs, arms in sorted(permutations(forks, 2), key=lambda pair: -pair[0].length - pair[1].length):
-            apart = not {*legs.limbs} & {*self.skeleton.ancestors(arms.joint)}
-            if apart and legs.joint in self.skeleton.ancestors(arms.joint)[1:] and arms.length > 0.3 * legs.length:
+            above = self.skeleton.ancestors(arms.joint)
+            is_above = legs.joint in above[1:] and not {*legs.limbs} & {*above}
+            if is_above and arms.length > 0.3 * legs.length:
                 yield legs, arms
 
     def _is_mirrored(self, fork: _Fork) -> bool:
-        one, other = (self.lengths[self.path(limb)] for limb in fork.limbs)
-        return len(one) == len(other) and bool(np.abs(one - other).max() < 0.02 * fork.length)
+        left, right = (self.lengths[self.path(limb)] for limb in fork.limbs)
+        return len(left) == len(right) and bool(np.abs(left - right).max() < 0.02 * fork.length)
 
     def pair(self, fork: _Fork) -> tuple[list[list[int]], list[float]]:
         """The paths of two limbs, as long as the shorter, and how far down their joints are, the mean of both."""
         paths = [self.path(limb) for limb in fork.limbs]
-        paths = [path[: min(map(len, paths))] for path in paths]
-        ends = [[0.0, *np.cumsum(self.lengths[path[1:]]).tolist(), self.reach[path[0]]] for path in paths]
+        shortest = min(map(len, paths))
+        paths = [path[:shortest] for path in paths]
+        ends = []
+        for path in paths:
+            ends.append([0.0, *np.cumsum(self.lengths[path[1:]]).tolist(), self.reach[path[0]]])
         return paths, np.mean(ends, axis=0).tolist()
 
     def legs(self, fork: _Fork) -> Limbs:
-        """Thighs, shins, feet and toes: the ankle leaves the foot's length, the knee halves what is above it."""
+        """Thighs, shins, feet and toes: the ankle leaves the foot's length, the knee halves the leg above it."""
         paths, places = self.pair(fork)
         last = len(places) - 2
-        # what comes after the ankle is within these parts of a leg
+        # the part of a leg below the ankle is within these limits
         feet = [k for k in range(2, last + 1) if 0.08 <= 1 - places[k] / places[-1] <= 0.35] or [last]
         thigh, shin, foot = _two_bones(places, feet)
-        parts = {"UpperLeg": thigh, "LowerLeg": shin, "Foot": foot, "Toes": foot + 1}
-        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
+        return _limbs(paths, {"UpperLeg": thigh, "LowerLeg": shin, "Foot": foot, "Toes": foot + 1})
 
     def arms(self, fork: _Fork) -> Limbs:
         """Clavicles, upper arms, forearms and hands: the hand is where fingers fork or begins them; the elbow halves.
@@ -150,16 +167,17 @@ class _Tree:
         An arm that ends in one long bone has no joint for the hand: its tip is the wrist.
         """
         paths, places = self.pair(fork)
-        last = len(places) - 2
         start, elbow, hand = _two_bones(places, self._wrists(paths, places))
-        parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand} | ({"Shoulder": 0} if start else {})
-        return [{part: path[k] for part, k in parts.items() if k <= last} for path in paths]
+        parts = {"UpperArm": start, "LowerArm": elbow, "Hand": hand}
+        if start:
+            parts["Shoulder"] = 0
+        return _limbs(paths, parts)
 
     def _wrists(self, paths: list[list[int]], places: list[float]) -> list[int]:
         """Where on an arm the hand may begin."""
         last = len(places) - 2
         forks = [k for k, joint in enumerate(paths[0]) if k >= 2 and len(self.skeleton.children[joint]) >= 2]
-        # what comes after the wrist is within this part of an arm
+        # the part of an arm beyond the wrist is within this limit
         near = [k for k in range(2, last + 1) if 1 - places[k] / places[-1] <= 0.35]
         is_leaf = not any(self.skeleton.children[path[last]] for path in paths)
         # a leaf that is near to the joint before it is the hand's end
@@ -179,21 +197,29 @@ class _Tree:
         return tuple(path[:head]), path[head]
 
 
+def _limbs(paths: list[list[int]], parts: dict[str, int]) -> Limbs:
+    """For both paths the joint of each part, from its place on them, where they are that long."""
+    limbs = []
+    for path in paths:
+        limbs.append({part: path[k] for part, k in parts.items() if k < len(path)})
+    return limbs
+
+
 def map_of(motion: Motion) -> JointMap:
     """Which joint of the motion's skeleton is which bone: by names, else by the tree; MotionError if it is not human.
 
-    Where names fit in part, and the tree does not tell either, the error says which bones the names lack.
+    Where names fit in part, and the tree does not help either, the error lists the bones that the names lack.
     """
     try:
         return map_by_names(skeleton_of(motion)) or map_by_tree(motion)
     except HalfKnownError as half:
         try:
-            found = map_by_tree(motion)
+            joint_map = map_by_tree(motion)
         except MotionError:
             raise half from None
-        if not half.agreed.items() <= found.joints.items():
+        if not half.agreed.items() <= joint_map.joints.items():
             raise
-        return found
+        return joint_map
 
 
 def map_by_tree(motion: Motion) -> JointMap:
@@ -204,7 +230,7 @@ def map_by_tree(motion: Motion) -> JointMap:
     try:
         return _mapped(tree, frames, *tree.legs_and_arms())
     except MotionError as error:
-        # what a body wears and carries can be longer than its limbs; beasts do not stand with their backs upright
+        # clothes and tools can be longer than limbs; animals do not stand with their backs upright
         for legs, arms in tree.mirrored_legs_and_arms():
             if _stands(skeleton.rest_positions, tree.legs(legs), arms):
                 try:
@@ -215,28 +241,38 @@ def map_by_tree(motion: Motion) -> JointMap:
 
 
 def _mapped(tree: _Tree, frames: Array, legs: _Fork, arms: _Fork) -> JointMap:
-    """The map by the tree with given legs and arms, in frames (T, J, 3)."""
+    """The map by the tree with known legs and arms, in frames (T, J, 3)."""
     skeleton = tree.skeleton
     hips_up = skeleton.ancestors(legs.joint)
     back = [joint for joint in skeleton.ancestors(arms.joint) if joint not in hips_up]
     if not back:
         raise MotionError(f"{NO_HUMAN}; there is no back between {skeleton.names[legs.joint]!r} and the arms")
-    leg_pair = tree.legs(legs)
-    arm_pair = tree.arms(arms)
-    # legs that are folded or crossed do not tell sides, as they do at rest where the figure stands there
-    shown = skeleton.rest_positions[None] if _stands(skeleton.rest_positions, leg_pair, arms) else frames
-    to_left = _to_left(shown, leg_pair, skeleton)
     joints = {"hips": legs.joint}
-    named = False
-    for pair, parts, first in ((leg_pair, LEG, "UpperLeg"), (arm_pair, ARM, "UpperArm")):
-        left_first, by_name = _left_first(tree, shown, to_left, [limb[first] for limb in pair])
-        named = named or by_name
-        for side, limb in zip(LEFT_RIGHT, pair if left_first else pair[::-1], strict=True):
-            joints |= {sided(side, part): limb[part] for part in parts if part in limb}
+    limbs, named = _sided_limbs(tree, frames, tree.legs(legs), arms)
+    joints |= limbs
     neck, head = tree.neck(arms)
-    joints |= {} if head is None else {"head": head}
+    if head is not None:
+        joints["head"] = head
     _check_straight(skeleton, frames, joints)
     return check_map(skeleton, JointMap(joints, tuple(back[::-1]), neck, BY_THE_TREE, 0.8 if named else 0.6))
+
+
+def _sided_limbs(tree: _Tree, frames: Array, legs: Limbs, arms: _Fork) -> tuple[dict[str, int], bool]:
+    """For each bone of legs and arms its joint, and whether names show sides."""
+    # legs that are folded or crossed do not show sides, as they do at rest where the figure stands there
+    rest = tree.skeleton.rest_positions
+    poses = rest[None] if _stands(rest, legs, arms) else frames
+    to_left = _to_left(poses, legs, tree.skeleton)
+    joints = {}
+    named = False
+    for pair, parts, first in ((legs, LEG, "UpperLeg"), (tree.arms(arms), ARM, "UpperArm")):
+        left_first, by_name = _left_first(tree, poses, to_left, [limb[first] for limb in pair])
+        named = named or by_name
+        for side, limb in zip(LEFT_RIGHT, pair if left_first else pair[::-1], strict=True):
+            for part in parts:
+                if part in limb:
+                    joints[sided(side, part)] = limb[part]
+    return joints, named
 
 
 def _two_bones(places: list[float], ends: list[int]) -> tuple[int, int, int]:
@@ -252,37 +288,45 @@ def _two_bones(places: list[float], ends: list[int]) -> tuple[int, int, int]:
         begins = places[first] - places[start] > 0.15 * whole > 0
         return abs(upper - lower) / whole - 0.1 * whole / places[-1] if begins else np.inf
 
-    return min(((start, middle, end) for end in ends for start, middle in combinations(range(end), 2)), key=unlike)
+    choices = []
+    for end in ends:
+        choices += [(start, middle, end) for start, middle in combinations(range(end), 2)]
+    return min(choices, key=unlike)
 
 
 def _check_straight(skeleton: Skeleton, frames: Array, joints: dict[str, int]) -> None:
     """Refuse limbs whose bones are not straight from joint to joint in most frames (T, J, 3)."""
     for side in LEFT_RIGHT:
-        for one, other in (*pairwise(LEG[:3]), *pairwise(ARM[1:])):
-            if sided(side, other) not in joints:
+        for part, next_part in (*pairwise(LEG[:3]), *pairwise(ARM[1:])):
+            if sided(side, next_part) not in joints:
                 continue
-            upper = joints[sided(side, one)]
-            lower = joints[sided(side, other)]
-            above = skeleton.ancestors(lower)
-            within = above[: above.index(upper) + 1]
-            pieces = sum(np.linalg.norm(frames[:, low] - frames[:, high], axis=-1) for low, high in pairwise(within))
-            # joints that take a bone's twist lie in line with it; limbs of beasts have more bones, and bend at them
-            if np.median(pieces) > 1.1 * np.median(np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)):
+            upper = joints[sided(side, part)]
+            lower = joints[sided(side, next_part)]
+            # joints that take a bone's twist lie in line with it; limbs of animals have more bones, and bend at them
+            if _is_bent(skeleton, frames, upper, lower):
                 bent = f"this one is bent between {skeleton.names[upper]!r} and {skeleton.names[lower]!r}"
                 raise MotionError(f"a human's bones are straight, {bent}: if it is human all the same, give a map")
 
 
+def _is_bent(skeleton: Skeleton, frames: Array, upper: int, lower: int) -> bool:
+    """Whether the way from joint to joint is longer than the straight line by a tenth in most frames (T, J, 3)."""
+    above = skeleton.ancestors(lower)
+    between = above[: above.index(upper) + 1]
+    pieces = sum(np.linalg.norm(frames[:, low] - frames[:, high], axis=-1) for low, high in pairwise(between))
+    straight = np.linalg.norm(frames[:, upper] - frames[:, lower], axis=-1)
+    return bool(np.median(pieces) > 1.1 * np.median(straight))
+
+
 def _stands(pose: Array, legs: Limbs, arms: _Fork) -> bool:
     """Whether in a pose (J, 3) both legs are straight, and the arms above them."""
-    thighs, shins = (
-        unit(np.array([pose[leg[one]] - pose[leg[next_]] for leg in legs])) for one, next_ in pairwise(LEG[:3])
-    )
+    thighs = unit(np.array([pose[leg["UpperLeg"]] - pose[leg["LowerLeg"]] for leg in legs]))
+    shins = unit(np.array([pose[leg["LowerLeg"]] - pose[leg["Foot"]] for leg in legs]))
     trunk = unit(pose[list(arms.limbs)].mean(axis=0) - pose[[leg["UpperLeg"] for leg in legs]].mean(axis=0))
     return bool(min(*(thighs @ trunk), *(shins @ trunk)) > 0.75)
 
 
 def _to_left(frames: Array, legs: Limbs, skeleton: Skeleton) -> Array:
-    """Directions (T, 3) to the figure's left, told from its feet."""
+    """Directions (T, 3) to the figure's left, as its feet show."""
     forward = np.zeros(frames[:, 0].shape)
     up = np.zeros(frames[:, 0].shape)
     for leg in legs:
