@@ -8,7 +8,9 @@ export default defineConfig(
   {
     files: ["src/**"],
     // a variable is named for what it holds
-    rules: { "id-denylist": ["error", "found", "one", "own", "told", "said", "given", "asked", "how", "those"] },
+    rules: {
+      "id-denylist": ["error", "found", "one", "own", "told", "said", "given", "asked", "how", "those"],
+    },
   },
   {
     files: ["tests/**"],
