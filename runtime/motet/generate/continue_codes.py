@@ -213,7 +213,7 @@ class Progress:
         self.turned = 0.0
 
     def nearest(self, drawn: Ids) -> int:
-        """The row of those drawn for a moment (S, B, P) that keeps the pace best; it becomes part of the continuation."""
+        """The row of those drawn for a moment (S, B, P) that keeps the pace best, and is continued."""
         settings = self.continuer.settings
         seconds = self.continuer.codec.seconds
         moves = self.continuer.codec.book[drawn[..., 0]]

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
+from itertools import product
 from typing import NamedTuple
 
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
@@ -11,7 +12,7 @@ THEN = re.compile(
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
 OPENING = re.compile(r"((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
-"""What may stand before the verb of a part: its subject, or an adverb."""
+"""Words that may stand before the verb of a part: its subject, or an adverb."""
 
 # fmt: off
 FUNCTION_WORDS = frozenset((
@@ -20,7 +21,7 @@ FUNCTION_WORDS = frozenset((
     "or", "person", "she", "someone", "somebody", "that", "the", "their", "them", "then", "they", "this", "to", "up",
     "while", "who", "with", "woman", "you", "your",
 ))
-"""Words that say little about what is done."""
+"""Words that say little about an action."""
 # fmt: on
 
 
@@ -33,17 +34,17 @@ POSTURES = {
     "low": r"sit|sits|sitting|seated|lie|lies|lying|kneel\w*",
     "going": r"(?:walk|run|jog|sprint|jump|hop|leap|skip|march|climb|crawl)\w*",
 }
-"""What a figure can only do one of at a time."""
+"""Postures that exclude each other."""
 
 OWN = re.compile(
     r"\b(\w+) (?:your|his|her|their|my|the|both) (?:left |right )?"
     r"(?:arm|hand|fist|leg|foot|feet|knee|head|shoulder|elbow|hip|finger|toe|leg)s?\b"
 )
-"""A part of the body, and what is done with it."""
+"""A part of the body, and the word for what is done with it."""
 
 
 class Shown(NamedTuple):
-    """What a sentence is shown as: ``action``, ``lacking`` and ``confidence`` as for
+    """How a sentence is shown: ``action``, ``lacking`` and ``confidence`` as for
     :class:`motet.generate.base.Generated`."""
 
     action: str = ""
@@ -51,7 +52,7 @@ class Shown(NamedTuple):
     confidence: float | None = None
 
     def left_out(self, sentence: str) -> str:
-        """What is said of a sentence of which words are left out."""
+        """The message for a sentence some of whose words are left out."""
         words = ", ".join(f"'{word}'" for word in self.lacking)
         return f"{sentence!r} is read as {self.action!r}, which leaves out {words}"
 
@@ -72,7 +73,7 @@ class Passage:
 
 
 def stem(word: str) -> str:
-    """What the forms of a lower-case word share: "danc" of dance, dances and dancing."""
+    """The part that the forms of a lower-case word share: "danc" of dance, dances and dancing."""
     if len(word) <= 3:
         return word
     for ending, rest in ((r"ies$", "y"), (r"(ing|ed|es|s|e)$", ""), (r"y$", "i"), (r"([^aeiou])\1$", r"\1")):
@@ -81,40 +82,48 @@ def stem(word: str) -> str:
 
 
 def verbs_of(words: Iterable[str]) -> frozenset[str]:
-    """The stems of those of some words that have a form in -ing among them."""
+    """The stems of the words that end in -ing."""
     return frozenset(stem(word) for word in words if len(word) > 5 and word.endswith("ing"))
 
 
 def at_odds(sentence: str) -> tuple[str, str] | None:
-    """Two things that a sentence asks for at once and that exclude each other: "stands still while running"."""
-    said = []
+    """Two things in a sentence that exclude each other at the same time: "stands still while running"."""
+    postures: list[tuple[str, str]] = []
     for clause in AT_ONCE.split(sentence.lower()):
-        found = [
-            (kind, match[0]) for kind, words in POSTURES.items() if (match := re.search(rf"\b(?:{words})\b", clause))
-        ]
-        said += found[:1]
-    pairs = ((one[1], other[1]) for one in said for other in said if one[0] < other[0])
-    return next(pairs, None)
+        for posture, words in POSTURES.items():
+            match = re.search(rf"\b(?:{words})\b", clause)
+            if match:
+                postures.append((posture, match[0]))
+                break
+    for (posture, first), (other_posture, second) in product(postures, postures):
+        if posture < other_posture:
+            return first, second
+    return None
 
 
 def sentences_of(text: str) -> list[str]:
-    """The sentences of a text, and what it has between semicolons and in lines."""
-    return [found for one in STOPS.split(text) if (found := one.strip(" ,"))]
+    """The sentences of a text; semicolons and line breaks end a sentence, too."""
+    sentences = [sentence.strip(" ,") for sentence in STOPS.split(text)]
+    return [sentence for sentence in sentences if sentence]
 
 
 def parts_of(sentence: str, verbs: Set[str]) -> list[str]:
     """The parts of a sentence, in the order in which they are done.
 
-    verbs: stems. "then", "after that", "afterwards", "next" and "finally" always begin a part; what follows a comma or
-    "and" does if it begins with a verb and one came before, so that "jumps up and down" stays whole.
+    verbs: stems. "then", "after that", "afterwards", "next" and "finally" always begin a part; a comma or "and" does
+    before a verb if another verb came before, so that "jumps up and down" stays whole.
     """
     sentence = re.sub(r"^first(ly)?\b,?\s*", "", sentence, flags=re.IGNORECASE)
-    pieces = [piece for piece in THEN.split(sentence) if piece.strip(" ,")]
-    return [part for piece in pieces for part in _before_verbs(piece.strip(" ,"), verbs)]
+    parts: list[str] = []
+    for piece in THEN.split(sentence):
+        stripped = piece.strip(" ,")
+        if stripped:
+            parts += _before_verbs(stripped, verbs)
+    return parts
 
 
 def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:
-    """A text cut at each comma and "and" that a verb follows."""
+    """A text cut at each comma and "and" before a verb."""
     start = 0
     for match in ALSO.finditer(text):
         done = re.findall(r"\w+", text[start : match.start()].lower())

@@ -7,18 +7,17 @@ before something that is counted is a quantity. Anything else stays a word of th
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from motet.errors import TextError
 from motet.text.clauses import stem
 from motet.text.vocabulary import NUMBER_WORDS, RULES
 
 Kind = Literal["degrees", "metres", "steps", "times", "seconds", "pace"]
-"""degrees: of a turn of the whole figure, to the left; negative to the right. pace: beside how fast it is done
-otherwise."""
+"""degrees: of a turn of the whole figure, to the left; negative to the right. pace: relative to the usual speed."""
 
 MOST: Mapping[Kind, float] = {"degrees": 3600, "metres": 200, "steps": 200, "times": 50, "seconds": 600}
-"""The largest number of each kind that is taken."""
+"""The largest number of each kind that is accepted."""
 
 TURN = r"(?:turn|circle|rotation|revolution|spin|twirl|pirouette|lap)s?"
 SIZE = r"(?:(?:small|little|tiny|short|big|large|long|giant|quick|slow|more|baby) )?"
@@ -35,17 +34,17 @@ UNITS: tuple[tuple[Kind, float, str], ...] = (
     ("seconds", 60, r"mins?|minutes?"),
     ("times", 1, r"times?|x"),
 )
-"""What a number may count: its kind, how much of that it is, and how it is written."""
+"""Units of numbers: the kind, its amount in a unit, and the spellings of the unit."""
 
 SPELLED = "|".join([*NUMBER_WORDS, "hundred"])
 MEASURES = "|".join(unit for kind, _, unit in UNITS if kind in ("metres", "steps", "seconds"))
 SAID: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
-    (rf"\b(?:a )?(?:{SPELLED})(?:(?:[ -]| and )(?:{SPELLED}))*\b", lambda found: RULES.normalise(found[0])),
+    (rf"\b(?:a )?(?:{SPELLED})(?:(?:[ -]| and )(?:{SPELLED}))*\b", lambda match: RULES.normalise(match[0])),
     (r"\u2212(?=\d)", "-"),
     (r"[\u00b0\u00ba]", " degrees "),
-    (r"(\d?)\u00bd", lambda found: f"{found[1] or 0}.5"),
+    (r"(\d?)\u00bd", lambda match: f"{match[1] or 0}.5"),
     (r"(?<=\d),(?=\d{3}\b)", ""),
-    (r"\b(?:10 ?\^ ?|1e)(\d{1,2})\b", lambda found: "1" + "0" * int(found[1])),
+    (r"\b(?:10 ?\^ ?|1e)(\d{1,2})\b", lambda match: "1" + "0" * int(match[1])),
     (r"\b(\d+) thousand\b", r"\g<1>000"),
     (r"\b(\d+) million\b", r"\g<1>000000"),
     (r"\b(?:at )?a right angle\b", "90 degrees"),
@@ -67,7 +66,7 @@ SAID: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (rf"\ban? (?=(?:{MEASURES})\b)", "1 "),
     (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*|does an?|do an?) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
 )  # fmt: skip
-"""How numbers and their units are said otherwise, and what that becomes."""
+"""Other ways to say numbers and their units, and their replacements."""
 
 LEADING = r"(?:\b(?:for|by|about|roughly|exactly|only|just|in|within|over|of|another|an?|the)\s+)*"
 QUANTITY = re.compile(
@@ -75,7 +74,7 @@ QUANTITY = re.compile(
     rf"(?:{'|'.join(f'(?P<u{i}>{unit})' for i, (*_, unit) in enumerate(UNITS))})\b"
     r"(?!\s*(?:/|per\b|high|tall|apart|off))"
 )
-"""A number and its unit, with what leads to it."""
+"""A number and its unit, with the words before it that belong to it."""
 
 ACTS: Mapping[str, str] = {
     **dict.fromkeys(("jump", "hop", "leap", "bounc"), "jumps"),
@@ -90,21 +89,21 @@ ACTS: Mapping[str, str] = {
     **dict.fromkeys(("pushup", "pressup"), "pushups"),
     **dict.fromkeys(("cartwheel", "flip", "backflip", "roll", "push", "press", "throw", "swing"), ""),
 }
-"""Stems of words for what is done several times, and how that is counted (:mod:`motet.generate.motion_measures`); ""
-for what is counted as often as it is begun."""
+"""Stems of words for acts that are repeated, and the measure that counts them
+(:mod:`motet.generate.motion_measures`); "" for acts that are counted by their beginnings."""
 
 
 COUNTED = re.compile(
     rf"(?P<doing>\b(?:do|does|doing|performs?)\s+)?(?<![\w.-])(?P<number>-?\d+)\s+"
     rf"(?P<what>(?:[a-z-]+\s+){{0,2}}?(?:(?:{'|'.join(ACTS)})\w*|(?(doing)[a-z]+s|(?!)))\b)"
 )
-"""A number of something that is done: "two squats", "does 3 cartwheels"."""
+"""A number of acts: "two squats", "does 3 cartwheels"."""
 
 LEFT = {"step": "steps", "pace": "steps", "stri": "steps", "turn": "turn", "spin": "turn", "rota": "turn"}
-"""What a quantity leaves of its unit, by how that begins."""
+"""The word that remains of a unit, by its first letters."""
 
 ON_FEET = re.compile(r"(?:on|with|off|from|lifts?|raises?|puts?|both|the)\s*$|^1$")
-"""Before a number of feet, or the number: those that the figure has."""
+"""Words before a number of feet, or the number, that mean the figure's feet."""
 
 BODY = re.compile(r"\b(?:arm|hand|fist|leg|knee|head|shoulder|elbow|hip|waist|trunk|torso|finger|wrist|back|body)s?\b")
 MOVING = re.compile(
@@ -114,86 +113,107 @@ SIDES = re.compile(
     r"\b(?:(left|anti-?clockwise|counter-?clockwise)|(right|clockwise))\b(?! (?:arm|hand|fist|leg|foot|knee|side of))"
 )
 PACES = re.compile(r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly))\b")
-SLOWER, FASTER = 0.75, 1.3
+SLOWER = 0.75
+FASTER = 1.3
 
 
 ELSEWHERE = (
     r"\b(?:spot|place|stand\w*|walk\w*|r[ua]n\w*|jog\w*|skip\w*|hop\w*|jump\w*|leap\w*|danc\w*|sit\w*|crawl\w*)\b"
 )
-"""Words that say how a turn is made."""
+"""Words for the manner of a turn."""
 
 UNSAID: Mapping[Kind, str] = {"steps": "walk forward", "metres": "walk forward", "degrees": "turn around"}
-"""What is done where a sentence says nothing but a number."""
+"""The action of a sentence that says nothing but a number."""
 
 
 @dataclass(frozen=True)
 class Quantities:
-    """What a sentence asks for in numbers. text: what it says without them. amounts: how much of what.
-
-    either: whether a turn may be to either side. act: what is done so many times, a value of :data:`ACTS`; "" for what
-    is counted as often as it is done.
-    """
+    """The numbers in a sentence."""
 
     text: str
+    """The sentence without them."""
+
     amounts: Mapping[Kind, float] = field(default_factory=dict)
+    """The amount of each kind."""
+
     either: bool = False
+    """Whether a turn may be to either side."""
+
     act: str = ""
+    """The measure of the act that is repeated, a value of :data:`ACTS`; "" for one counted by its beginnings."""
 
 
 def numerals(sentence: str) -> str:
     """A sentence in lower case with numbers as digits: "half a turn" is "0.5 turn", "twice" is "2 times"."""
     text = sentence.lower()
-    for pattern, said in SAID:
-        text = re.sub(pattern, said, text)
+    for pattern, replacement in SAID:
+        text = re.sub(pattern, replacement, text)
     return text
 
 
 def quantities_of(sentence: str) -> Quantities:
-    """The quantities of a sentence, the first of each kind; TextError for one that makes no sense: "-3 jumps"."""
-    said = numerals(sentence)
+    """The quantities of a sentence, the first of each kind; TextError for an impossible one: "-3 jumps"."""
+    text = numerals(sentence)
     amounts: dict[Kind, float] = {}
-    spans: list[tuple[int, int, str]] = []
-    for kind, value, start, stop, rest in sorted(_found(said), key=lambda one: one[2]):
-        if kind not in amounts and all(start >= end for _, end, _ in spans):
-            amounts[kind] = _sensible(kind, value, sentence)
-            spans.append((start, stop, rest))
-    for start, stop, rest in reversed(spans):
-        said = said[:start] + rest + said[stop:]
-    ways = {1 if left else -1 for left, _ in SIDES.findall(said)}
-    _turned(said, amounts, ways)
-    if pace := PACES.search(said):
+    phrases: list[_Phrase] = []
+    for phrase in sorted(_phrases(text), key=lambda phrase: phrase.start):
+        if phrase.kind not in amounts and all(phrase.start >= earlier.stop for earlier in phrases):
+            amounts[phrase.kind] = _sensible(phrase.kind, phrase.amount, sentence)
+            phrases.append(phrase)
+    for phrase in reversed(phrases):
+        text = text[: phrase.start] + phrase.rest + text[phrase.stop :]
+    sides = {1 if left else -1 for left, _ in SIDES.findall(text)}
+    _turned(text, amounts, sides)
+    if pace := PACES.search(text):
         amounts["pace"] = SLOWER if pace[1] else FASTER
-    words = re.findall("[a-z]+", re.sub(r"\b(push|press|sit|pull)[ -]?ups?\b", r"\1up", said))
+    remaining = _plain(text, amounts) if phrases or "degrees" in amounts else sentence
+    return Quantities(remaining, amounts, len(sides) != 1, _act_in(text))
+
+
+def _act_in(text: str) -> str:
+    """The measure of the act that a text repeats, a value of :data:`ACTS`."""
+    words = re.findall("[a-z]+", re.sub(r"\b(push|press|sit|pull)[ -]?ups?\b", r"\1up", text))
     acts = [ACTS[word] for word in map(stem, words) if word in ACTS]
-    act = "jacks" if "jacks" in acts else next(filter(None, acts), "")
-    text = _plain(said, amounts) if spans or "degrees" in amounts else sentence
-    return Quantities(text, amounts, len(ways) != 1, act)
+    return "jacks" if "jacks" in acts else next(filter(None, acts), "")
 
 
-def known_turns(asked: Quantities) -> list[str]:
-    """What is asked for with other angles, that nearest to what is asked first: actions are known by right angles and
-    their halves, and a turn made while walking is turned best."""
-    turn = abs(asked.amounts.get("degrees", 0))
+def known_turns(quantities: Quantities) -> list[str]:
+    """Texts with other angles, the nearest first: actions are known by right angles and their halves, and a turn made
+    while walking is turned best."""
+    turn = abs(quantities.amounts.get("degrees", 0))
     if not 20 <= turn <= 240:
         return []
     angles = sorted((45, 90, 135, 180), key=lambda angle: abs(angle - turn))
-    return [f"{asked.text} {angle} degrees" for angle in angles]
+    return [f"{quantities.text} {angle} degrees" for angle in angles]
 
 
-def _found(said: str) -> Iterator[tuple[Kind, float, int, int, str]]:
-    """Quantities: kind and value, from where to where they are said, and what is left of that."""
-    for match in QUANTITY.finditer(said):
+class _Phrase(NamedTuple):
+    """A quantity in a text: from ``start`` to ``stop``, where ``rest`` remains."""
+
+    kind: Kind
+    amount: float
+    start: int
+    stop: int
+    rest: str
+
+
+def _phrases(text: str) -> Iterator[_Phrase]:
+    """The quantities in a text, units before acts."""
+    for match in QUANTITY.finditer(text):
         place = next(i for i in range(len(UNITS)) if match[f"u{i}"])
         kind, factor, _ = UNITS[place]
-        before = said[: match.start()]
-        moves = [0, *(found.end() for found in MOVING.finditer(before))]
-        of_body = kind in ("degrees", "metres") and BODY.search(before, moves[-1])
-        own = match[f"u{place}"] in ("foot", "feet") and (ON_FEET.search(before) or match["number"] == "1")
-        if not (of_body or own or re.search(r"\b(?:after|every|each)\s*$", before)):
-            rest = "" if moves[1:] and kind == "degrees" else LEFT.get(match[f"u{place}"].split()[-1][:4], "")
-            yield kind, factor * float(match["number"]), match.start(), match.end(), f" {rest} "
-    for match in COUNTED.finditer(said):
-        yield "times", float(match["number"]), match.start("number"), match.start("what"), ""
+        unit = match[f"u{place}"]
+        before = text[: match.start()]
+        verb_ends = [verb.end() for verb in MOVING.finditer(before)]
+        # An angle or a length of a part of the body, the figure's own feet, and "after 3 steps" are no quantities.
+        of_body = kind in ("degrees", "metres") and BODY.search(before, verb_ends[-1] if verb_ends else 0)
+        of_feet = unit in ("foot", "feet") and (ON_FEET.search(before) or match["number"] == "1")
+        if of_body or of_feet or re.search(r"\b(?:after|every|each)\s*$", before):
+            continue
+        rest = "" if verb_ends and kind == "degrees" else LEFT.get(unit.split()[-1][:4], "")
+        yield _Phrase(kind, factor * float(match["number"]), match.start(), match.end(), f" {rest} ")
+    for match in COUNTED.finditer(text):
+        yield _Phrase("times", float(match["number"]), match.start("number"), match.start("what"), "")
 
 
 def _sensible(kind: Kind, value: float, sentence: str) -> float:
@@ -204,30 +224,30 @@ def _sensible(kind: Kind, value: float, sentence: str) -> float:
     return value
 
 
-def _turned(said: str, amounts: dict[Kind, float], ways: set[int]) -> None:
-    """Make turns degrees, with the sign of their side: "turns around" is half a turn, so many times so many turns."""
-    around = re.search(r"\bturn\w*(?: all the way)? around\b", said)
-    if "degrees" not in amounts and (around or re.search(r"\b(?:spin|rotat|twirl|whirl|pirouett)\w*\b", said)):
+def _turned(text: str, amounts: dict[Kind, float], sides: set[int]) -> None:
+    """Make turns degrees, with the sign of their side: "turns around" is half a turn, once for each time."""
+    around = re.search(r"\bturn\w*(?: all the way)? around\b", text)
+    if "degrees" not in amounts and (around or re.search(r"\b(?:spin|rotat|twirl|whirl|pirouett)\w*\b", text)):
         if "times" in amounts:
             amounts["degrees"] = 360 * amounts.pop("times")
         elif around:
             amounts["degrees"] = 360 if "all the way" in around[0] else 180
     elif "degrees" in amounts and "times" in amounts:
         amounts["degrees"] *= amounts.pop("times")
-    elif "times" in amounts and re.search(r"\bstep(?:s|ping)?\b", said) and "steps" not in amounts:
+    elif "times" in amounts and re.search(r"\bstep(?:s|ping)?\b", text) and "steps" not in amounts:
         amounts["steps"] = amounts.pop("times")
-    if "degrees" in amounts and ways == {-1}:
+    if "degrees" in amounts and sides == {-1}:
         amounts["degrees"] *= -1
 
 
-def _plain(said: str, amounts: Mapping[Kind, float]) -> str:
-    """What is done, without numbers: steps and turns are made walking, where nothing else is said of them."""
-    if "steps" in amounts and not re.search(r"\b(?:left|right|side\w*)\b", said):
+def _plain(text: str, amounts: Mapping[Kind, float]) -> str:
+    """A text without numbers: steps and turns are made walking, unless it says something else of them."""
+    if "steps" in amounts and not re.search(r"\b(?:left|right|side\w*)\b", text):
         steps = r"\b(?:(?:takes?|taking|makes?|does|do)\s+)?steps\b"
-        alone = not MOVING.search(re.sub(steps, "", said))
-        said = re.sub(steps, "walks" if alone else "", said)
-    if 20 <= abs(amounts.get("degrees", 0)) <= 240 and not re.search(ELSEWHERE, said):
-        said = re.sub(r"\b(?:(?:makes?|do|does)\s+)?(?:turn|pivot|rotat|veer)\w*", "walks and turns", said)
-    text = re.sub(r"\s+", " ", said).strip(" ,.")
+        alone = not MOVING.search(re.sub(steps, "", text))
+        text = re.sub(steps, "walks" if alone else "", text)
+    if 20 <= abs(amounts.get("degrees", 0)) <= 240 and not re.search(ELSEWHERE, text):
+        text = re.sub(r"\b(?:(?:makes?|do|does)\s+)?(?:turn|pivot|rotat|veer)\w*", "walks and turns", text)
+    text = re.sub(r"\s+", " ", text).strip(" ,.")
     text = re.sub(r"\bwalk(s|ing)?$", r"walk\1 forward", text)
     return text or next(UNSAID[kind] for kind in (*amounts, "steps") if kind in UNSAID)

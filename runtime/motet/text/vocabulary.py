@@ -1,4 +1,4 @@
-"""Words and their ids: how a sentence becomes words (section 3.2 of Plappert et al. 2017), and which a model knows."""
+"""Words and their ids: how a sentence becomes words (section 3.2 of Plappert et al. 2017), and the words of a model."""
 
 import re
 import unicodedata
@@ -21,7 +21,11 @@ PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
 """Padding, start and end of a sentence, unknown word: ids 0 to 3. Upper case, so that no normal word is one."""
 
 
-MAX_WORDS, MAX_LETTERS = 40, 2000  # of a sentence
+MAX_WORDS = 40
+"""Words of a sentence."""
+
+MAX_LETTERS = 2000
+"""Letters of a sentence."""
 
 
 # fmt: off
@@ -75,7 +79,8 @@ class TextRules:
         """Read what :meth:`to_json` wrote; BundleError where it is not a set of rules."""
         top = Fields(data, "text")
         top.whole("rules", 1, 1)
-        spelling, numbers = top.fields("spelling"), top.fields("numbers")
+        spelling = top.fields("spelling")
+        numbers = top.fields("numbers")
         if (count := len(spelling.data) + len(numbers.data)) > 2000:
             raise top.fault("at most 2000 words in its tables", count)
         right = {wrong: spelling.text(wrong) for wrong in spelling.data}
@@ -90,7 +95,8 @@ class TextRules:
         plain = re.sub(r"(?<=\d)\.(?=\d)", f" {self.point} ", plain)
         plain = " ".join(re.sub(r"[\W_]+", " ", plain).split())
         tokens = self._misspelt.sub(lambda match: self.spelling[match[0]], plain).split()
-        result, place = [], 0
+        result = []
+        place = 0
         while place < len(tokens):
             value, used = self._number(tokens[place : place + 5])
             result.append(str(value) if used else tokens[place])
@@ -119,7 +125,8 @@ class TextRules:
         value, used = self._below_hundred(tokens)
         if tokens[used : used + 1] != [self.hundred]:
             return value, used
-        value, used = 100 * (value if used else 1), used + 1
+        value = 100 * (value if used else 1)
+        used += 1
         skipped = tokens[used : used + 1] == [self.conjunction]
         more, length = self._below_hundred(tokens[used + skipped :])
         return (value + more, used + skipped + length) if length else (value, used)
@@ -194,14 +201,14 @@ class Vocabulary:
         """
         if len(sentence) > MAX_LETTERS:
             raise TextError(f"the sentence has {len(sentence)} letters, but at most {MAX_LETTERS} are allowed")
-        found = self.rules.words(sentence)
-        meant = list(map(self.meant, found))
-        unknown = [word for word, known in zip(found, meant, strict=True) if not known]
-        if not found:
+        words = self.rules.words(sentence)
+        meant = list(map(self.meant, words))
+        unknown = [word for word, known in zip(words, meant, strict=True) if not known]
+        if not words:
             raise TextError(f"the sentence {sentence!r} has no words")
-        if len(found) > MAX_WORDS:
-            raise TextError(f"the sentence has {len(found)} words, but at most {MAX_WORDS} are allowed: {sentence!r}")
-        if len(unknown) == len(found):
+        if len(words) > MAX_WORDS:
+            raise TextError(f"the sentence has {len(words)} words, but at most {MAX_WORDS} are allowed: {sentence!r}")
+        if len(unknown) == len(words):
             examples = ", ".join(self.words[len(SPECIALS) : len(SPECIALS) + 20])
             raise TextError(f"the model, for English, knows no word of {sentence!r}; it knows words such as {examples}")
         return np.array([self.ids[word or UNK] for word in meant], dtype=np.int64), unknown
