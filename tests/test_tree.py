@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 244
+MOST_LARGE_FUNCTIONS = 242
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 422
-MOST_TUPLE_ASSIGNMENTS = 86
-MOST_NESTED_COMPREHENSIONS = 108
+MOST_BANNED_NAMES = 352
+MOST_TUPLE_ASSIGNMENTS = 44
+MOST_NESTED_COMPREHENSIONS = 102
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -93,7 +93,7 @@ CEILINGS = {
     "motet.draw": 12_000,
     "motet.figures": 32_300,
     "motet.formats": 37_100,
-    "motet.generate": 26_000,
+    "motet.generate": 26_100,
     "motet.live": 5_700,
     "motet.models": 9_200,
     "motet.motion": 16_100,
