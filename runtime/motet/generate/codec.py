@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Graph
 from motet.decode.loop import Ids
 from motet.motion.rotations import Array
-from motet.motion.springs import damped, damping_of
+from motet.motion.springs import Inertializer
 
 REACH = 0.5
 """Metres that count as much as a radian where moves are compared."""
@@ -124,24 +124,26 @@ class Codec:
 
 
 class Inertialization:
-    """What a motion's last frames (2, D) are beside those found in their place goes from the frames that follow.
+    """Lets decoded frames continue a motion: its last frames (2, D) differ from the decoded ones in their place by a
+    jump, which becomes an offset of the frames that follow.
 
-    By a critically damped spring, so that neither poses nor velocities leap (Bollo 2016). What the root's rates are off
-    by is a speed already, and has none.
+    The offset fades by a critically damped spring, so that neither poses nor velocities leap (Bollo 2016). That of the
+    root's rates is a speed already, and its own rate of change is left out.
     """
 
-    def __init__(self, given: Array, found: Array, fps: float, half_life: float) -> None:
-        self.seconds, self.damping = 1 / fps, damping_of(half_life)
-        before, self.off = given - found
-        self.speed = (self.off - before) * fps
-        self.speed[:PATH] = 0
+    def __init__(self, last_frames: Array, decoded: Array, fps: float, half_life: float) -> None:
+        self.seconds = 1 / fps
+        self.inertializer = Inertializer(half_life)
+        offset_before, self.offset = last_frames - decoded
+        self.offset_rate = (self.offset - offset_before) * fps
+        self.offset_rate[:PATH] = 0
 
     def __call__(self, frames: Array) -> Array:
-        """The next frames (T, D) with what is left."""
+        """The next frames (T, D), with the offset."""
         joined = np.array(frames)
         for place in range(len(joined)):
-            self.off, self.speed = damped(self.off, self.speed, self.damping, self.seconds)
-            joined[place] += self.off
+            self.offset, self.offset_rate = self.inertializer.update(self.offset, self.offset_rate, self.seconds)
+            joined[place] += self.offset
         return joined
 
 

@@ -37,7 +37,7 @@ class ActSettings(Settings):
     rest: Annotated[float, Range(0, 100, "m/s")] = 0.25
     """The beginning and the end of an act are left out where no joint is faster than this."""
     moves: Annotated[float, Range(0, 10, "s")] = 1.0
-    """Shortest movement whose rest is left out: less is a pose that is held."""
+    """Shortest movement of an act whose rest is left out; a shorter one is a held pose."""
     bent: Metres = 0.25
     """An act is one of the legs where the heights of the hips, and of a straight stance, differ by more than this,"""
     raised: Metres = 0.3
@@ -125,7 +125,7 @@ class Act:
 
 
 def _checked(numbers: Floats) -> Array:
-    """Frames (T, :data:`WIDTH`) in float64; ControlError for those that are none."""
+    """Frames (T, :data:`WIDTH`) in float64; ControlError if they are no act."""
     if numbers.ndim != 2 or numbers.shape[1] != WIDTH or len(numbers) < SHORTEST:
         raise ControlError(f"an act needs {SHORTEST} or more frames of {WIDTH} numbers, not {numbers.shape}")
     if not (np.abs(numbers) <= LARGEST).all():

@@ -1,6 +1,6 @@
 """Figures that stand keep their place, and breathe.
 
-Recordings of people who stand sway, and each transition between two of them leaves a small displacement, so an idle
+Recordings of standing people sway, and each transition between two of them leaves a small displacement, so an idle
 figure would drift. While one stands, the playback moves it over the ground no more, and its feet are held by the foot
 lock. Its chest goes forward and up and back again, by small turns that are added to whatever is played; head and arms
 stay where they are. Breaths are a wave over the ground, to keep neighbours from breathing as one. Letters in shapes: B
@@ -101,7 +101,7 @@ class IdleLayer:
         root: (B, 3) before the tick. target: (B, 3) velocity along x and z, and facing. acts: (B,) whether an act leads
         the whole body.
         """
-        # who stands: without a target speed, slow, and on both feet
+        # figures stand without a target speed, slow, and on both feet
         stopped = (target[:, :2] == 0).all(axis=1)
         on_both_feet = (pose.contacts > settings.stands).all(axis=1)
         slow = (playback.spring[:, :2] ** 2).sum(axis=1) < settings.slow**2

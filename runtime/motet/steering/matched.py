@@ -1,4 +1,4 @@
-"""What a steered figure plays and what it is looking for, to be drawn or examined where it does not do as it should."""
+"""The rows that a steered figure plays and its desired path, for drawings and for finding faults."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from motet.steering.matching import HORIZONS, Flags, Matcher, Playback, Rows
 
 
 class Matched(NamedTuple):
-    """What B figures play."""
+    """The rows that B figures play."""
 
     row: Rows
     """(B,) of the bundle's table."""
@@ -23,7 +23,7 @@ class Matched(NamedTuple):
 
 
 def matched(matcher: Matcher, playback: Playback, target: Array, gait: Rows) -> Matched:
-    """What figures play in gaits (B,) with targets (B, 3): velocity along x and z, and facing."""
+    """The rows that figures play in gaits (B,) with targets (B, 3): velocity along x and z, and facing."""
     # the cost of the row that is played, with the constant that a search leaves out
     row = playback.row + (playback.part > 0.5)
     mirror = playback.mirror

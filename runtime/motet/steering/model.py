@@ -131,14 +131,14 @@ class SteerModel(ControlModel):
         start: a gait, by default the first; or a motion of any human figure. places: (characters, 3) x and z in metres
             and facing in degrees; by default all are at the origin and face z.
         hold_feet: keep planted feet in place, by turning hips and knees. strict: refuse a speed outside a gait's range,
-            instead of clamping it, and acts in words of which a word is left out.
+            instead of clamping it, and acts in words where a word is left out.
         phases: a whole number for all or for each, from 0, less than the ``search_every`` of the bundle's settings: the
             ticks until its first search of the table. From then on it searches in its turn alone, every
-            ``search_every`` ticks, and what it is told waits for that. By default the phases of 32 characters or more
-            are 0, 1, 2 and so on in turn, so that each tick costs the same; fewer search after every command. A
-            character moves as it would alone with its phase.
-        words: a generate model, which makes what the session's ``act`` is told in sentences; or the
-            :class:`motet.steering.sentence_acts.SaidActs` of one, which sessions share.
+            ``search_every`` ticks, and commands wait for that. By default the phases of 32 characters or more are 0,
+            1, 2 and so on in turn, so that each tick costs the same; fewer search after every command. A character
+            moves as it would alone with its phase.
+        words: a generate model, which makes the acts of sentences; or its
+            :class:`motet.steering.sentence_acts.SaidActs`, which sessions share.
         ControlError for values out of range, MotionError for a motion that does not fit.
         """
         characters = checked_int("characters", characters, 1, LARGEST_CROWD, ControlError)

@@ -35,7 +35,7 @@ class Pose:
     events: tuple[Event, ...] = ()
 
     def read_only(self) -> "Pose":
-        """The same, whose arrays cannot be written into: what a session gives is the state that it goes on from."""
+        """The same pose with read-only arrays: they are the state from which a session goes on."""
         ground = self.ground.view()
         rotations = self.rotations.view()
         height = self.height.view()

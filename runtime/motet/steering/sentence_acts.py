@@ -34,7 +34,7 @@ class SaidActs:
     def shown(self, sentence: str, strict: bool = False) -> tuple[Act, Shown]:
         """The act of a sentence, and what that is shown as; errors and warnings like :meth:`act`.
 
-        strict: TextError for a sentence of which the action leaves out a word.
+        strict: TextError for a sentence if the action leaves out a word.
         """
         if strict:
             self.words.check(self._known(sentence))

@@ -270,20 +270,20 @@ class SteerSession(Guided):
     def act(
         self, what: Action | Sequence[Action], *, who: CharacterIds = None, upper: bool | None = None
     ) -> list[Shown]:
-        """Do something, from the next tick on, in place of what is being done.
+        """Begin an act in the next tick, in place of the present one.
 
-        what: a motion of any human figure, without what it rests at both ends; an act, which
-            :meth:`motet.steering.model.SteerModel.act_of` makes of one once; the name of a gait that goes nowhere, such
-            as "jump", which is done once, forward by who moves; or a sentence such as "wave", of which the session's
-            ``words`` generate one, once; None ends what is done. One for all, or one for each of ``who``.
+        what: a motion of any human figure, without the rest at both ends; an act, made of a motion once by
+            :meth:`motet.steering.model.SteerModel.act_of`; the name of a gait that goes nowhere, such as "jump", which
+            is done once, forward by characters that move; or a sentence such as "wave", for which the session's
+            ``words`` generate a motion, once; None ends the present act. One for all, or one for each of ``who``.
         who: numbers of characters, by default all.
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
-            the ground. By default by the whole body where a character stands, whose legs go once it is told to; or
+            the ground. By default by the whole body where a character stands, until it is steered elsewhere; or
             where the act is one of the legs, such as a kick, after which a character that moves goes on.
-        Returns what each sentence is shown as, and warns (TextWarning) of words that are left out.
-        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not know,
-        or of which a word is left out if the session is strict, ControlError for a motion of less than three ticks, for
-        characters that are not there, and for a sentence without ``words``; nothing changes then.
+        Returns how each sentence is shown, and warns (TextWarning) of words that are left out.
+        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not know
+        or, in a strict session, with words that are left out, ControlError for a motion of less than three ticks, for
+        unknown characters, and for a sentence without ``words``; nothing changes then.
         """
         characters = self._chosen(who).tolist()
         each = list(what) if is_many(what) and not isinstance(what, Action) else [what] * len(characters)
@@ -305,7 +305,7 @@ class SteerSession(Guided):
         return choose(acts, key=lambda act: act.reach) if acts else None
 
     def prepare(self, *sentences: str) -> list[Shown]:
-        """Make acts of sentences, so that :meth:`act` has them at once; what they are shown as. It may be called in
+        """Make acts of sentences, so that :meth:`act` has them at once; returns how they are shown. It may be called in
         another thread while the session ticks, such as by ``asyncio.to_thread(session.prepare, "wave")``. Errors and
         warnings are those of :meth:`act`."""
         shown: list[Shown] = []
@@ -314,7 +314,7 @@ class SteerSession(Guided):
         return shown
 
     def _acts_of(self, what: Any, shown: list[Shown]) -> tuple[Act, ...]:
-        """The acts that are meant, of which a character does one; what a sentence is shown as is added to a list."""
+        """The acts of an action, among which a character does one; ``shown`` grows by how a sentence is shown."""
         needs(what, Action, "a motion, an act or a sentence")
         if what is None:
             return ()
@@ -335,7 +335,7 @@ class SteerSession(Guided):
 
     @property
     def acting(self) -> list[tuple[str, float] | None]:
-        """What each character does: its name and the seconds that are left; None of those that only go or stand."""
+        """The act of each character: its name and the seconds that are left; None for characters without an act."""
         acting = list[tuple[str, float] | None]()
         for playing in self._actions.playing:
             if playing is None:
@@ -389,8 +389,8 @@ class SteerSession(Guided):
             self._lock = self._new_lock()
 
     def add(self, places: ArrayLike, *, gait: str | None = None, phases: ArrayLike | None = None) -> list[int]:
-        """Add characters that stand at places: (3,) for one or (n, 3), x and z in metres, facing in degrees; their
-        numbers (n), which follow those that there are. Each moves as in a session of its own that starts now.
+        """Add characters that stand at places: (3,) for one or (n, 3), x and z in metres, facing in degrees. Returns
+        their numbers (n), which follow the present ones. Each moves as in a session of its own that starts now.
 
         gait, phases: like ``start`` and ``phases`` of :meth:`motet.steering.model.SteerModel.start`. ControlError for
         values out of range, and for more than 100,000 characters in all; nothing changes then.
@@ -411,8 +411,8 @@ class SteerSession(Guided):
         return numbers
 
     def remove(self, who: int | Sequence[int]) -> None:
-        """Remove characters. Those that stay keep their order: the numbers of those behind become smaller. ControlError
-        for characters that are not there, and for all of them: one stays."""
+        """Remove characters. The others keep their order, and the numbers of later ones become smaller. ControlError
+        for unknown characters, and for all of them: one stays."""
         if who is None:
             raise ControlError("who must be the numbers of the characters that go")
         stay = np.delete(np.arange(self.characters), self._chosen(who))

@@ -135,7 +135,7 @@ class Guided(ABC):
 
     @property
     def arrived(self) -> NDArray[np.bool_]:
-        """Which characters (characters,) stand, within 8 cm and 8 degrees, where they were told to go last."""
+        """Which characters (characters,) stand, within 8 cm and 8 degrees, where they were last sent."""
         return self._guidance.going.arrived.copy()
 
     def keep_apart(self, room: float | None = 0.8) -> None:
