@@ -13,8 +13,8 @@ LARGE_FUNCTION = 250
 MOST_LARGE_FUNCTIONS = 242
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 352
-MOST_TUPLE_ASSIGNMENTS = 44
+MOST_BANNED_NAMES = 350
+MOST_TUPLE_ASSIGNMENTS = 43
 MOST_NESTED_COMPREHENSIONS = 102
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
