@@ -45,11 +45,11 @@ def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
     """Rotations of poses with others of thighs, shins and feet, of legs as :func:`limbs` gives them."""
     # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
     turned: NDArray[Any] = np.array(legs)
-    found = rotations.copy("K")
-    found.transpose(1, 2, 0)[LEG_BONES[:, :3]] = (
+    posed = rotations.copy("K")
+    posed.transpose(1, 2, 0)[LEG_BONES[:, :3]] = (
         turned[..., None] if len(legs) == 2 else turned[0].transpose(2, 0, 1, 3)
     )
-    return found
+    return posed
 
 
 def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quaternion], list[Vector]]:

@@ -20,6 +20,7 @@ from motet.motion.kinematics import (
 )
 from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, axis_to_rotmat, inverse, product, rotated
+from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -80,19 +81,27 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
     if motion.fps != like.fps:
         log.warning("resampled the second motion from %g to %g fps, the rate of the first", motion.fps, like.fps)
         motion = motion.continuous().resample(like.fps)
-    one = skeleton_of(motion)
-    two = skeleton_of(like)
-    joints = [[(joint.name, joint.parent, joint.order, joint.axis) for joint in each.joints] for each in (one, two)]
-    same = joints[0] == joints[1] and one.metres_per_unit == two.metres_per_unit
-    if not same or np.abs(one.offsets[1:] - two.offsets[1:]).max(initial=0) > 1e-3 * two.height:
+    skeleton = skeleton_of(like)
+    if not _same_figure(skeleton_of(motion), skeleton):
         log.warning("retargeted the second motion to the figure of the first")
         motion = from_humanoid(on_humanoid(motion), like)
     elif set(motion.channels) == set(like.channels):
-        return replace(motion.select(like.channels, like.units), skeleton=two)
-    turned = local_rotations(motion)
-    moved = local_translations(motion)
-    by_name = ({name: part[:, i] for i, name in enumerate(two.names)} for part in (turned, moved))
-    return continued(like[-1:], *by_name)
+        return replace(motion.select(like.channels, like.units), skeleton=skeleton)
+    rotations = local_rotations(motion)
+    translations = local_translations(motion)
+    rotations_by_name = {name: rotations[:, i] for i, name in enumerate(skeleton.names)}
+    translations_by_name = {name: translations[:, i] for i, name in enumerate(skeleton.names)}
+    return continued(like[-1:], rotations_by_name, translations_by_name)
+
+
+def _same_figure(skeleton: Skeleton, other: Skeleton) -> bool:
+    """Whether two skeletons have the same joints and unit, and offsets within a thousandth of the height."""
+    if len(skeleton.joints) != len(other.joints) or skeleton.metres_per_unit != other.metres_per_unit:
+        return False
+    for joint, like in zip(skeleton.joints, other.joints, strict=True):
+        if replace(joint, offset=like.offset) != like:
+            return False
+    return bool(np.abs(skeleton.offsets[1:] - other.offsets[1:]).max(initial=0) <= 1e-3 * other.height)
 
 
 def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) -> Motion | None:
@@ -103,31 +112,47 @@ def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) ->
     position or rotation of the hips.
     """
     skeleton = skeleton_of(motion)
-    known = set(motion.channels)
-    # the hips are the first joint with a translation
-    hips = next((i for i, n in enumerate(skeleton.names) if {f"{n}.t{axis}" for axis in AXES} <= known), -1)
-    if hips < 0 or not {f"{skeleton.names[hips]}.r{axis}" for axis in AXES} <= known:
+    hips = _moving_joint(motion)
+    if hips is None or not _has_channels(motion, skeleton.names[hips], "r"):
         return None
     name = skeleton.names[hips]
-    above = skeleton.joints[hips].parent
     rotations, places = global_transforms(motion)
     about = axis_to_rotmat("y", np.array(turn))
+
+    # the hips arrive where the mean velocity takes them, at their own height
     last = global_transforms(before[-1])[1][0, hips]
-    speed = (_velocity(before, hips, to_end=True) + about @ _velocity(motion, hips)) / 2
-    to = last + seconds * speed
-    place = np.array([to[0], places[0, hips, 1], to[2]]) + rotated(about, places[:, hips] - places[0, hips])
+    velocity = (_velocity(before, hips, to_end=True) + about @ _velocity(motion, hips)) / 2
+    arrival = last + seconds * velocity
+    start = np.array([arrival[0], places[0, hips, 1], arrival[2]])
+    path = start + rotated(about, places[:, hips] - places[0, hips])
+
+    # in the frame of the joint above
+    above = skeleton.joints[hips].parent
     to_parent = np.broadcast_to(np.eye(3), (len(motion), 3, 3))
     origin = np.zeros((len(motion), 3))
     if above >= 0:
         to_parent = inverse(rotations[:, above])
         origin = places[:, above]
-    own = product(to_parent, product(np.broadcast_to(about, to_parent.shape), rotations[:, hips]))
-    return posed(motion, {name: own}, {name: rotated(to_parent, place - origin)})
+    turned = product(np.broadcast_to(about, to_parent.shape), rotations[:, hips])
+    return posed(motion, {name: product(to_parent, turned)}, {name: rotated(to_parent, path - origin)})
+
+
+def _moving_joint(motion: Motion) -> int | None:
+    """The first joint with a translation, which the hips are."""
+    for i, name in enumerate(skeleton_of(motion).names):
+        if _has_channels(motion, name, "t"):
+            return i
+    return None
+
+
+def _has_channels(motion: Motion, joint: str, letter: str) -> bool:
+    """Whether a motion has all three channels of a joint's translation ("t") or rotation ("r")."""
+    return {f"{joint}.{letter}{axis}" for axis in AXES} <= set(motion.channels)
 
 
 def _velocity(motion: Motion, joint: int, to_end: bool = False) -> Array:
     """Velocity (3,) of a joint, lengths per second, at the start or end of a motion; 0 for a single frame."""
     frames = max(1, round(0.2 * motion.fps)) + 1  # the mean over .2 s
     places = global_transforms(motion[-frames:] if to_end else motion[:frames])[1][:, joint]
-    found: Array = (places[-1] - places[0]) * motion.fps / max(1, len(places) - 1)
-    return found
+    velocity: Array = (places[-1] - places[0]) * motion.fps / max(1, len(places) - 1)
+    return velocity

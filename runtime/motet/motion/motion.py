@@ -215,12 +215,12 @@ def _places(channels: tuple[str, ...]) -> Mapping[str, int]:
 
 @lru_cache(maxsize=64)
 def _rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str) -> Mapping[str, list[int]]:
-    found: dict[str, list[int]] = {}
+    columns_of: dict[str, list[int]] = {}
     for column in sorted(range(len(channels)), key=lambda column: channels[column][-2:]):
         joint, _, kind = channels[column].rpartition(".")
         if kind in (f"{letter}x", f"{letter}y", f"{letter}z") and units[column] in TURN:
-            found.setdefault(joint, []).append(column)
-    return found
+            columns_of.setdefault(joint, []).append(column)
+    return columns_of
 
 
 def resampled(values: Array, ratio: float, to_end: bool = False) -> Array:
@@ -259,8 +259,8 @@ def spline(values: Array, times: Array) -> Array:
     padded = np.concatenate([ends[0], values, ends[1]])
     start, s = _between(values, times)
     a, b, c, d = (padded[start + n] for n in range(4))
-    found: Array = b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
-    return found
+    points: Array = b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
+    return points
 
 
 def _between(values: Array, times: Array) -> tuple[NDArray[np.intp], Array]:

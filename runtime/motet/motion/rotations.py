@@ -160,8 +160,8 @@ def _whole_turns(now: Array, after: Array) -> Array:
     angle, other = (np.linalg.norm(vector, axis=-1, keepdims=True) for vector in (now, after))
     # a rotation by no angle takes the axis of the frame after it
     axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(other, 1e-9))
-    found: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
-    return found
+    turns: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
+    return turns
 
 
 def rotvec_to_rotmat(vector: Array) -> Array:
@@ -232,8 +232,8 @@ def product(left: Array, right: Array) -> Array:
 
 def rotated(rotations: Array, vectors: Array) -> Array:
     """Vectors (..., 3) rotated by rotations (..., 3, 3)."""
-    found: Array = np.einsum("...ij,...j->...i", rotations, vectors)
-    return found
+    turned: Array = np.einsum("...ij,...j->...i", rotations, vectors)
+    return turned
 
 
 def inverse(rotations: Array) -> Array:
@@ -278,33 +278,33 @@ def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """Products of quaternions (..., 4): the right rotation first, then the left."""
     a = left[..., :3]
     b = right[..., :3]
-    found = np.empty(np.broadcast_shapes(left.shape, right.shape), dtype=left.dtype)
-    found[..., :3] = left[..., 3:] * b + right[..., 3:] * a + cross(a, b)
-    found[..., 3] = left[..., 3] * right[..., 3] - (a * b).sum(axis=-1)
-    return found
+    products = np.empty(np.broadcast_shapes(left.shape, right.shape), dtype=left.dtype)
+    products[..., :3] = left[..., 3:] * b + right[..., 3:] * a + cross(a, b)
+    products[..., 3] = left[..., 3] * right[..., 3] - (a * b).sum(axis=-1)
+    return products
 
 
 def quat_rotated(quats: NDArray[Any], vectors: NDArray[Any]) -> NDArray[Any]:
     """Vectors (..., 3) rotated by unit quaternions (..., 4)."""
     axis = quats[..., :3]
     twice = 2 * cross(axis, vectors)
-    found: NDArray[Any] = vectors + quats[..., 3:] * twice + cross(axis, twice)
-    return found
+    turned: NDArray[Any] = vectors + quats[..., 3:] * twice + cross(axis, twice)
+    return turned
 
 
 def cross(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
     """Cross products of vectors (..., 3); numpy's own takes several times as long for small arrays."""
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=a.dtype)
-    found[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    found[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    found[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return found
+    products = np.empty(np.broadcast_shapes(a.shape, b.shape), dtype=a.dtype)
+    products[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    products[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    products[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return products
 
 
 def conjugate(quats: NDArray[Any]) -> NDArray[Any]:
     """The inverse rotations (..., 4)."""
-    found: NDArray[Any] = quats * np.array([-1, -1, -1, 1], dtype=quats.dtype)
-    return found
+    inverses: NDArray[Any] = quats * np.array([-1, -1, -1, 1], dtype=quats.dtype)
+    return inverses
 
 
 def wrapped(angle: NDArray[Any]) -> NDArray[Any]:

@@ -98,10 +98,10 @@ class Skeleton:
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """For each joint the indices of its children."""
-        found: list[list[int]] = [[] for _ in self.joints]
+        children: list[list[int]] = [[] for _ in self.joints]
         for i, joint in enumerate(self.joints[1:], start=1):
-            found[joint.parent].append(i)
-        return tuple(map(tuple, found))
+            children[joint.parent].append(i)
+        return tuple(map(tuple, children))
 
     @cached_property
     def levels(self) -> tuple[NDArray[np.intp], ...]:
@@ -137,10 +137,10 @@ class Skeleton:
 
     def subtree(self, name: str) -> tuple[int, ...]:
         """Indices of a joint and all its descendants."""
-        found = [self.index(name)]
-        for i in found:
-            found.extend(self.children[i])
-        return tuple(sorted(found))
+        joints = [self.index(name)]
+        for i in joints:
+            joints.extend(self.children[i])
+        return tuple(sorted(joints))
 
     def ancestors(self, joint: int) -> list[int]:
         """Indices of a joint and all that it hangs on, upwards to the root."""
@@ -213,19 +213,30 @@ def sides_of(names: Sequence[str]) -> tuple[str, ...]:
 
 def _partners(names: Sequence[str]) -> list[tuple[int, str]]:
     """For each name the index of its partner and the side that it is on itself."""
-    patterns = (
-        r"left|Left|LEFT|right|Right|RIGHT",  # LeftArm, arm_left, mixamorig:RightHand
-        r"(?<![A-Za-z])[lLrR](?![A-Za-z])",  # L_Arm, arm.R, "Bip01 L Thigh"
-        r"^[lr](?=[A-Za-z])|^[LR](?=[A-Z])",  # lfemur, RThigh
-        r"(?<=[a-z])[LR]$",  # armL
-    )
-    pairs = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
-    other = dict(pairs) | {right: left for left, right in pairs}
     places = {name: place for place, name in enumerate(names)}
-    found = []
-    for place, name in enumerate(names):
-        matches = (match for pattern in patterns for match in re.finditer(pattern, name))
-        swapped = ((name[: m.start()] + other[m[0]] + name[m.end() :], m[0][0]) for m in matches)
-        partners = ((places[partner], LEFT if own in "lL" else RIGHT) for partner, own in swapped if partner in places)
-        found.append(next(partners, (place, MIDDLE)))
-    return found
+    return [_partner(place, name, places) for place, name in enumerate(names)]
+
+
+SIDE_PATTERNS = (
+    r"left|Left|LEFT|right|Right|RIGHT",  # LeftArm, arm_left, mixamorig:RightHand
+    r"(?<![A-Za-z])[lLrR](?![A-Za-z])",  # L_Arm, arm.R, "Bip01 L Thigh"
+    r"^[lr](?=[A-Za-z])|^[LR](?=[A-Z])",  # lfemur, RThigh
+    r"(?<=[a-z])[LR]$",  # armL
+)
+"""Patterns of the words for sides in names of joints, the clearest first."""
+
+SIDE_WORDS = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
+"""Words for the left and for the right."""
+
+OTHER_SIDE = dict(SIDE_WORDS) | {right: left for left, right in SIDE_WORDS}
+"""For each word for a side the word for the other."""
+
+
+def _partner(place: int, name: str, places: Mapping[str, int]) -> tuple[int, str]:
+    """The index of a name's partner and the side of the name itself; its own index and the middle if there is none."""
+    for pattern in SIDE_PATTERNS:
+        for match in re.finditer(pattern, name):
+            swapped = name[: match.start()] + OTHER_SIDE[match[0]] + name[match.end() :]
+            if swapped in places:
+                return places[swapped], LEFT if match[0][0] in "lL" else RIGHT
+    return place, MIDDLE

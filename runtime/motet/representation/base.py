@@ -86,12 +86,12 @@ def mirror_by_joints(features: Motion, signs: Mapping[str, float]) -> FrameMirro
     joints = joints_with(features.channels, next(iter(signs)))
     places = {name: column for column, name in enumerate(features.channels)}
     columns = np.arange(len(places))
-    found = root_signs(features.channels)
+    signs_of_columns = root_signs(features.channels)
     for joint, partner in zip(joints, partners_of(joints), strict=True):
         for kind, sign in signs.items():
             columns[places[f"{joint}.{kind}"]] = places[f"{joints[partner]}.{kind}"]
-            found[places[f"{joint}.{kind}"]] = sign
-    return FrameMirror(columns, found)
+            signs_of_columns[places[f"{joint}.{kind}"]] = sign
+    return FrameMirror(columns, signs_of_columns)
 
 
 def lateral_x(features: Motion) -> Skeleton:

@@ -83,8 +83,8 @@ class MotionContract:
 
         plant: let the feet say where the figure goes, in representations of generated motions.
         """
-        found = Motion(np.asarray(frames, dtype=np.float64), self.channels, self.units, self.fps, self.skeleton)
-        return named(self.representation).planted(found) if plant else found
+        features = Motion(np.asarray(frames, dtype=np.float64), self.channels, self.units, self.fps, self.skeleton)
+        return named(self.representation).planted(features) if plant else features
 
     def frames(self, motion: Motion) -> Array:
         """The frames (T, D) float64 of a motion, of any length, or of features.
@@ -181,5 +181,5 @@ def sequences(representation: str, motion: Motion, fps: float, like: Motion | No
 def living(std: ArrayLike, units: Sequence[str]) -> Array:
     """Standard deviations (D,) of training data, 0 where they are under the floor of their unit."""
     floors = np.array([LIVING_STD[unit] for unit in units])
-    found: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
-    return found
+    living_std: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
+    return living_std

@@ -37,17 +37,18 @@ def placed_by_way(frames: Array, fps: float) -> Array:
     steps = frames[..., :ROOT_PLACE] / fps
     steps[..., :1, :] = 0
     forward, left, turn = np.moveaxis(steps, -1, 0)
-    now = np.cumsum(turn, axis=-1)
-    sin = np.sin(now - turn)
-    cos = np.cos(now - turn)
-    x, z = (np.cumsum(step, axis=-1) for step in (forward * sin + left * cos, forward * cos - left * sin))
-    found = np.empty((*frames.shape[:-1], frames.shape[-1] - 1))
-    found[..., 0] = x
-    found[..., 1] = frames[..., ROOT_PLACE]
-    found[..., 2] = z
-    found[..., ROOT_PLACE:] = frames[..., len(ROOT_SIXD) :]
-    _turn(found[..., ROOT_PLACE : ROOT_PLACE + 6], now)
-    return found
+
+    # each step is taken in the facing before it
+    facing = np.cumsum(turn, axis=-1)
+    sin = np.sin(facing - turn)
+    cos = np.cos(facing - turn)
+    placed_frames = np.empty((*frames.shape[:-1], frames.shape[-1] - 1))
+    placed_frames[..., 0] = np.cumsum(forward * sin + left * cos, axis=-1)
+    placed_frames[..., 1] = frames[..., ROOT_PLACE]
+    placed_frames[..., 2] = np.cumsum(forward * cos - left * sin, axis=-1)
+    placed_frames[..., ROOT_PLACE:] = frames[..., len(ROOT_SIXD) :]
+    _turn(placed_frames[..., ROOT_PLACE : ROOT_PLACE + 6], facing)
+    return placed_frames
 
 
 def pose_of(frames: Array) -> Array:
@@ -63,55 +64,63 @@ def pose_of(frames: Array) -> Array:
 
 def seen_from(frames: Array, pose: Array) -> Array:
     """Placed frames (..., T, E) as they are seen from poses (..., 3), which come to the origin and face z."""
-    found = np.array(frames, dtype=np.float64)
-    found[..., 0] -= pose[..., None, 0]
-    found[..., 2] -= pose[..., None, 1]
-    return _turned(found, -pose[..., None, 2])
+    seen = np.array(frames, dtype=np.float64)
+    seen[..., 0] -= pose[..., None, 0]
+    seen[..., 2] -= pose[..., None, 1]
+    return _turned(seen, -pose[..., None, 2])
 
 
 def put_at(frames: Array, pose: Array) -> Array:
     """The inverse of :func:`seen_from`: frames whose origin comes to poses (..., 3)."""
-    found = _turned(np.array(frames, dtype=np.float64), pose[..., None, 2])
-    found[..., 0] += pose[..., None, 0]
-    found[..., 2] += pose[..., None, 1]
-    return found
+    put = _turned(np.array(frames, dtype=np.float64), pose[..., None, 2])
+    put[..., 0] += pose[..., None, 0]
+    put[..., 2] += pose[..., None, 1]
+    return put
 
 
 def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
     """A plain way (..., count, E) from the last of placed frames (..., P, E) to the first of (..., A, E).
 
     Joints turn the shortest way at an even speed (slerp); the root goes on a cubic Hermite curve that leaves and
-    arrives with the velocities it has there. pace: frames of the gap in one of the frames given.
+    arrives with the velocities it has there. pace: frames of the gap per frame of the past.
     """
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
     start = past[..., -1:, :]
     end = after[..., :1, :]
-    sides = (past[..., -4:, :ROOT_PLACE], after[..., :4, :ROOT_PLACE])
-    # the hips' velocities, metres a frame, over 3 frames; 0 where there is only one
-    leaves, arrives = ((side[..., -1:, :] - side[..., :1, :]) / max(1, side.shape[-2] - 1) for side in sides)
+    frames = np.empty((*past.shape[:-2], count, past.shape[-1]))
+
+    # the root's place: a Hermite curve between the velocities at both ends
+    leaves = _root_velocity(past[..., -4:, :ROOT_PLACE])
+    arrives = _root_velocity(after[..., :4, :ROOT_PLACE])
     span = (count + 1) * pace
-    found = np.empty((*past.shape[:-2], count, past.shape[-1]))
-    found[..., :ROOT_PLACE] = (
+    frames[..., :ROOT_PLACE] = (
         (1 + 2 * part) * (1 - part) ** 2 * start[..., :ROOT_PLACE]
         + part * (1 - part) ** 2 * span * leaves
         + part**2 * (3 - 2 * part) * end[..., :ROOT_PLACE]
         - part**2 * (1 - part) * span * arrives
     )
-    one, other = (_rotations(frames) for frames in (start, end))
-    turns = rotmat_to_rotvec(product(inverse(one), other)) * part[..., None]
-    axes = rotmat_to_sixd(np.matmul(one, rotvec_to_rotmat(turns)))
-    found[..., ROOT_PLACE:] = axes.reshape(*found.shape[:-1], found.shape[-1] - ROOT_PLACE)
-    return found
+
+    # the joints: the shortest turn from one end to the other
+    rotations = _rotations(start)
+    turns = rotmat_to_rotvec(product(inverse(rotations), _rotations(end))) * part[..., None]
+    axes = rotmat_to_sixd(np.matmul(rotations, rotvec_to_rotmat(turns)))
+    frames[..., ROOT_PLACE:] = axes.reshape(*frames.shape[:-1], frames.shape[-1] - ROOT_PLACE)
+    return frames
+
+
+def _root_velocity(places: Array) -> Array:
+    """The mean velocity (..., 1, 3) over places (..., T, 3), metres a frame; 0 where there is only one."""
+    return np.asarray((places[..., -1:, :] - places[..., :1, :]) / max(1, places.shape[-2] - 1))
 
 
 def straight(past: Array, after: Array, count: int) -> Array:
     """As :func:`bridge`, the root on a line at an even speed: the plainest interpolation."""
     part = (np.arange(1, count + 1) / (count + 1))[:, None]
-    found = bridge(past, after, count)
+    frames = bridge(past, after, count)
     start = past[..., -1:, :ROOT_PLACE]
     end = after[..., :1, :ROOT_PLACE]
-    found[..., :ROOT_PLACE] = start + part * (end - start)
-    return found
+    frames[..., :ROOT_PLACE] = start + part * (end - start)
+    return frames
 
 
 def unplaced(frames: Array, after: Motion) -> Motion:
@@ -126,10 +135,11 @@ def mirror() -> FrameMirror:
     columns = np.arange(PLACED_CHANNELS)
     signs = np.ones(PLACED_CHANNELS, dtype=np.float32)
     signs[0] = -1
+    kinds = np.arange(len(SIXD_KINDS)) + ROOT_PLACE
     for bone, partner in enumerate(partners_of(BONES)):
-        own, other = (np.arange(len(SIXD_KINDS)) + ROOT_PLACE + len(SIXD_KINDS) * one for one in (bone, partner))
-        columns[own] = other
-        signs[own] = SIXD_SIGNS
+        bone_columns = kinds + len(SIXD_KINDS) * bone
+        columns[bone_columns] = kinds + len(SIXD_KINDS) * partner
+        signs[bone_columns] = SIXD_SIGNS
     return FrameMirror(columns, signs)
 
 

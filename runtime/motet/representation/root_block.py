@@ -119,8 +119,8 @@ def ground_velocities(places: Array, heading: Array, fps: float) -> Array:
     x, z = np.diff(places[:, [0, 2]], axis=0).T
     sin = np.sin(heading[:-1])
     cos = np.cos(heading[:-1])
-    found = np.column_stack([x * sin + z * cos, x * cos - z * sin, np.diff(heading)]) * fps
-    return np.concatenate([found[:1], found])
+    velocities = np.column_stack([x * sin + z * cos, x * cos - z * sin, np.diff(heading)]) * fps
+    return np.concatenate([velocities[:1], velocities])
 
 
 def from_root_block(motion: Motion, after: Motion | None = None) -> Motion:
