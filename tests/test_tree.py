@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 242
+MOST_LARGE_FUNCTIONS = 239
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 350
+MOST_BANNED_NAMES = 310
 MOST_TUPLE_ASSIGNMENTS = 43
-MOST_NESTED_COMPREHENSIONS = 102
+MOST_NESTED_COMPREHENSIONS = 96
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -91,7 +91,7 @@ CEILINGS = {
     "motet.corpus": 9_200,
     "motet.decode": 3_900,
     "motet.draw": 12_000,
-    "motet.figures": 32_300,
+    "motet.figures": 32_400,
     "motet.formats": 37_100,
     "motet.generate": 26_100,
     "motet.live": 5_700,
@@ -99,7 +99,7 @@ CEILINGS = {
     "motet.motion": 16_100,
     "motet.papers": 7_300,
     "motet.predict": 5_400,
-    "motet.representation": 9_400,
+    "motet.representation": 9_600,
     "motet.search": 3_500,
     "motet.serve": 17_000,
     "motet.steering": 37_800,
