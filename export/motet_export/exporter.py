@@ -87,14 +87,9 @@ def _log_silenced() -> Iterator[None]:
 
 def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
     """Strip paths of the building machine, add metadata, check, and serialise a model that needs no other file."""
-    graph = model.graph
-    model.doc_string = graph.doc_string = ""
-    # doc strings and metadata of nodes hold source paths
-    for items in (graph.node, graph.initializer, graph.input, graph.output, graph.value_info):
-        for item in items:
-            item.doc_string = ""
-            del item.metadata_props[:]
-    del graph.metadata_props[:], model.metadata_props[:]
+    model.doc_string = ""
+    del model.metadata_props[:]
+    _strip(model.graph)
     for key, value in metadata.items():
         model.metadata_props.add(key=key, value=value)
     # the first IR version with this opset, which every ONNX Runtime from 1.14 on reads
@@ -109,6 +104,22 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
     except BundleError as error:
         raise ExportError(f"the exported graph would be refused: {error}") from error
     return data
+
+
+def _strip(graph: onnx.GraphProto) -> None:
+    """Remove doc strings and metadata, which hold source paths, from a graph and the bodies of its Scan and If."""
+    graph.doc_string = ""
+    del graph.metadata_props[:]
+    for items in (graph.node, graph.initializer, graph.input, graph.output, graph.value_info):
+        for item in items:
+            item.doc_string = ""
+            del item.metadata_props[:]
+    for node in graph.node:
+        for attribute in node.attribute:
+            attribute.doc_string = ""
+            for body in (attribute.g, *attribute.graphs):
+                if body.node:
+                    _strip(body)
 
 
 @torch.no_grad()

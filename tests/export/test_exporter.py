@@ -7,7 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
-from motet_export.exporter import ExportError, export_graph
+from motet_export.exporter import ExportError, export_graph, self_contained
 from motet_export.parity import check_carried, check_one_step, error
 from motet_train.runs import TorchGraph
 
@@ -78,3 +78,28 @@ def test_error_is_relative_to_large_outputs_and_refuses_what_is_not_finite() -> 
         error({"a": np.array([np.nan])}, {"a": np.array([0.0])})
     with pytest.raises(ExportError, match="shape"):
         error({"a": np.zeros(2)}, {"a": np.zeros(3)})
+
+
+def test_the_bodies_of_loops_are_stripped(exported: bytes) -> None:
+    float32 = onnx.TensorProto.FLOAT
+    helper = onnx.helper
+    body = helper.make_graph(
+        [helper.make_node("Add", ["state", "x"], ["sum"]), helper.make_node("Identity", ["sum"], ["y"])],
+        "body",
+        [helper.make_tensor_value_info(name, float32, [1]) for name in ("state", "x")],
+        [helper.make_tensor_value_info(name, float32, [1]) for name in ("sum", "y")],
+    )
+    body.node[0].metadata_props.add(key="pkg.torch.onnx.stack_trace", value='File "/home/me/net.py", line 1')
+    scan = helper.make_node("Scan", ["start", "xs"], ["last", "ys"], num_scan_inputs=1, body=body)
+    inputs = [
+        helper.make_tensor_value_info("start", float32, [1]),
+        helper.make_tensor_value_info("xs", float32, [5, 1]),
+    ]
+    outputs = [
+        helper.make_tensor_value_info("last", float32, [1]),
+        helper.make_tensor_value_info("ys", float32, [5, 1]),
+    ]
+    graph = helper.make_graph([scan], "graph", inputs, outputs)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=8)
+    assert b".py" in model.SerializeToString()
+    assert b".py" not in self_contained(model, {})
