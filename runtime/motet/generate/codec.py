@@ -24,19 +24,22 @@ REACH = 0.5
 
 def moved(pose: Array, move: Array) -> Array:
     """The poses (..., 3) that moves (..., 3) lead to."""
-    sin, cos = np.sin(pose[..., 2]), np.cos(pose[..., 2])
+    sin = np.sin(pose[..., 2])
+    cos = np.cos(pose[..., 2])
     x = pose[..., 0] + move[..., 0] * sin + move[..., 1] * cos
     z = pose[..., 1] + move[..., 0] * cos - move[..., 1] * sin
-    found: Array = np.stack([x, z, pose[..., 2] + move[..., 2]], axis=-1)
-    return found
+    poses: Array = np.stack([x, z, pose[..., 2] + move[..., 2]], axis=-1)
+    return poses
 
 
 def seen_from(pose: Array, other: Array) -> Array:
     """The moves (..., 3) that lead from poses (..., 3) to others: :func:`moved` undone. Turns are not wrapped."""
-    sin, cos = np.sin(pose[..., 2]), np.cos(pose[..., 2])
-    x, z = other[..., 0] - pose[..., 0], other[..., 1] - pose[..., 1]
-    found: Array = np.stack([x * sin + z * cos, x * cos - z * sin, other[..., 2] - pose[..., 2]], axis=-1)
-    return found
+    sin = np.sin(pose[..., 2])
+    cos = np.cos(pose[..., 2])
+    x = other[..., 0] - pose[..., 0]
+    z = other[..., 1] - pose[..., 1]
+    moves: Array = np.stack([x * sin + z * cos, x * cos - z * sin, other[..., 2] - pose[..., 2]], axis=-1)
+    return moves
 
 
 def way_of(start: Array, moves: Array) -> Array:
@@ -52,13 +55,16 @@ def nearest_moves(poses: Array, book: Array) -> tuple[NDArray[np.int64], Array]:
 
     The way starts at the first pose; each entry is the one that leads nearest to the next pose from where the way is.
     """
-    scale, way, found = np.array([1.0, 1.0, REACH]), [poses[..., 0, :]], []
+    scale = np.array([1.0, 1.0, REACH])
+    way = [poses[..., 0, :]]
+    entries = []
     for place in range(1, poses.shape[-2]):
         wanted = seen_from(way[-1], poses[..., place, :])
         off = ((wanted[..., None, :] - book) * scale) ** 2
-        found.append(off.sum(axis=-1).argmin(axis=-1))
-        way.append(moved(way[-1], book[found[-1]]))
-    return np.stack(found, axis=-1), np.stack(way, axis=-2)
+        entry = off.sum(axis=-1).argmin(axis=-1)
+        entries.append(entry)
+        way.append(moved(way[-1], book[entry]))
+    return np.stack(entries, axis=-1), np.stack(way, axis=-2)
 
 
 PATH = 3
@@ -159,41 +165,54 @@ class StreamingDecoder:
         self.codes = [] if context is None else list(context.codes)
         self.given = None if context is None else context.frames[-2:]
         self.count = max(0, len(self.codes) - 1)  # steps of which frames were given; the last is decoded to be joined
-        self.way, self.pose = np.zeros((1, 3)), np.zeros((0, PATH))
+        self.way = np.zeros((1, 3))
+        self.pose = np.zeros((0, PATH))
         self.join: Inertialization | None = None
 
     def push(self, steps: Ids) -> Array:
         """Frames (T, D) that further steps settle; none at first."""
         self.codes += list(steps)
-        found = self._settled(len(self.codes) - self.codec.field.ahead)
+        frames = self._settled(len(self.codes) - self.codec.field.ahead)
         over = max(0, self.count - self.codec.field.back)  # out of sight
-        self.codes, self.count = self.codes[over:], self.count - over
-        return found
+        self.codes = self.codes[over:]
+        self.count -= over
+        return frames
 
     def finish(self) -> Array:
         """The remaining frames, with nothing to follow."""
         return self._settled(len(self.codes))
 
     def _settled(self, until: int) -> Array:
-        codec, hop = self.codec, self.codec.field.hop
+        """The frames of steps up to one, which nothing that follows changes any more."""
         if until <= self.count:
-            return np.empty((0, codec.decoder.spec.output("frames").size(-1)))
-        start = max(0, self.count - codec.field.back)
-        part = np.array(self.codes[start : until + codec.field.ahead])
-        found = codec.decoder({"codes": np.stack([part, part])})  # two rows: a lone one is rounded differently
-        moves = found["moves"][0].astype(np.float64)
-        frames = found["frames"][0, self.count - start : until - start].astype(np.float64)
-        way = way_of(self.way[-1], moves[self.count - start : until - start])
-        self.way, self.count = way[-1:], until
-        # the root, seen from the way, as rates
-        poses = moved(way[:-1, None], frames[..., :PATH]).reshape(-1, PATH)
+            return np.empty((0, self.codec.decoder.spec.output("frames").size(-1)))
+        # The steps, and those that the decoder looks back and ahead at; two rows, as a lone one is rounded differently.
+        start = max(0, self.count - self.codec.field.back)
+        steps = np.array(self.codes[start : until + self.codec.field.ahead])
+        decoded = self.codec.decoder({"codes": np.stack([steps, steps])})
+        new = slice(self.count - start, until - start)
+        moves = decoded["moves"][0, new].astype(np.float64)
+        frames = decoded["frames"][0, new].astype(np.float64)
+        self.count = until
+        # The root, which the decoder gives as seen from the way, as rates.
+        rates = self._rates(moves, frames[..., :PATH])
+        frames = np.concatenate([rates, frames.reshape(len(rates), -1)[:, PATH:]], axis=1)
+        if self.given is not None:
+            # The first step is the motion's last one: the offset between the two fades from the frames after it.
+            hop = self.codec.field.hop
+            self.join = Inertialization(self.given, frames[hop - 2 : hop], self.codec.fps, self.codec.half_life)
+            self.given = None
+            frames = frames[hop:]
+        return frames if self.join is None else self.join(frames)
+
+    def _rates(self, moves: Array, root: Array) -> Array:
+        """The root's rates (T, 3) a second in frames (N, T / N, 3) seen from the way by moves (N, 3)."""
+        way = way_of(self.way[-1], moves)
+        self.way = way[-1:]
+        poses = moved(way[:-1, None], root).reshape(-1, PATH)
         earlier = self.pose if len(self.pose) else poses[:1]
-        rates = seen_from(np.concatenate([earlier, poses[:-1]]), poses) * codec.fps
+        rates = seen_from(np.concatenate([earlier, poses[:-1]]), poses) * self.codec.fps
         if not len(self.pose):
             rates[:1] = rates[1:2]
         self.pose = poses[-1:]
-        frames = np.concatenate([rates, frames.reshape(len(poses), -1)[:, PATH:]], axis=1)
-        if self.given is not None:
-            self.join = Inertialization(self.given, frames[hop - 2 : hop], codec.fps, codec.half_life)
-            self.given, frames = None, frames[hop:]
-        return frames if self.join is None else self.join(frames)
+        return rates
