@@ -42,7 +42,10 @@ class TwoBones:
     def __init__(self, hip: Vector, knee: Vector, ankle: Vector, hinge: Vector) -> None:
         self.hip = hip
         self.ankle = ankle
-        self._along, self._down = along, down = minus(knee, hip), minus(ankle, knee)
+        along = minus(knee, hip)
+        down = minus(ankle, knee)
+        self._along = along
+        self._down = down
         upper = dot(along, along)
         lower = dot(down, down)
         self._axis = unit(minus(hinge, times(along, dot(hinge, along) / upper)))
@@ -88,8 +91,9 @@ class TwoBones:
         aside = dot(cross(self._along, self._down), self._axis)
         by = 1 / larger(root(now * now + aside * aside), 1e-300)
         # the cosine and sine of the difference of the angles, and half of it
-        cosine, sine = (cosine * now + sine * aside) * by, (sine * now - cosine * aside) * by
-        half = 1 + cosine
-        sine = where(half > 1e-12, sine, 1.0)
+        turn_cosine = (cosine * now + sine * aside) * by
+        turn_sine = (sine * now - cosine * aside) * by
+        half = 1 + turn_cosine
+        sine = where(half > 1e-12, turn_sine, 1.0)
         x, y, z = times(self._axis, sine)
         return normalised((x, y, z, half))

@@ -270,10 +270,10 @@ def _between(values: Array, times: Array) -> tuple[NDArray[np.intp], Array]:
     return start, (times - start).reshape(-1, *[1] * (values.ndim - 1))
 
 
-def motions_of(given: Motion | Iterable[Motion]) -> list[Motion]:
+def motions_of(source: Motion | Iterable[Motion]) -> list[Motion]:
     """A motion, or several, as a list; ArgumentError for anything else."""
     motions: list[Motion] = []
-    for motion in given if is_many(given) and not isinstance(given, Motion) else [given]:
+    for motion in source if is_many(source) and not isinstance(source, Motion) else [source]:
         if not isinstance(motion, Motion):
             remedy = ": motet.read() reads a file" if isinstance(motion, str | PathLike) else ""
             raise ArgumentError(f"expected a motion, not {quoted(repr(motion))}{remedy}")
@@ -289,6 +289,6 @@ def with_frames(motion: Motion) -> Motion:
     return motion
 
 
-def is_many(given: object) -> bool:
+def is_many(source: object) -> bool:
     """Whether something is several things, and no text."""
-    return isinstance(given, Iterable) and not isinstance(given, str | bytes)
+    return isinstance(source, Iterable) and not isinstance(source, str | bytes)

@@ -103,16 +103,16 @@ def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
     # steps of less than a sixth of a turn are nearer than the other solution, of which two angles are half a turn off
     leaping = (np.abs(np.diff(result, axis=0)) > turn / 6).any(axis=(0, -1))
     if leaping.any():
-        own = result[:, leaping]
+        leaping_angles = result[:, leaping]
         turn = turn[leaping]
-        flipped = own * [1, -1, 1] + turn / 2
+        flipped = leaping_angles * [1, -1, 1] + turn / 2
         # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend
         # on which of them the frame before took
-        stay, change = ((then - own[:-1]) / turn for then in (own[1:], flipped[1:]))
+        stay, change = ((then - leaping_angles[:-1]) / turn for then in (leaping_angles[1:], flipped[1:]))
         stay, change = (2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1) for turns in (stay, change))
         changed = np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1
-        own[1:] = np.where(changed[..., None], flipped[1:], own[1:])
-        result[:, leaping] = without_turns(own, turn)
+        leaping_angles[1:] = np.where(changed[..., None], flipped[1:], leaping_angles[1:])
+        result[:, leaping] = without_turns(leaping_angles, turn)
     return result
 
 

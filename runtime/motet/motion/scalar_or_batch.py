@@ -37,8 +37,8 @@ def single(values: NDArray[Any]) -> Part:
 
 def computed(function: np.ufunc, *values: Part) -> Part:
     """A function of numpy's, of floats a float, rounded as it is in arrays."""
-    found = function(*values)
-    return float(found) if isinstance(found, float) else found
+    result = function(*values)
+    return float(result) if isinstance(result, float) else result
 
 
 def where(condition: Any, yes: Part, no: Part) -> Part:
@@ -48,14 +48,14 @@ def where(condition: Any, yes: Part, no: Part) -> Part:
     return np.where(condition, yes, no)
 
 
-def larger(one: Part, other: Part) -> Part:
+def larger(a: Part, b: Part) -> Part:
     """The larger of two."""
-    return max(one, other) if isinstance(one, float) else np.maximum(one, other)
+    return max(a, b) if isinstance(a, float) else np.maximum(a, b)
 
 
-def smaller(one: Part, other: Part) -> Part:
+def smaller(a: Part, b: Part) -> Part:
     """The smaller of two."""
-    return min(one, other) if isinstance(one, float) else np.minimum(one, other)
+    return min(a, b) if isinstance(a, float) else np.minimum(a, b)
 
 
 def clipped(value: Part, low: Part, high: Part) -> Part:
@@ -111,7 +111,8 @@ def unit(a: Vector) -> Vector:
 
 def product(left: Quaternion, right: Quaternion) -> Quaternion:
     """The right rotation first, then the left."""
-    (a, b, c, d), (x, y, z, w) = left, right
+    a, b, c, d = left
+    x, y, z, w = right
     return (
         d * x + w * a + b * z - c * y,
         d * y + w * b + c * x - a * z,
@@ -122,7 +123,8 @@ def product(left: Quaternion, right: Quaternion) -> Quaternion:
 
 def rotated(quat: Quaternion, vector: Vector) -> Vector:
     """A vector rotated by a unit quaternion."""
-    (x, y, z, w), (a, b, c) = quat, vector
+    x, y, z, w = quat
+    a, b, c = vector
     p = 2 * (y * c - z * b)
     q = 2 * (z * a - x * c)
     r = 2 * (x * b - y * a)
@@ -143,8 +145,8 @@ def rotated_axis(quat: Quaternion, axis: int) -> Vector:
     w = quat[3]
     p = 2 * j
     q = 2 * k
-    found = 1 - j * p - k * q, i * p + w * q, i * q - w * p
-    return found[-axis], found[1 - axis], found[2 - axis]
+    columns = 1 - j * p - k * q, i * p + w * q, i * q - w * p
+    return columns[-axis], columns[1 - axis], columns[2 - axis]
 
 
 def inverse(quat: Quaternion) -> Quaternion:
@@ -162,7 +164,8 @@ def normalised(quat: Quaternion) -> Quaternion:
 
 def swing(start: Vector, end: Vector) -> Quaternion:
     """The shortest rotation from one direction to another; half a turn is about any axis, and none from or to 0."""
-    both, (x, y, z) = root(dot(start, start) * dot(end, end)), start
+    both = root(dot(start, start) * dot(end, end))
+    x, y, z = start
     cosine = both + dot(start, end)
     half = cosine < 1e-6 * both
     a, b, c = cross(start, end)

@@ -81,10 +81,10 @@ class Angles(Representation):
         count = len(features.channels)
         probe = Motion(np.arange(1.0, count + 1)[None], features.channels, features.units, 1.0, features.skeleton)
         mirrored = mirror(probe)
-        found = np.abs(mirrored.values[0])
-        if mirrored.channels != probe.channels or not np.array_equal(np.sort(found), probe.values[0]):
+        sources = np.abs(mirrored.values[0])
+        if mirrored.channels != probe.channels or not np.array_equal(np.sort(sources), probe.values[0]):
             raise MotionError("left and right joints turn about different axes: frames cannot be mirrored by columns")
-        return FrameMirror(found.astype(np.intp) - 1, np.sign(mirrored.values[0]).astype(np.float32))
+        return FrameMirror(sources.astype(np.intp) - 1, np.sign(mirrored.values[0]).astype(np.float32))
 
 
 ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pitch", "root.roll")
@@ -229,11 +229,11 @@ class RootAngles(Representation):
         """The joints as :class:`motet.representation.root_block.Angles` does it."""
         lateral_x(features)
         joints = np.flatnonzero([name not in ROOT_BLOCK for name in features.channels])
-        found = Angles().mirror(features.select(tuple(features.channels[d] for d in joints)))
+        by_joints = Angles().mirror(features.select(tuple(features.channels[d] for d in joints)))
         columns = np.arange(len(features.channels))
         signs = root_signs(features.channels)
-        columns[joints] = joints[found.columns]
-        signs[joints] = found.signs
+        columns[joints] = joints[by_joints.columns]
+        signs[joints] = by_joints.signs
         return FrameMirror(columns, signs)
 
 

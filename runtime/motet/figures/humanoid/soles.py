@@ -65,7 +65,8 @@ class Mesh:
 
     def has_soles(self) -> bool:
         """Whether a foot has points."""
-        return any(joint in self.skin for side in LEFT_RIGHT for joint in self.under(sided(side, "Foot")))
+        joints = self.under(sided("left", "Foot")) + self.under(sided("right", "Foot"))
+        return any(joint in self.skin for joint in joints)
 
     def points(self, turned: Array, places: Array, joints: Iterable[int]) -> Array:
         """The points (T, P, 3) of joints, from rotations (T, J, 3, 3) and positions (T, J, 3) of all joints."""
@@ -74,8 +75,9 @@ class Mesh:
 
     def lowest(self, turned: Array, places: Array) -> Array:
         """The height (T,) of the lowest point of feet, hands and head, without what hangs from the head."""
-        limbs = [sided(side, part) for side in LEFT_RIGHT for part in ("Foot", "Hand")]
-        joints = [joint for bone in limbs for joint in self.under(bone)] + self.under("head")[:1]
+        joints = self.under("head")[:1]
+        for side in LEFT_RIGHT:
+            joints += self.under(sided(side, "Foot")) + self.under(sided(side, "Hand"))
         return np.asarray(self.points(turned, places, joints)[..., 1].min(axis=1))
 
 
