@@ -23,8 +23,8 @@ def place_of(file: File) -> Path:
 
 def files_in(folder: Path, extensions: Collection[str]) -> list[Path]:
     """The files of some types in a folder and all below it, sorted, but for hidden ones."""
-    found = (path for path in folder.rglob("*") if path.suffix.lower() in extensions and path.name[0] != ".")
-    return sorted(path for path in found if path.is_file())
+    paths = (path for path in folder.rglob("*") if path.suffix.lower() in extensions and path.name[0] != ".")
+    return sorted(path for path in paths if path.is_file())
 
 
 def check_place(path: str | Path) -> Path:

@@ -26,14 +26,14 @@ _sent = b""
 """In a process of its own: what it does with each thing, pickled."""
 
 
-def in_order(function: Callable[[T], R], given: Iterable[T], jobs: int | None, few: int = FEW) -> Iterator[R]:
+def in_order(function: Callable[[T], R], items: Iterable[T], jobs: int | None, few: int = FEW) -> Iterator[R]:
     """The results of a function, in the order of what is given, each as soon as those before it are there.
 
     jobs: processes; 1: this one, None: one for each core that may be used. few: fewer things are done in this one. At
     most four results for each process wait, so memory does not grow. What the function raises ends all; what is
     interrupted starts no more. MotetError where a process was killed.
     """
-    first = list(islice(rest := iter(given), few))
+    first = list(islice(rest := iter(items), few))
     jobs = cores() if jobs is None else jobs
     if jobs < 2 or len(first) < few:
         yield from map(function, chain(first, rest))
@@ -41,36 +41,36 @@ def in_order(function: Callable[[T], R], given: Iterable[T], jobs: int | None, f
     with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(pickle.dumps(function),)) as pool:
         waiting: deque[Future[R]] = deque()
         try:
-            for one in chain(first, rest):
-                waiting.append(pool.submit(_do, one))
+            for item in chain(first, rest):
+                waiting.append(pool.submit(_do, item))
                 if len(waiting) > 4 * jobs:
                     yield waiting.popleft().result()
             while waiting:
                 yield waiting.popleft().result()
         except BrokenProcessPool as error:
-            said = "a process was killed, as where memory is short: give fewer --jobs"
-            raise MotetError(said) from error
+            reason = "a process was killed, as where memory is short: give fewer --jobs"
+            raise MotetError(reason) from error
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 def in_batches(
-    function: Callable[[Sequence[T]], Sequence[R]], given: Sequence[T], jobs: int | None, most: int
+    function: Callable[[Sequence[T]], Sequence[R]], items: Sequence[T], jobs: int | None, most: int
 ) -> Iterator[R]:
     """The results of a function of batches, of at most ``most`` things each, one for each thing; else as
     :func:`in_order`."""
-    jobs = 1 if len(given) < FEW else cores() if jobs is None else jobs
-    yield from chain.from_iterable(in_order(function, batches(given, jobs, most), jobs, few=1))
+    jobs = 1 if len(items) < FEW else cores() if jobs is None else jobs
+    yield from chain.from_iterable(in_order(function, batches(items, jobs, most), jobs, few=1))
 
 
-def batches(given: Sequence[T], jobs: int, most: int) -> Iterator[Sequence[T]]:
+def batches(items: Sequence[T], jobs: int, most: int) -> Iterator[Sequence[T]]:
     """Things in batches of at most ``most``, and for several processes of a quarter of each one's share of the rest,
     so that all end at once."""
     start = 0
-    while start < len(given):
-        share = most if jobs == 1 else (len(given) - start) // (4 * jobs)
+    while start < len(items):
+        share = most if jobs == 1 else (len(items) - start) // (4 * jobs)
         stop = start + max(1, min(most, share))
-        yield given[start:stop]
+        yield items[start:stop]
         start = stop
 
 
@@ -84,10 +84,10 @@ class Shard:
     @staticmethod
     def parse(text: str) -> "Shard":
         """Read "3/16"; SettingError for anything else."""
-        found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
-        if found is None or not 1 <= int(found[1]) <= int(found[2]):
+        match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+        if match is None or not 1 <= int(match[1]) <= int(match[2]):
             raise SettingError(f"a shard is a number and how many there are, such as 3/16, not {text!r}")
-        return Shard(int(found[1]), int(found[2]))
+        return Shard(int(match[1]), int(match[2]))
 
     def of(self, things: Sequence[T]) -> Sequence[T]:
         """Those of this shard."""
@@ -111,9 +111,9 @@ def _begin(function: bytes) -> None:
 
 @cache
 def _function() -> Callable[[Any], Any]:
-    found: Callable[[Any], Any] = pickle.loads(_sent)
-    return found
+    function: Callable[[Any], Any] = pickle.loads(_sent)
+    return function
 
 
-def _do(one: Any) -> Any:
-    return _function()(one)
+def _do(item: Any) -> Any:
+    return _function()(item)

@@ -55,17 +55,17 @@ class Settings:
             object.__setattr__(self, name, self.check(name, getattr(self, name)))
 
     @classmethod
-    def read(cls, given: Mapping[str, Any], path: str) -> Self:
+    def read(cls, values: Mapping[str, Any], path: str) -> Self:
         """The settings of a manifest's object at ``path``, and defaults for those that it does not name. BundleError
         with the key of one that is unknown, missing, or out of range."""
-        for name in given:
+        for name in values:
             if name not in cls.RANGES:
                 raise BundleError(f"manifest, {path}.{name}: is unknown; expected one of {', '.join(cls.RANGES)}")
         for field in fields(cls):
-            if field.default is MISSING and field.name not in given:
+            if field.default is MISSING and field.name not in values:
                 raise BundleError(f"manifest, {path}.{field.name}: is missing")
         try:
-            return cls(**given)
+            return cls(**values)
         except SettingError as error:
             raise BundleError(f"manifest, {path}.{error}") from error
 
@@ -91,24 +91,24 @@ def is_number(value: object) -> bool:
 def checked_int(name: str, value: Any, low: int, high: int, error: type[MotetError] = SettingError) -> int:
     """A whole number of Python's or numpy's from ``low`` to ``high``; ``error`` for anything else, True and 2.0 too."""
     try:
-        found = low - 1 if isinstance(value, bool) else operator.index(value)
+        number = low - 1 if isinstance(value, bool) else operator.index(value)
     except TypeError:
-        found = low - 1
-    if not low <= found <= high:
+        number = low - 1
+    if not low <= number <= high:
         raise error(f"{name} must be a whole number from {low} to {high}, not {value!r}")
-    return found
+    return number
 
 
 def seeds_of(seed: Seed, count: int, error: type[MotetError]) -> list[int]:
     """A seed for each of ``count`` rows; ``error`` for a negative one, another number of them, or another type."""
     try:  # arrays look like integers, too: iterables are asked for first
-        given = seed if isinstance(seed, Iterable) else range(operator.index(seed), operator.index(seed) + count)
-        found = list(map(operator.index, given))
+        numbers = seed if isinstance(seed, Iterable) else range(operator.index(seed), operator.index(seed) + count)
+        seeds = list(map(operator.index, numbers))
     except TypeError:
-        found = []
-    if len(found) != count or min(found, default=0) < 0:
+        seeds = []
+    if len(seeds) != count or min(seeds, default=0) < 0:
         raise error(f"expected a seed of 0 or more, or one for each of {count}, not {seed}")
-    return found
+    return seeds
 
 
 def silent(done: int, total: int) -> None:

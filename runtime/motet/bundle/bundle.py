@@ -85,19 +85,19 @@ class Bundle:
 
     def graph(self, role: str, options: SessionOptions | None = None) -> OnnxGraph:
         """The graph of a role ("encoder", "step", ...), checked against its contract."""
-        found = self.manifest.graphs.get(role)
+        graph_entry = self.manifest.graphs.get(role)
         with self.named(f", {role} graph"):
-            if found is None:
+            if graph_entry is None:
                 raise BundleError("there is none")
-            return OnnxGraph(self.read(found.file), found.spec, options)
+            return OnnxGraph(self.read(graph_entry.file), graph_entry.spec, options)
 
     def table(self, name: str) -> NDArray[Any]:
         """A table's array, read-only; BundleError if it differs from its declaration or is not finite."""
-        found = self.manifest.tables[name]
+        table_entry = self.manifest.tables[name]
         with self.named(f", table {name}"):
-            array = array_of(self.read(found.file), found.file, [found.dtype])
-            if array.shape != found.shape:
-                raise BundleError(f"its shape is {list(array.shape)}, declared as {list(found.shape)}")
+            array = array_of(self.read(table_entry.file), table_entry.file, [table_entry.dtype])
+            if array.shape != table_entry.shape:
+                raise BundleError(f"its shape is {list(array.shape)}, declared as {list(table_entry.shape)}")
             if array.dtype.kind == "f" and not (np.abs(array) <= np.float64(LARGEST)).all():
                 raise BundleError(f"some numbers are not between -{LARGEST:g} and {LARGEST:g}")
             return array
@@ -119,8 +119,8 @@ class Bundle:
         try:
             yield
         except BundleError as error:
-            told = str(error).startswith(f"bundle {self.path}")
-            raise error if told else BundleError(f"bundle {self.path}{where}: {error}") from error
+            names_bundle = str(error).startswith(f"bundle {self.path}")
+            raise error if names_bundle else BundleError(f"bundle {self.path}{where}: {error}") from error
 
     def _read(self, name: str, limit: int) -> bytes:
         if name not in self._members.names:
@@ -158,8 +158,11 @@ def list_bundles() -> dict[str, Path]:
         except ImportError as error:
             log.info("the bundles of %s are left out: %s", point.value, error)
     # motet's own come last, and so replace others of their names
-    found = {path.stem: path for folder in reversed(folders) for path in folder.glob("*.zip")}
-    return dict(sorted(found.items()))
+    paths: dict[str, Path] = {}
+    for folder in reversed(folders):
+        for path in folder.glob("*.zip"):
+            paths[path.stem] = path
+    return dict(sorted(paths.items()))
 
 
 def entry(data: bytes) -> FileEntry:

@@ -42,9 +42,9 @@ class Fields:
     def __contains__(self, key: str) -> bool:
         return self.data.get(key) is not None
 
-    def fault(self, wanted: str, found: object, key: str = "") -> BundleError:
+    def fault(self, wanted: str, value: object, key: str = "") -> BundleError:
         """The error that says what must stand at a key, and what stands there."""
-        return BundleError(f"manifest, {self.at(key) or 'all of it'}: must be {wanted}, not {reprlib.repr(found)}")
+        return BundleError(f"manifest, {self.at(key) or 'all of it'}: must be {wanted}, not {reprlib.repr(value)}")
 
     def at(self, key: str) -> str:
         """The path of a key."""
@@ -58,62 +58,62 @@ class Fields:
 
     def text(self, key: str) -> str:
         """A string."""
-        found = self.value(key)
-        if not isinstance(found, str):
-            raise self.fault("a string", found, key)
-        return found
+        value = self.value(key)
+        if not isinstance(value, str):
+            raise self.fault("a string", value, key)
+        return value
 
     def one_of(self, key: str, allowed: Collection[str]) -> str:
         """One of the allowed strings."""
-        found = self.text(key)
-        if found not in allowed:
-            raise self.fault(f"one of {', '.join(allowed)}", found, key)
-        return found
+        text = self.text(key)
+        if text not in allowed:
+            raise self.fault(f"one of {', '.join(allowed)}", text, key)
+        return text
 
     def number(self, key: str, low: float = -LARGEST, high: float = LARGEST) -> float:
         """A number between two others."""
-        found = self.value(key)
-        if not is_number(found) or not low <= found <= high:
-            raise self.fault(f"a number between {low:g} and {high:g}", found, key)
-        return float(found)
+        number = self.value(key)
+        if not is_number(number) or not low <= number <= high:
+            raise self.fault(f"a number between {low:g} and {high:g}", number, key)
+        return float(number)
 
     def whole(self, key: str, low: int, high: int) -> int:
         """A whole number between two others."""
-        found = self.value(key)
-        if isinstance(found, bool) or not isinstance(found, int) or not low <= found <= high:
-            raise self.fault(f"a whole number between {low} and {high}", found, key)
-        return found
+        number = self.value(key)
+        if isinstance(number, bool) or not isinstance(number, int) or not low <= number <= high:
+            raise self.fault(f"a whole number between {low} and {high}", number, key)
+        return number
 
     def items(self, key: str) -> list[Any]:
         """A list of anything."""
-        found = self.value(key)
-        if not isinstance(found, list):
-            raise self.fault("a list", found, key)
-        return found
+        items = self.value(key)
+        if not isinstance(items, list):
+            raise self.fault("a list", items, key)
+        return items
 
     def texts(self, key: str) -> tuple[str, ...]:
         """A list of distinct strings."""
-        found = self.items(key)
-        if not all(isinstance(item, str) for item in found):
-            raise self.fault("a list of strings", found, key)
-        if len(set(found)) != len(found):
+        strings = self.items(key)
+        if not all(isinstance(item, str) for item in strings):
+            raise self.fault("a list of strings", strings, key)
+        if len(set(strings)) != len(strings):
             raise BundleError(f"manifest, {self.at(key)}: holds a string twice")
-        return tuple(found)
+        return tuple(strings)
 
     def numbers(self, key: str, count: int, low: float = -LARGEST) -> NDArray[np.float64]:
         """A list of ``count`` numbers as (count,) float64."""
-        found = self.items(key)
-        if len(found) != count:
-            raise BundleError(f"manifest, {self.at(key)}: must hold {count} numbers, not {len(found)}")
-        for item in found:
+        items = self.items(key)
+        if len(items) != count:
+            raise BundleError(f"manifest, {self.at(key)}: must hold {count} numbers, not {len(items)}")
+        for item in items:
             if not is_number(item) or not low <= item <= LARGEST:
                 raise self.fault(f"numbers between {low:g} and {LARGEST:g}", item, key)
-        return np.array(found, dtype=np.float64)
+        return np.array(items, dtype=np.float64)
 
     def wholes(self, key: str, low: int, high: int) -> tuple[int, ...]:
         """A list of whole numbers between two others."""
-        found = Fields({str(n): item for n, item in enumerate(self.items(key))}, self.at(key))
-        return tuple(found.whole(n, low, high) for n in found.data)
+        numbers = Fields({str(n): item for n, item in enumerate(self.items(key))}, self.at(key))
+        return tuple(numbers.whole(n, low, high) for n in numbers.data)
 
     def table(self, key: str, columns: int) -> NDArray[np.float64]:
         """A list of lists of ``columns`` numbers as (rows, columns) float64."""
@@ -130,8 +130,8 @@ class Fields:
 
     def entries(self, key: str) -> Iterator[tuple[str, "Fields"]]:
         """The objects of an object, by name; none where there is none."""
-        found = Fields(self.mapping(key), self.at(key))
-        return ((name, found.fields(name)) for name in found.data)
+        objects = Fields(self.mapping(key), self.at(key))
+        return ((name, objects.fields(name)) for name in objects.data)
 
     def list_of_fields(self, key: str) -> "list[Fields]":
         """A list of objects."""

@@ -31,7 +31,7 @@ class Replayable(Protocol):
 
     graphs: Mapping[str, Graph]
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The outputs of the whole run."""
 
     def meaning(self, frames: Array) -> Arrays:
@@ -39,18 +39,20 @@ class Replayable(Protocol):
 
 
 def vectors(
-    model: Replayable, feeds: Mapping[str, Arrays], given: Arrays, settings: Mapping[str, Any], frames: Array
+    model: Replayable, feeds: Mapping[str, Arrays], run_inputs: Arrays, settings: Mapping[str, Any], frames: Array
 ) -> bytes:
     """The golden vectors of a model: of its graphs from the ``feeds`` of each role, of a run, and of the meaning of
     ``frames`` (T, D)."""
     arrays: dict[str, Arrays] = {}
     for role, inputs in feeds.items():
         arrays |= {f"{role}.in": inputs, f"{role}.out": model.graphs[role](inputs)}
-    arrays |= {"run.in": given, "run.out": model.replay(given, settings)}
+    arrays |= {"run.in": run_inputs, "run.out": model.replay(run_inputs, settings)}
     arrays |= {f"{MEANING}.in": {"frames": frames}, f"{MEANING}.out": model.meaning(frames)}
-    return archive_bytes(
-        {f"{a}.{b}.npy": array_bytes(value) for a, part in arrays.items() for b, value in part.items()}
-    )
+    members: dict[str, bytes] = {}
+    for prefix, part in arrays.items():
+        for name, array in part.items():
+            members[f"{prefix}.{name}.npy"] = array_bytes(array)
+    return archive_bytes(members)
 
 
 def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
@@ -60,20 +62,20 @@ def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
     there was a meaning among them have none.
     """
     arrays = read(data)
-    found = {}
+    differences = {}
     for role, graph in model.graphs.items():
-        found[role] = difference(graph(_part(arrays, f"{role}.in.")), _part(arrays, f"{role}.out."))
+        differences[role] = difference(graph(_part(arrays, f"{role}.in.")), _part(arrays, f"{role}.out."))
     try:
         run = model.replay(_part(arrays, "run.in."), golden.run)
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise BundleError(f"the golden run cannot be replayed: {error}") from error
-    found["run"] = difference(run, _part(arrays, "run.out."))
+    differences["run"] = difference(run, _part(arrays, "run.out."))
     if any(name.startswith(f"{MEANING}.") for name in arrays):
-        found[MEANING] = _meaning_difference(model, arrays)
-    for name, off in found.items():
+        differences[MEANING] = _meaning_difference(model, arrays)
+    for name, off in differences.items():
         if not off <= golden.tolerance:
             raise BundleError(f"golden vectors, {name}: off by {off:.2e}, the tolerance is {golden.tolerance:g}")
-    return found
+    return differences
 
 
 def _meaning_difference(model: Replayable, arrays: Arrays) -> float:
@@ -83,23 +85,23 @@ def _meaning_difference(model: Replayable, arrays: Arrays) -> float:
     return difference(model.meaning(frames), _part(arrays, f"{MEANING}.out."))
 
 
-def difference(found: Arrays, expected: Arrays) -> float:
+def difference(actual: Arrays, expected: Arrays) -> float:
     """The largest |a - b| / max(1, RMS of b, |b|) over arrays of equal names; of whole numbers, infinity for any.
 
     BundleError where shapes or dtypes differ, or a value is not finite.
     """
     largest = 0.0
     for name, array in expected.items():
-        if name not in found or found[name].shape != array.shape or found[name].dtype != array.dtype:
+        if name not in actual or actual[name].shape != array.shape or actual[name].dtype != array.dtype:
             raise BundleError(f"output {name!r} does not have the expected shape or dtype")
-        if not np.isfinite(found[name]).all() or not np.isfinite(array).all():
+        if not np.isfinite(actual[name]).all() or not np.isfinite(array).all():
             raise BundleError(f"output {name!r} is not finite")
         if array.dtype.kind in "bi":
-            largest = largest if np.array_equal(found[name], array) else math.inf
+            largest = largest if np.array_equal(actual[name], array) else math.inf
         elif array.size:
             wanted = array.astype(np.float64)
             scale = np.maximum(max(1.0, math.sqrt(np.mean(np.square(wanted)))), np.abs(wanted))
-            largest = max(largest, float((np.abs(found[name] - wanted) / scale).max()))
+            largest = max(largest, float((np.abs(actual[name] - wanted) / scale).max()))
     return largest
 
 
@@ -107,19 +109,19 @@ def read(data: bytes) -> dict[str, NDArray[Any]]:
     """The arrays of an .npz by name; BundleError where it is damaged, too large, or holds anything but numbers."""
     archive = Archive(data)
     left = 16 << 20
-    found = {}
+    arrays = {}
     dtypes = ("float32", "float64", "int64")
     for member in sorted(archive.names):
         content = archive.read(member, left)
         left -= len(content)
         if left < 0:
             raise BundleError(f"the golden vectors are larger than {16 << 20} bytes")
-        found[member.removesuffix(".npy")] = array_of(content, f"golden vectors, {member}", dtypes)
-    return found
+        arrays[member.removesuffix(".npy")] = array_of(content, f"golden vectors, {member}", dtypes)
+    return arrays
 
 
 def _part(arrays: Arrays, prefix: str) -> dict[str, NDArray[Any]]:
-    found = {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
-    if not found:
+    part = {name.removeprefix(prefix): value for name, value in arrays.items() if name.startswith(prefix)}
+    if not part:
         raise BundleError(f"the golden vectors have no {prefix}*")
-    return found
+    return part

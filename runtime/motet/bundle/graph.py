@@ -71,8 +71,8 @@ class SessionOptions:
         if self.configure is not None:
             self.configure(options)
         options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
-        given = [dict(one) for one in self.provider_options] or None
-        return onnxruntime.InferenceSession(model, options, list(self.providers), given, enable_fallback=0)
+        provider_options = [dict(provider) for provider in self.provider_options] or None
+        return onnxruntime.InferenceSession(model, options, list(self.providers), provider_options, enable_fallback=0)
 
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -151,12 +151,10 @@ class GraphSpec:
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object; :meth:`read` is the inverse."""
-        inputs, outputs = (
-            [{"name": one.name, "dtype": one.dtype, "shape": list(one.shape)} for one in tensors]
-            for tensors in (self.inputs, self.outputs)
-        )
-        found: dict[str, Any] = {"inputs": inputs, "outputs": outputs, "feedback": dict(self.feedback)}
-        return {**found, "start": {name: list(sizes) for name, sizes in self.start.items()}} if self.start else found
+        inputs = list(map(_tensor_json, self.inputs))
+        outputs = list(map(_tensor_json, self.outputs))
+        data: dict[str, Any] = {"inputs": inputs, "outputs": outputs, "feedback": dict(self.feedback)}
+        return {**data, "start": {name: list(sizes) for name, sizes in self.start.items()}} if self.start else data
 
     @staticmethod
     def read(data: Fields) -> "GraphSpec":
@@ -164,24 +162,27 @@ class GraphSpec:
         inputs, outputs = (tuple(map(TensorSpec.read, data.list_of_fields(key))) for key in ("inputs", "outputs"))
         fed, start = (data.fields(key) if key in data else Fields({}) for key in ("feedback", "start"))
         feedback = {name: fed.text(name) for name in fed.data}
-        sizes = {name: tuple(int(size) for size in start.numbers(name, len(start.items(name)))) for name in start.data}
-        found = GraphSpec(inputs, outputs, feedback, sizes)
+        sizes: dict[str, tuple[int, ...]] = {}
+        for name in start.data:
+            sizes[name] = tuple(map(int, start.numbers(name, len(start.items(name)))))
+        graph_spec = GraphSpec(inputs, outputs, feedback, sizes)
         for tensors in (inputs, outputs):
             if len({spec.name for spec in tensors}) != len(tensors):
                 raise BundleError(f"manifest, {data.path}: two tensors have the same name")
         for name, source in feedback.items():
-            given = found.output(source)
-            taken = found.input(name)
-            pairs = zip(given.shape, taken.shape, strict=False)
-            alike = all(b in {a, given.shape[0]} or isinstance(b, str) for a, b in pairs)
-            if given.dtype != taken.dtype or len(given.shape) != len(taken.shape) or not alike:
+            source_tensor = graph_spec.output(source)
+            taken = graph_spec.input(name)
+            pairs = zip(source_tensor.shape, taken.shape, strict=False)
+            alike = all(b in {a, source_tensor.shape[0]} or isinstance(b, str) for a, b in pairs)
+            if source_tensor.dtype != taken.dtype or len(source_tensor.shape) != len(taken.shape) or not alike:
                 raise BundleError(f"manifest, {data.path}.feedback: {source!r} does not fit the input {name!r}")
-        for name, own in sizes.items():
-            shape = found.input(name).shape[1:]
-            fits = len(own) == len(shape) and all(isinstance(b, str) or a == b for a, b in zip(own, shape, strict=True))
-            if name not in feedback or not fits or not all(0 <= size <= MAX_AXIS for size in own):
-                raise BundleError(f"manifest, {data.path}.start: {list(own)} does not fit the state {name!r}")
-        return found
+        for name, state_shape in sizes.items():
+            shape = graph_spec.input(name).shape[1:]
+            fits = len(state_shape) == len(shape)
+            fits = fits and all(isinstance(b, str) or a == b for a, b in zip(state_shape, shape, strict=True))
+            if name not in feedback or not fits or not all(0 <= size <= MAX_AXIS for size in state_shape):
+                raise BundleError(f"manifest, {data.path}.start: {list(state_shape)} does not fit the state {name!r}")
+        return graph_spec
 
 
 def _named(name: str, tensors: tuple[TensorSpec, ...], kind: str) -> TensorSpec:
@@ -240,18 +241,22 @@ class OnnxGraph:
         :data:`motet.bundle.fields.LARGEST`, whose squares would not be.
         """
         try:
-            found = dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
+            outputs = dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
         except Exception as error:
             raise BundleError(f"the graph cannot be run: {str(error).partition(chr(10))[0]}") from error
-        for name, array in found.items():
+        for name, array in outputs.items():
             if array.dtype.kind == "f" and not -LARGEST <= array.min(initial=0) <= array.max(initial=0) <= LARGEST:
                 raise BundleError(f"the graph's output {name!r} is not finite, or beyond {LARGEST:g}")
-        return found
+        return outputs
 
 
 def _sizes(shape: Any) -> tuple[int | None, ...]:
     """A shape with None for dynamic axes."""
     return tuple(axis if isinstance(axis, int) else None for axis in shape)
+
+
+def _tensor_json(tensor: TensorSpec) -> dict[str, Any]:
+    return {"name": tensor.name, "dtype": tensor.dtype, "shape": list(tensor.shape)}
 
 
 Sizes = dict[str, int]
@@ -264,13 +269,13 @@ def bind(
     inputs: Mapping[str, str],
     outputs: Mapping[str, str],
     sizes: Sizes,
-    given: Collection[TensorSpec] = (),
+    provided: Collection[TensorSpec] = (),
 ) -> None:
     """Check a graph's tensors, and note the sizes of axes not known before.
 
     inputs, outputs: shapes by name. A small word is a dynamic axis; a capital letter is a size, the same wherever it
         stands; "*" in front is int64. The graph may have more outputs, and more inputs where something gives them.
-    given: tensors that another graph gives. All other inputs must be fed back, and how they start be known.
+    provided: tensors that another graph gives. All other inputs must be fed back, and how they start be known.
     BundleError names the role, the tensor and what is expected.
     """
     for wanted, find in ((inputs, spec.input), (outputs, spec.output)):
@@ -280,7 +285,7 @@ def bind(
             except BundleError as error:
                 raise BundleError(f"manifest, graphs.{role}: {error}") from error
     for tensor in spec.inputs:
-        if tensor in given or tensor.name in inputs:
+        if tensor in provided or tensor.name in inputs:
             continue
         if tensor.name not in spec.feedback:
             raise BundleError(f"manifest, graphs.{role}: input {tensor.name!r} is neither supplied nor fed back")

@@ -112,8 +112,9 @@ class Manifest:
         motion = read_contract(top.fields("motion"))
         golden = None
         if "golden" in top:
-            given = top.fields("golden")
-            golden = Golden(given.text("file"), given.number("tolerance", 0.0, 1.0), given.mapping("run"))
+            golden_fields = top.fields("golden")
+            tolerance = golden_fields.number("tolerance", 0.0, 1.0)
+            golden = Golden(golden_fields.text("file"), tolerance, golden_fields.mapping("run"))
         texts: dict[str, Any] = {key: top.text(key) for key in ("name", "verb", "model", "loop")}
         records = ("config", "licence", "training", "quality", "parity")
         others: dict[str, Any] = {key: top.mapping(key) for key in records}
@@ -128,9 +129,9 @@ class Manifest:
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             common=_common(top.fields("common")) if "common" in top else {},
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
-            graphs={role: GraphEntry(one.text("file"), GraphSpec.read(one)) for role, one in top.entries("graphs")},
-            tables={name: _table(one) for name, one in top.entries("tables")},
-            files={name: _file(name, one) for name, one in top.entries("files")},
+            graphs={role: _graph(fields) for role, fields in top.entries("graphs")},
+            tables={name: _table(fields) for name, fields in top.entries("tables")},
+            files={name: _file(name, fields) for name, fields in top.entries("files")},
             golden=golden,
             source=top.data,
         )
@@ -147,18 +148,18 @@ class Manifest:
             )
         if version != FORMAT:
             raise BundleError(f"it has the format {version!r}; this motet reads format {FORMAT}")
-        found = Manifest.from_json(data)
-        if found.golden is None or not (found.graphs or found.tables):
+        manifest = Manifest.from_json(data)
+        if manifest.golden is None or not (manifest.graphs or manifest.tables):
             raise BundleError("manifest: it needs graphs or tables, and golden vectors")
         named = {
-            **{f"graphs.{role}.file": g.file for role, g in found.graphs.items()},
-            **{f"tables.{name}.file": t.file for name, t in found.tables.items()},
-            "golden.file": found.golden.file,
+            **{f"graphs.{role}.file": g.file for role, g in manifest.graphs.items()},
+            **{f"tables.{name}.file": t.file for name, t in manifest.tables.items()},
+            "golden.file": manifest.golden.file,
         }
         for key, file in named.items():
-            if file not in found.files:
+            if file not in manifest.files:
                 raise BundleError(f"manifest, {key}: {file!r} is not among its files")
-        return found
+        return manifest
 
 
 def read_contract(data: Fields) -> MotionContract:
@@ -210,6 +211,10 @@ def _control(data: Fields, channels: int) -> Control:
 
 def _common(data: Fields) -> dict[str, str]:
     return {word: data.text(word) for word in data.data}
+
+
+def _graph(data: Fields) -> GraphEntry:
+    return GraphEntry(data.text("file"), GraphSpec.read(data))
 
 
 def _table(data: Fields) -> TableEntry:

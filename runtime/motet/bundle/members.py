@@ -35,14 +35,14 @@ class Folder:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            found = {member.name: member.lstat() for member in path.iterdir()}
+            states = {member.name: member.lstat() for member in path.iterdir()}
         except OSError as error:
             raise BundleError(f"cannot read the folder: {error.strerror}") from error
-        _check({name: state.st_size for name, state in found.items()})
-        for name, state in found.items():
+        _check({name: state.st_size for name, state in states.items()})
+        for name, state in states.items():
             if not stat.S_ISREG(state.st_mode):
                 raise BundleError(f"{name!r} is not a plain file")
-        self.names = frozenset(found)
+        self.names = frozenset(states)
 
     def read(self, name: str, limit: int) -> bytes:
         """One file's bytes, the first ``limit`` + 1 of them where it is longer; BundleError where it cannot be read."""

@@ -12,7 +12,7 @@ import click
 
 from motet.bench.cases import cases
 from motet.bench.machine import Machine, begun
-from motet.bench.measure import LESS, Row, compared
+from motet.bench.measure import LESS, Case, Row, compared
 from motet.bench.profile import with_profiles
 from motet.bundle.bundle import list_bundles
 from motet.bundle.graph import SessionOptions
@@ -41,7 +41,7 @@ def bench(
     force: bool,
     as_json: bool,
     session: SessionOptions,
-    **how: Any,
+    **measure_options: Any,
 ) -> None:
     """Measure a bundle's speed, and torch's where it is installed, in turn; and the machine's own ceilings."""
     old = {} if compare is None else _earlier(compare)
@@ -54,14 +54,15 @@ def bench(
     for key in ("processor", "cores", "versions"):
         if old and old["machine"].get(key) != (now := getattr(machine, key)):
             log.warning("%s: another machine or version: %s %s, now %s", compare, key, old["machine"].get(key), now)
-    found: dict[str, list[Row]] = {}
+    measurements: dict[str, list[Row]] = {}
     for name in list_bundles() if bundle == "all" else [bundle]:
-        found[name] = measured(name, session, machine, **how)
+        measurements[name] = measured(name, session, machine, **measure_options)
         if not as_json:
             click.echo(f"{name} on {', '.join(load(name, session).providers) or 'numpy'}, threads: {session.threads}")
-            _print(found[name], {row["name"]: row["value"] for row in old.get("bundles", {}).get(name, [])}, profile)
+            old_rows = old.get("bundles", {}).get(name, [])
+            _print(measurements[name], {row["name"]: row["value"] for row in old_rows}, profile)
     if as_json:
-        rows = {name: list(map(asdict, of)) for name, of in found.items()}
+        rows = {name: list(map(asdict, of)) for name, of in measurements.items()}
         click.echo(json.dumps({"machine": asdict(machine), "bundles": rows}))
         return
     products = ", ".join(f"{speed:.0f} GFLOP/s by {count}" for count, speed in machine.gflops.items())
@@ -83,12 +84,16 @@ def measured(
     if torch and model.graphs and importlib.util.find_spec("torch"):
         # by name: the runtime does not depend on the training package
         runs = importlib.import_module("motet_train.runs")
-        for who in ("eager", "compiled") if compile else ("eager",):
-            models[who] = runs.torch_model(model, options.threads, compiled=who == "compiled")
+        for torch_mode in ("eager", "compiled") if compile else ("eager",):
+            models[torch_mode] = runs.torch_model(model, options.threads, compiled=torch_mode == "compiled")
     with collected(TextWarning):
-        rows = compared({who: cases(one, motion) for who, one in models.items()}, seconds)
+        rows = compared({torch_mode: cases(candidate, motion) for torch_mode, candidate in models.items()}, seconds)
         if model.graphs:
-            rows = with_profiles(rows, options, lambda given: cases(load(name, given), motion), machine, seconds / 5)
+
+            def cases_with(profile_options: SessionOptions) -> list[Case]:
+                return cases(load(name, profile_options), motion)
+
+            rows = with_profiles(rows, options, cases_with, machine, seconds / 5)
     return rows + begun(name, options)
 
 
@@ -100,8 +105,9 @@ def _print(rows: list[Row], before: dict[str, float], profile: bool) -> None:
         if row.times is not None:
             times = row.times
             line += f"  p95 {times.p95:,.3g} p99 {times.p99:,.3g} mean {times.mean:,.3g} cpu {times.processor:,.3g} ms"
-        for who, one in row.beside.items():
-            line += f"  x{one.ratio:.2f} (cpu x{one.processor_ratio:.2f}) of {who} {one.value:,.1f}"
+        for rival, comparison in row.beside.items():
+            line += f"  x{comparison.ratio:.2f} (cpu x{comparison.processor_ratio:.2f})"
+            line += f" of {rival} {comparison.value:,.1f}"
         if row.share is not None:
             line += f"  {row.gflop:.3g} GFLOP, {100 * row.share:.0f} % of peak"
         if before.get(row.name):
@@ -117,10 +123,10 @@ def _print(rows: list[Row], before: dict[str, float], profile: bool) -> None:
 def _earlier(file: Path) -> dict[str, Any]:
     """What ``--json`` printed."""
     try:
-        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        known = [(row["name"], float(row["value"])) for rows in found["bundles"].values() for row in rows]
-        if not known or not isinstance(found["machine"], dict):
+        report: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        known = [(row["name"], float(row["value"])) for rows in report["bundles"].values() for row in rows]
+        if not known or not isinstance(report["machine"], dict):
             raise ValueError("no rows")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FormatError(file, f"not what motet bench --json prints: {error}") from error
-    return found
+    return report

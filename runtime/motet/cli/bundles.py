@@ -21,16 +21,16 @@ def bundle() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def list_(as_json: bool) -> None:
     """List the installed bundles."""
-    found: list[dict[str, Any]] = []
-    for one in map(Bundle.open, list_bundles().values()):
-        manifest = one.manifest
-        size = sum(entry.size for entry in one.manifest.files.values())
-        about = {"name": one.name, "version": manifest.version, "verb": manifest.verb, "model": manifest.model}
-        found.append({**about, "size": size, "licence": manifest.licence.get("weights")})
+    rows: list[dict[str, Any]] = []
+    for opened in map(Bundle.open, list_bundles().values()):
+        manifest = opened.manifest
+        size = sum(entry.size for entry in opened.manifest.files.values())
+        about = {"name": opened.name, "version": manifest.version, "verb": manifest.verb, "model": manifest.model}
+        rows.append({**about, "size": size, "licence": manifest.licence.get("weights")})
     if as_json:
-        click.echo(json.dumps(found))
+        click.echo(json.dumps(rows))
         return
-    for row in found:
+    for row in rows:
         megabytes = row["size"] / 1e6
         licence = row["licence"] or "not stated"
         click.echo(f"{row['name']:<16} {row['version']:<6} {row['verb']:<10} {megabytes:6.2f} MB  {licence}")
@@ -68,12 +68,13 @@ def _tree(values: dict[str, Any], indent: str = "  ") -> None:
 def verify(name: str, session: SessionOptions) -> None:
     """Check that a bundle works here: its files and graphs, its model, and its golden vectors, replayed."""
     opened = Bundle.open(name)
-    found = verify_bundle(opened, session)
-    worst = max(found.errors, key=found.errors.__getitem__)
-    click.echo(f"{opened.path}: {len(found.files)} files match the manifest")
-    click.echo(f"the model runs on {', '.join(found.providers) or 'numpy alone'}")
+    verified = verify_bundle(opened, session)
+    worst = max(verified.errors, key=verified.errors.__getitem__)
+    click.echo(f"{opened.path}: {len(verified.files)} files match the manifest")
+    click.echo(f"the model runs on {', '.join(verified.providers) or 'numpy alone'}")
     click.echo(
-        f"golden vectors: the largest difference is {found.errors[worst]:.1e} ({worst}), tolerance {found.tolerance:g}"
+        f"golden vectors: the largest difference is {verified.errors[worst]:.1e} ({worst}), "
+        f"tolerance {verified.tolerance:g}"
     )
 
 

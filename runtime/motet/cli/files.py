@@ -40,23 +40,23 @@ class Row:
     """What was found of a file or clip, or None. reason: why it is unreadable or refused."""
 
     source: Source
-    found: Checked | None
+    checked: Checked | None
     reason: str | None
 
     @staticmethod
     def of(answer: Answer) -> "Row":
         """What an answer of :class:`Look` says."""
         source = answer.source
-        found = next(iter(answer.rows), None)
+        checked = next(iter(answer.rows), None)
         unread = answer.error.removeprefix(f"{source.path}: ").removeprefix(f"{source.path}, ")
-        return Row(source, found, found.refused if found else unread)
+        return Row(source, checked, checked.refused if checked else unread)
 
     @property
     def verdict(self) -> str:
         """One word."""
-        if self.found is None:
+        if self.checked is None:
             return "unreadable"
-        return "refused" if self.reason else "understood" if self.found.sure else "unsure"
+        return "refused" if self.reason else "understood" if self.checked.sure else "unsure"
 
 
 @click.command(
@@ -77,7 +77,7 @@ def check(files: tuple[Path, ...], out: Path | None, many: Many, as_json: bool) 
         raise click.UsageError(f"-o is a page: expected a name that ends in .html, not {out.name!r}")
     sources = many.sources(files)
     if out is not None:
-        sources = [replace(one, place=place) for one, place in zip(sources, places(out, sources), strict=True)]
+        sources = [replace(source, place=place) for source, place in zip(sources, places(out, sources), strict=True)]
     if many.parts:
         many.write_part(Check(many.read.options), sources, files, "checking")
     counts: Counter[str] = Counter()
@@ -95,15 +95,16 @@ class Look(Check):
 
     def rows(self, answer: Answer) -> list[Any]:
         """The one row."""
-        (found,), source = super().rows(answer), answer.source
+        (checked,) = super().rows(answer)
+        source = answer.source
         if source.place is not None:
             bare = "as in the file"
             figures = {bare: self.read(answer)}
-            if found.refused is None:
+            if checked.refused is None:
                 figures["as the humanoid"] = to_humanoid(figures[bare]).motion
             title = source.path.name + source.part
             write_many(source.place, list(figures.values()), list(figures), title, bare=[bare])
-        return [found]
+        return [checked]
 
 
 def _counted(rows: Iterable[Row], counts: Counter[str]) -> Iterator[Row]:
@@ -113,7 +114,7 @@ def _counted(rows: Iterable[Row], counts: Counter[str]) -> Iterator[Row]:
 
 
 def _json(row: Row) -> str:
-    return to_json(row.found or {"file": str(row.source.path), "clip": row.source.clip, "error": row.reason})
+    return to_json(row.checked or {"file": str(row.source.path), "clip": row.source.clip, "error": row.reason})
 
 
 COLUMNS = "{:<26}{:>6}{:>8}{:>9}{:>7}{:>11}{:>10}{:>10}{:>7}"
@@ -135,70 +136,70 @@ def _print_text(rows: Iterator[Row], sources: Sequence[Source], counts: Mapping[
             if row.source.part and last is None:
                 click.echo(str(file))
             name = f"  {row.source.part}" if row.source.part else str(file)
-            said = f"{row.verdict}, as above" if row.reason and last and last.reason == row.reason else _line(row)
-            click.echo(f"{name:<{width - 2}}  {said}")
+            line = f"{row.verdict}, as above" if row.reason and last and last.reason == row.reason else _line(row)
+            click.echo(f"{name:<{width - 2}}  {line}")
             last = row
     click.echo(f"{len(sources)} motions: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
 
 
 def _line(row: Row) -> str:
-    found = row.found
-    if found is None or found.refused:
+    checked = row.checked
+    if checked is None or checked.refused:
         return f"{row.verdict}: {row.reason}"
-    figure = f"{found.convention}" if found.sure else f"? {found.convention}"
+    figure = f"{checked.convention}" if checked.sure else f"? {checked.convention}"
     return COLUMNS.format(
         figure if len(figure) < 26 else f"{figure[:24]}…",
-        f"{found.confidence:.2f}",
-        "?" if found.height is None else f"{found.height:.2f}",
-        f"{found.seconds:.2f}",
-        f"{found.fps:g}",
-        _facing(found),
-        _metres(found.ground),
-        "in place" if found.in_place else _metres(found.travel),
-        len(found.notes) or "",
+        f"{checked.confidence:.2f}",
+        "?" if checked.height is None else f"{checked.height:.2f}",
+        f"{checked.seconds:.2f}",
+        f"{checked.fps:g}",
+        _facing(checked),
+        _metres(checked.ground),
+        "in place" if checked.in_place else _metres(checked.travel),
+        len(checked.notes) or "",
     )
 
 
 def _report(row: Row) -> Iterator[str]:
     """All that was found of one motion, as lines."""
-    found = row.found
-    if found is None:
+    checked = row.checked
+    if checked is None:
         return iter((str(row.source), f"  {row.verdict:<9} {row.reason}"))
-    said: list[tuple[str, str]] = []
-    if found.clips:
-        said.append(("clip", f"{found.clip}, {found.clips.index(found.clip or '') + 1} of {len(found.clips)}"))
-    if len(found.figures) > 1:
-        names = ", ".join(found.figures)
-        taken = "the default" if found.figure is None else found.figure
-        said.append(("figures", f"{taken}, of {len(found.figures)}: {names} (--figure)"))
-    said += [("refused", found.refused)] if found.refused else _understood(found)
-    said.append(("length", size(found.frames, found.fps)))
-    said += [("" if number else "assumed", note) for number, note in enumerate(found.notes)]
+    facts: list[tuple[str, str]] = []
+    if checked.clips:
+        facts.append(("clip", f"{checked.clip}, {checked.clips.index(checked.clip or '') + 1} of {len(checked.clips)}"))
+    if len(checked.figures) > 1:
+        names = ", ".join(checked.figures)
+        taken = "the default" if checked.figure is None else checked.figure
+        facts.append(("figures", f"{taken}, of {len(checked.figures)}: {names} (--figure)"))
+    facts += [("refused", checked.refused)] if checked.refused else _understood(checked)
+    facts.append(("length", size(checked.frames, checked.fps)))
+    facts += [("" if number else "assumed", note) for number, note in enumerate(checked.notes)]
     if row.source.place is not None:
-        said.append(("page", str(row.source.place)))
-    return chain([str(row.source)], (f"  {name:<9} {text}" for name, text in said))
+        facts.append(("page", str(row.source.place)))
+    return chain([str(row.source)], (f"  {name:<9} {text}" for name, text in facts))
 
 
-def _understood(found: Checked) -> list[tuple[str, str]]:
-    unsure = "" if found.sure else ": look at it, or give a map (motet convert --map)"
+def _understood(checked: Checked) -> list[tuple[str, str]]:
+    unsure = "" if checked.sure else ": look at it, or give a map (motet convert --map)"
     tall = "not known"
-    if found.height is not None and found.unit is not None:
-        near = (name for name, metres in LENGTH_UNITS.items() if abs(found.unit / metres - 1) < 1e-3)
-        tall = f"{found.height:.2f} m tall; lengths are in {next(near, f'units of {found.unit:g} m')}"
+    if checked.height is not None and checked.unit is not None:
+        near = (name for name, metres in LENGTH_UNITS.items() if abs(checked.unit / metres - 1) < 1e-3)
+        tall = f"{checked.height:.2f} m tall; lengths are in {next(near, f'units of {checked.unit:g} m')}"
     return [
-        ("figure", f"{found.convention}, confidence {found.confidence:.2f}{unsure}"),
+        ("figure", f"{checked.convention}, confidence {checked.confidence:.2f}{unsure}"),
         ("size", tall),
-        ("facing", f"{_facing(found)} in the first frame; ahead is +z"),
-        ("ground", f"soles stand at {_metres(found.ground)} m; lowest point {_metres(found.lowest)} m"),
-        ("travel", "in place" if found.in_place else f"{_metres(found.travel)} m"),
+        ("facing", f"{_facing(checked)} in the first frame; ahead is +z"),
+        ("ground", f"soles stand at {_metres(checked.ground)} m; lowest point {_metres(checked.lowest)} m"),
+        ("travel", "in place" if checked.in_place else f"{_metres(checked.travel)} m"),
     ]
 
 
-def _facing(found: Checked) -> str:
-    if found.facing is None:
+def _facing(checked: Checked) -> str:
+    if checked.facing is None:
         return "up or down"
-    degrees = round(abs(found.facing))
-    return f"{degrees}° {'left' if found.facing > 0 else 'right'}" if degrees else "ahead"
+    degrees = round(abs(checked.facing))
+    return f"{degrees}° {'left' if checked.facing > 0 else 'right'}" if degrees else "ahead"
 
 
 def _metres(value: float | None) -> str:
@@ -230,7 +231,7 @@ def _metres(value: float | None) -> str:
 @write_options
 @read_options
 @many_options
-def convert(files: Sequence[Path], out: Path | None, output: Output, many: Many, **how: Any) -> None:
+def convert(files: Sequence[Path], out: Path | None, output: Output, many: Many, **changes: Any) -> None:
     """Convert motion files."""
     if out is None:
         if len(files) != 2:
@@ -241,9 +242,10 @@ def convert(files: Sequence[Path], out: Path | None, output: Output, many: Many,
             raise click.UsageError("shards of convert need an OUT with {name} and, for clips, {clip}")
         places(out, list(map(Source, files_of(files))), output=output)
     sources = many.sources(files, every=False)
-    sources = [replace(one, place=to) for one, to in zip(sources, places(out, sources, output=output), strict=True)]
+    outs = places(out, sources, output=output)
+    sources = [replace(source, place=place) for source, place in zip(sources, outs, strict=True)]
     many = replace(many, jobs=1) if output.onto else many  # which holds all clips until the end
-    verb = Convert(many.read.options, output, Changes(**how))
+    verb = Convert(many.read.options, output, Changes(**changes))
     if many.parts and output.onto:
         raise click.UsageError("--parts writes a file for each motion: it does not go with --onto")
     if many.parts:
@@ -275,35 +277,36 @@ class Convert(Verb):
     """Writes each motion to its source's place: a row with input, output, frames and fps."""
 
     output: Output
-    how: Changes
+    changes: Changes
 
     def about(self) -> dict[str, Any]:
         """Also what is done."""
         figure = hashlib.sha256(pickle.dumps(self.output.character)).hexdigest()
         output = {"fps": self.output.fps, "in_place": self.output.in_place, "figure": figure}
-        return {**super().about(), "changes": {key: str(value) for key, value in vars(self.how).items()}, **output}
+        return {**super().about(), "changes": {key: str(value) for key, value in vars(self.changes).items()}, **output}
 
     def rows(self, answer: Answer) -> list[Any]:
         """The one row."""
-        how = self.how
+        changes = self.changes
         place = answer.source.place
         assert place is not None
         motion = self.read(answer)
-        motion = motion.cut(how.start, how.stop) if how.start or how.stop is not None else motion
-        motion = _to_humanoid(motion, how.map_file) if how.humanoid or how.map_file or how.hold_feet else motion
-        motion = with_travel(motion) if how.travel else motion
-        motion = self.output.shaped(feet_held(motion) if how.hold_feet else motion)
-        motion = motion.scaled(METRES[how.unit]) if how.unit else motion
-        motion = looped(motion) if how.loop else motion
-        self.output.save(place, mirrored(motion) if how.mirror else motion, answer.source.title)
-        said = {"input": str(answer.source), "output": str(place)}
-        return [{**said, "frames": len(motion), "fps": motion.fps}]
+        motion = motion.cut(changes.start, changes.stop) if changes.start or changes.stop is not None else motion
+        if changes.humanoid or changes.map_file or changes.hold_feet:
+            motion = _to_humanoid(motion, changes.map_file)
+        motion = with_travel(motion) if changes.travel else motion
+        motion = self.output.shaped(feet_held(motion) if changes.hold_feet else motion)
+        motion = motion.scaled(METRES[changes.unit]) if changes.unit else motion
+        motion = looped(motion) if changes.loop else motion
+        self.output.save(place, mirrored(motion) if changes.mirror else motion, answer.source.title)
+        paths = {"input": str(answer.source), "output": str(place)}
+        return [{**paths, "frames": len(motion), "fps": motion.fps}]
 
 
 def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:
-    found = to_humanoid(motion, read_map(map_file, skeleton_of(motion)) if map_file else None)
-    log.info("brought to the humanoid: %s", found.summary)
-    return found.motion
+    mapped = to_humanoid(motion, read_map(map_file, skeleton_of(motion)) if map_file else None)
+    log.info("brought to the humanoid: %s", mapped.summary)
+    return mapped.motion
 
 
 @click.command()
@@ -313,10 +316,13 @@ def _to_humanoid(motion: Motion, map_file: Path | None) -> Motion:
 def view(sources: tuple[Path, ...], out: Path | None, read: Read) -> None:
     """Write a self-contained page that plays each motion file, and print its path."""
     tries = Tries()
-    given = read.sources(sources)
-    new = ((source, source.label if source.part else source.name) for source in given)
-    pages = places(out, given) if out else [Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html" for _, name in new]
-    for source, page in zip(given, pages, strict=True):
+    motion_sources = read.sources(sources)
+    new = ((source, source.label if source.part else source.name) for source in motion_sources)
+    if out:
+        pages = places(out, motion_sources)
+    else:
+        pages = [Path(tempfile.mkdtemp(prefix="motet-")) / f"{name}.html" for _, name in new]
+    for source, page in zip(motion_sources, pages, strict=True):
         with tries.of(source):
             write_motion(page, read(source))
             click.echo(str(page))

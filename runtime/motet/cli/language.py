@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
@@ -72,7 +73,8 @@ def describe(
         many.write_part(verb, sources, motions, "describing")
     answers = many.answers(verb, sources, "describing")
     if as_json:
-        print_list(to_json(row) for answer in answers for row in answer.rows)
+        rows = chain.from_iterable(answer.rows for answer in answers)
+        print_list(map(to_json, rows))
     else:
         for answer in answers:
             for line in _told_of(answer, len(sources) > 1):
@@ -91,13 +93,13 @@ def _told_of(answer: Answer, several: bool) -> Iterator[str]:
             continue
         if len(answer.rows) > 1:
             yield f"{row['start']:.1f} to {row['stop']:.1f} s"
-        for found in row["hypotheses"]:
-            yield f"{found['score']:8.2f}  {_told(found)}"
+        for hypothesis in row["hypotheses"]:
+            yield f"{hypothesis['score']:8.2f}  {_told(hypothesis)}"
 
 
-def _told(found: Mapping[str, Any]) -> str:
-    sure = found["confident"] or found["text"] == NOTHING
-    return str(found["text"]) if sure else f"? {found['text']}"
+def _told(hypothesis: Mapping[str, Any]) -> str:
+    sure = hypothesis["confident"] or hypothesis["text"] == NOTHING
+    return str(hypothesis["text"]) if sure else f"? {hypothesis['text']}"
 
 
 @click.command()
@@ -156,23 +158,23 @@ def generate(
     With --story the texts become one motion, each taking over from the one before.
     """
     output.check(out)
-    told = story or after is not None or settings["stand"] is not None
+    by_codes = story or after is not None or settings["stand"] is not None
     settings = {key: value for key, value in settings.items() if value is not None}
     tries = Tries()
-    model = load_as(CodesModel if told else GenerateModel, bundle, session)
-    asked = _usable(tries, model, texts, settings["numbers"])
-    if told:
-        found = _stories(tries, cast(CodesModel, model), asked, story, after, **settings)
+    model = load_as(CodesModel if by_codes else GenerateModel, bundle, session)
+    requests = _usable(tries, model, texts, settings["numbers"])
+    if by_codes:
+        generated = _stories(tries, cast(CodesModel, model), requests, story, after, **settings)
     else:
-        found = _motions(tries, model, asked, **settings)
-    count = max((len(results) for *_, results in found), default=1) if every else 1
+        generated = _motions(tries, model, requests, **settings)
+    count = max((len(results) for *_, results in generated), default=1) if every else 1
     numbers = range(1, 1 + count * (1 if story else len(texts)))
     outs = places(out, list(map(str, numbers)), output=output)
     rows = []
-    for index, text, results in found:
+    for index, text, results in generated:
         with tries.of(text):
-            own = zip(results[:count], outs[count * index :], strict=False)
-            rows.append(_written(text, own, not no_plant, loop, output))
+            placed = zip(results[:count], outs[count * index :], strict=False)
+            rows.append(_written(text, placed, not no_plant, loop, output))
     output.finish()
     if rows:
         click.echo(json.dumps(rows) if as_json else "\n".join(_lines(rows)))
@@ -191,40 +193,46 @@ Found = tuple[int, str, list[Generated]]
 
 @noted()
 def _motions(
-    tries: Tries, model: GenerateModel, asked: dict[int, str], seed: int, strict: bool, **settings: Any
+    tries: Tries, model: GenerateModel, requests: dict[int, str], seed: int, strict: bool, **settings: Any
 ) -> list[Found]:
     """The motions of each text by itself, of all of them in one batch."""
     if strict:  # one text that is refused leaves the others
-        asked = tries.usable(asked, partial(model.check, whole=settings["whole"], numbers=settings["numbers"]))
+        requests = tries.usable(requests, partial(model.check, whole=settings["whole"], numbers=settings["numbers"]))
     with bar("generating") as progress:
-        seeds = [seed + index for index in asked]
-        found = model.generate(list(asked.values()), seed=seeds, strict=strict, progress=progress, **settings)
-    return [(index, text, results) for (index, text), results in zip(asked.items(), found, strict=True)]
+        seeds = [seed + index for index in requests]
+        generated = model.generate(list(requests.values()), seed=seeds, strict=strict, progress=progress, **settings)
+    return [(index, text, results) for (index, text), results in zip(requests.items(), generated, strict=True)]
 
 
 @noted()
 def _stories(
-    tries: Tries, model: CodesModel, asked: dict[int, str], story: bool, after: Path | None, seed: int, **settings: Any
+    tries: Tries,
+    model: CodesModel,
+    requests: dict[int, str],
+    story: bool,
+    after: Path | None,
+    seed: int,
+    **settings: Any,
 ) -> list[Found]:
     """One motion for all texts, or one for each."""
     if settings.pop("hypotheses", 1) != 1:
         raise click.UsageError("--story, --after and --stand give one motion: leave --hypotheses out")
     if after is not None:
         settings["after"] = read_motion(after)
-    groups = [asked] if story else [{index: text} for index, text in asked.items()]
-    found: list[Found] = []
+    groups = [requests] if story else [{index: text} for index, text in requests.items()]
+    stories: list[Found] = []
     for number, group in enumerate(filter(None, groups)):
-        told = " / ".join(group.values())
-        with tries.of(told), naming(after):
-            found.append((number, told, [model.story(list(group.values()), seed=seed + min(group), **settings)]))
-    return found
+        label = " / ".join(group.values())
+        with tries.of(label), naming(after):
+            stories.append((number, label, [model.story(list(group.values()), seed=seed + min(group), **settings)]))
+    return stories
 
 
 def _written(
     text: str, results: Iterable[tuple[Generated, Path]], plant: bool, loop: bool, output: Output
 ) -> dict[str, Any]:
     """Write the motions of an input; what is said of them."""
-    found = []
+    hypotheses = []
     for result, place in results:
         motion = result.playable(output.fps or PLAYED, plant)
         captions = _captions(result.passages) if isinstance(result, Story) else None
@@ -232,9 +240,10 @@ def _written(
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
         shown = {"action": result.action or None, "lacking": result.lacking, "confidence": result.confidence}
-        told = {**shown, "asked": dict(result.asked), "measured": dict(result.measured)}
-        found.append({"output": str(place), "log_likelihood": result.log_likelihood, **facts, **told, **passages})
-    return {"input": text, "hypotheses": found}
+        details = {**shown, "asked": dict(result.asked), "measured": dict(result.measured)}
+        scored = {"output": str(place), "log_likelihood": result.log_likelihood}
+        hypotheses.append({**scored, **facts, **details, **passages})
+    return {"input": text, "hypotheses": hypotheses}
 
 
 def _captions(passages: Iterable[Passage]) -> list[tuple[float, str]]:
@@ -244,19 +253,18 @@ def _captions(passages: Iterable[Passage]) -> list[tuple[float, str]]:
 
 def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in rows:
-        for found in row["hypotheses"]:
-            likelihood = found["log_likelihood"]
+        for hypothesis in row["hypotheses"]:
+            likelihood = hypothesis["log_likelihood"]
             score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
-            yield f"{found['output']}: {size(found['frames'], found['fps'])}{score}: {row['input']}"
-            if found["action"]:
-                yield f"  as: {found['action']}{_sure(found)}"
-            if found["action"] and (numbers := _numbers(found)):
+            yield f"{hypothesis['output']}: {size(hypothesis['frames'], hypothesis['fps'])}{score}: {row['input']}"
+            if hypothesis["action"]:
+                yield f"  as: {hypothesis['action']}{_sure(hypothesis)}"
+            if hypothesis["action"] and (numbers := _numbers(hypothesis)):
                 yield f"  {numbers}"
-            for passage in found.get("passages", ()):
-                numbers = "" if found["action"] else _numbers(passage)
-                shown = (
-                    "" if found["action"] else f" (as: {passage['action']}{_sure(passage)}{numbers and f'; {numbers}'})"
-                )
+            for passage in hypothesis.get("passages", ()):
+                numbers = "" if hypothesis["action"] else _numbers(passage)
+                numbers = numbers and f"; {numbers}"
+                shown = "" if hypothesis["action"] else f" (as: {passage['action']}{_sure(passage)}{numbers})"
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"
 
 
@@ -267,11 +275,11 @@ def _sure(shown: Mapping[str, Any]) -> str:
     return sure + (without and f", without {without}")
 
 
-def _numbers(found: Mapping[str, Any]) -> str:
+def _numbers(hypothesis: Mapping[str, Any]) -> str:
     """What was asked in numbers beside what was measured: "asked 3 steps: 3"."""
-    shown = {kind: f": {value:.3g} shown" for kind, value in found["measured"].items()}
-    told = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in found["asked"].items())
-    return told and f"asked: {told}"
+    shown = {kind: f": {value:.3g} shown" for kind, value in hypothesis["measured"].items()}
+    numbers = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in hypothesis["asked"].items())
+    return numbers and f"asked: {numbers}"
 
 
 @click.command()
@@ -303,18 +311,19 @@ def compose(
     moments = read_plan(plan) if Path(plan).suffix.lower() == ".json" else parse_plan(plan)
     model = load_as(CodesModel, bundle, session)
     with noted():
-        found = model.compose(moments, seed=seed, strict=strict)
-    told = " / ".join(passage.text for passage in found.passages)
-    motion = output.write(out, found.motion, told, _captions(found.passages))
+        composed = model.compose(moments, seed=seed, strict=strict)
+    label = " / ".join(passage.text for passage in composed.passages)
+    motion = output.write(out, composed.motion, label, _captions(composed.passages))
     output.finish()
     facts = {"output": str(out), "frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
-    passages = [asdict(one) for one in found.passages]
-    met = [one._asdict() for one in found.met]
+    passages = [asdict(passage) for passage in composed.passages]
+    met = [outcome._asdict() for outcome in composed.met]
     if as_json:
         click.echo(json.dumps({**facts, "passages": passages, "met": met}))
         return
     click.echo(f"{out}: {size(len(motion), motion.fps)}")
-    for one in found.passages:
-        click.echo(f"  {one.start:.1f}-{one.stop:.1f} s {one.text} (as: {one.action}{_sure(vars(one))})")
-    for each in found.met:
+    for passage in composed.passages:
+        action = f"{passage.action}{_sure(vars(passage))}"
+        click.echo(f"  {passage.start:.1f}-{passage.stop:.1f} s {passage.text} (as: {action})")
+    for each in composed.met:
         click.echo(f"  {each}")

@@ -41,20 +41,20 @@ class Many:
     address: str | None = None
     tries: Tries = field(default_factory=Tries)
 
-    def sources(self, given: Sequence[Path], every: bool = True) -> list[Source]:
+    def sources(self, paths: Sequence[Path], every: bool = True) -> list[Source]:
         """The motions of this shard that files, folders, zips and patterns name. every: all clips where nothing says
         which."""
-        files = self.shard.of(list(enumerate(files_of(given))))
-        return [replace(one, number=number) for number, file in files for one in self.read.sources([file], every)]
+        files = self.shard.of(list(enumerate(files_of(paths))))
+        return [replace(source, number=number) for number, file in files for source in self.read.sources([file], every)]
 
     def answers(self, verb: Verb, sources: Sequence[Source], label: str, named: bool = True) -> Iterator[Answer]:
         """The answers in order, with progress where they are not printed as they come. named: failures are said."""
         if self.engine == "ray":
-            found = ray_engine.answers(verb, sources, self.jobs, self.address)
+            answered = ray_engine.answers(verb, sources, self.jobs, self.address)
         else:
-            found = in_batches(verb, sources, self.jobs, verb.most)
+            answered = in_batches(verb, sources, self.jobs, verb.most)
         with nullcontext(silent) if sys.stdout.isatty() and self.parts is None else bar(label) as progress:
-            for done, answer in enumerate(found, start=1):
+            for done, answer in enumerate(answered, start=1):
                 progress(done, len(sources))
                 if named:
                     self.tries.say(answer)
@@ -62,28 +62,28 @@ class Many:
                     self.read.rates.append(answer.fps)
                 yield answer
 
-    def write_part(self, verb: Verb, sources: Sequence[Source], given: Sequence[Path], label: str) -> None:
+    def write_part(self, verb: Verb, sources: Sequence[Source], paths: Sequence[Path], label: str) -> None:
         """Write the part of this shard, or what is missing of it, into the folder of ``--parts``."""
         assert self.parts is not None
-        files = files_of(given)
+        files = files_of(paths)
         corpus = {"files": len(files), "corpus": digest(files)}
         part = Part(self.parts, {"motet": version("motet"), **verb.about(), **corpus, "shard": str(self.shard)})
         before = part.complete()
         if not before:
-            part.write(sources, partial(self._while_it_stays, part, verb, given, label))
+            part.write(sources, partial(self._while_it_stays, part, verb, paths, label))
         count, failed = failures(part.path)
-        said = "was complete already: " if before else ""
-        click.echo(f"{part.path}: {said}{count} motions, {failed} failed")
+        note = "was complete already: " if before else ""
+        click.echo(f"{part.path}: {note}{count} motions, {failed} failed")
         sys.exit(1 if failed else 0)
 
     def _while_it_stays(
-        self, part: Part, verb: Verb, given: Sequence[Path], label: str, rest: Sequence[Source]
+        self, part: Part, verb: Verb, paths: Sequence[Path], label: str, rest: Sequence[Source]
     ) -> Iterator[Answer]:
         """The answers for a part; OutputError in the end where the corpus is no longer that with which it began."""
         yield from self.answers(Hashed.of(verb), rest, label)
-        if digest(files_of(given)) != part.about["corpus"]:
-            said = "the files that it is of changed while it was written: remove it, and run the same command again"
-            raise OutputError(f"cannot complete {part.path}: {said} on files that stay")
+        if digest(files_of(paths)) != part.about["corpus"]:
+            reason = "the files that it is of changed while it was written: remove it, and run the same command again"
+            raise OutputError(f"cannot complete {part.path}: {reason} on files that stay")
 
 
 def many_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -71,20 +71,20 @@ def predict(
     More frames than the bundle's horizon come from a bundle that writes codes (--beyond): walks walk on, runs run.
     With --samples all frames do, and the futures differ as far as the motion leaves it open.
     """
-    given = read.sources(sources)
-    outs = iter(places(out, given, samples or 1, output))
+    motion_sources = read.sources(sources)
+    outs = iter(places(out, motion_sources, samples or 1, output))
     model = load_as(PredictModel, bundle, session)
     tries = Tries()
     count = model.count(seconds, frames)
     rows = []
     writer = _writer(beyond, session, samples, count > model.horizon)
-    for source in given:
-        own = [next(outs) for _ in range(samples or 1)]
+    for source in motion_sources:
+        source_outs = [next(outs) for _ in range(samples or 1)]
         with tries.of(source) as caught:
             futures, expected = _futures(model, read(source), writer, samples, count, **drawn)
-            said = _written(futures, own, source.title, output, count, drawn["seed"])
-            said |= {"in_place": bool(caught), "beyond": writer and beyond}
-            rows.append({"input": str(source), **said, **expected})
+            facts = _written(futures, source_outs, source.title, output, count, drawn["seed"])
+            facts |= {"in_place": bool(caught), "beyond": writer and beyond}
+            rows.append({"input": str(source), **facts, **expected})
             if not as_json:
                 click.echo("\n".join(_lines(rows[-1], drawn["append"])))
     output.finish()
@@ -113,17 +113,17 @@ def _futures(
     try:
         if writer is not None and samples is not None:
             with bar("drawing") as progress:
-                given = {"beyond": writer, "frames": frames, "progress": progress, **drawn}
-                return model.futures(motion, samples=samples, **given), {}
-        found = model.predict(motion, frames=frames, beyond=writer, **drawn)
+                future_options = {"beyond": writer, "frames": frames, "progress": progress, **drawn}
+                return model.futures(motion, samples=samples, **future_options), {}
+        predicted = model.predict(motion, frames=frames, beyond=writer, **drawn)
     except MotionError as error:
         if writer is None:
             raise
         raise MotionError(f"{error} (--beyond none continues with the predictor alone)") from error
     if not model.knows_errors:
-        return [found], {}
+        return [predicted], {}
     errors = model.expected_errors(motion)[: min(frames, model.horizon if writer is None else model.sure)]
-    return [found], {"expected_error_cm": [round(float(error), 2) for error in errors]}
+    return [predicted], {"expected_error_cm": [round(float(error), 2) for error in errors]}
 
 
 def _written(
@@ -140,9 +140,9 @@ def _written(
 
 def _lines(row: dict[str, Any], append: bool) -> Iterator[str]:
     start = row["start"]
-    said = f", predicted from {start / row['fps']:.3g} s on (frame {start}, counted from 0)" if append else ""
+    joint = f", predicted from {start / row['fps']:.3g} s on (frame {start}, counted from 0)" if append else ""
     for sample in row["samples"]:
-        yield f"{sample['output']}: {size(row['frames'], row['fps'])}{said}"
+        yield f"{sample['output']}: {size(row['frames'], row['fps'])}{joint}"
 
 
 def _gaps(context: click.Context, option: click.Parameter, texts: tuple[str, ...]) -> tuple[Gap, ...]:
@@ -158,10 +158,10 @@ def _gaps(context: click.Context, option: click.Parameter, texts: tuple[str, ...
 
 def _filled(gaps: Sequence[Gap]) -> list[tuple[float, str]]:
     """What a page says when: what is filled, and what was given."""
-    told = [(0.0, "given")]
+    captions = [(0.0, "given")]
     for start, stop in sorted(gaps):
-        told += [(start, "filled"), (max(start, stop), "given")]
-    return sorted(told, key=lambda one: one[0])
+        captions += [(start, "filled"), (max(start, stop), "given")]
+    return sorted(captions, key=lambda caption: caption[0])
 
 
 @click.command()
@@ -199,21 +199,21 @@ def fill(
     """
     if loop == bool(gaps) or (seconds is not None and not loop):
         raise click.UsageError("give --gap START:STOP, once or several times, or --loop, with --seconds if you like")
-    given = read.sources(sources)
-    outs = places(out, given, output=output)
+    motion_sources = read.sources(sources)
+    outs = places(out, motion_sources, output=output)
     model = load_as(FillModel, bundle, session)
     tries = Tries()
-    for source, place in zip(given, outs, strict=True):
+    for source, place in zip(motion_sources, outs, strict=True):
         with tries.of(source):
             motion = read(source)
             if loop:
-                found = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
-                filled: Sequence[Gap] = [(motion.duration, found.duration)]
+                result = model.looped(motion, seconds=LOOP_SECONDS if seconds is None else seconds)
+                filled: Sequence[Gap] = [(motion.duration, result.duration)]
             else:
-                found = model.fill(motion, gaps)
+                result = model.fill(motion, gaps)
                 filled = gaps
-            found = output.write(place, found, source.title, _filled(filled))
-            click.echo(f"{place}: {size(len(found), found.fps)}")
+            result = output.write(place, result, source.title, _filled(filled))
+            click.echo(f"{place}: {size(len(result), result.fps)}")
     output.finish()
     tries.finish()
 
@@ -243,14 +243,14 @@ def join(
     """
     spare(out, first, second)
     model = load_as(FillModel, bundle, session)
-    one = read(first)
-    other = read(second)
+    before = read(first)
+    after = read(second)
     with naming(f"{first} and {second}"), warned(f"{first} and {second}"):
-        found = model.join(one, other, seconds=seconds)
-    captions = [(0.0, first.stem), (one.duration, "filled"), (found.duration - other.duration, second.stem)]
-    found = output.write(out, found, f"{first.stem} {second.stem}", captions)
+        joined = model.join(before, after, seconds=seconds)
+    captions = [(0.0, first.stem), (before.duration, "filled"), (joined.duration - after.duration, second.stem)]
+    joined = output.write(out, joined, f"{first.stem} {second.stem}", captions)
     output.finish()
-    click.echo(f"{out}: {size(len(found), found.fps)}")
+    click.echo(f"{out}: {size(len(joined), joined.fps)}")
 
 
 @click.command()

@@ -55,8 +55,8 @@ def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
         # ONNX Runtime's names, in letters of any case and without their ending
         available: list[str] = onnxruntime.get_available_providers()
         known = {name.removesuffix("ExecutionProvider").lower(): name for name in available}
-        asked = [known.get(name.removesuffix("ExecutionProvider").lower(), name) for name in providers or ("CPU",)]
-        return command(*args, session=SessionOptions(threads, tuple(asked)), **kwargs)
+        chosen = [known.get(name.removesuffix("ExecutionProvider").lower(), name) for name in providers or ("CPU",)]
+        return command(*args, session=SessionOptions(threads, tuple(chosen)), **kwargs)
 
     return with_session
 
@@ -79,12 +79,12 @@ def noted() -> Iterator[None]:
 
 
 @contextmanager
-def warned(given: object) -> Iterator[list[Warning]]:
+def warned(source: object) -> Iterator[list[Warning]]:
     """Log what motet warns of a motion, each once, with what was given."""
     with collected(TravelWarning) as notes:
         yield notes
     for text in each_once(notes):
-        log.warning("%s: %s", given, text)
+        log.warning("%s: %s", source, text)
 
 
 @contextmanager
@@ -109,15 +109,15 @@ class Tries:
         self.failed = 0
 
     @contextmanager
-    def of(self, given: object) -> Iterator[list[Warning]]:
+    def of(self, source: object) -> Iterator[list[Warning]]:
         """What is done for one file or text; motet's own errors end only this. What it was warned of meanwhile is said,
         once, of the file."""
         try:
-            with warned(given) as caught:
+            with warned(source) as caught:
                 yield caught
         except MotetError as error:
             self.failed += 1
-            click.echo(f"motet: {named(given, error)}", err=True)
+            click.echo(f"motet: {named(source, error)}", err=True)
 
     def say(self, answer: Answer) -> None:
         """Name an answer's failure, and what was warned of."""
@@ -129,12 +129,12 @@ class Tries:
 
     def usable(self, texts: Mapping[int, str], check: Callable[[str], object]) -> dict[int, str]:
         """The texts that pass a check."""
-        found = {}
+        valid = {}
         for index, text in texts.items():
             with self.of(quoted(text)):
                 check(text)
-                found[index] = text
-        return found
+                valid[index] = text
+        return valid
 
     def finish(self) -> None:
         """Exit code 1 if anything failed."""

@@ -37,19 +37,19 @@ class Read:
     figure: str | None = None
     rates: list[float] = field(default_factory=list)
 
-    def __call__(self, given: Path | Source) -> Motion:
+    def __call__(self, origin: Path | Source) -> Motion:
         """The motion of a file, of one clip of it; FormatError as :func:`motet.read`."""
-        source, *others = [given] if isinstance(given, Source) else self.sources([given])
+        source, *others = [origin] if isinstance(origin, Source) else self.sources([origin])
         if others:
-            raise click.UsageError(f"expected one motion, but {given} holds {len(others) + 1} motions: name one")
+            raise click.UsageError(f"expected one motion, but {origin} holds {len(others) + 1} motions: name one")
         motion = source.read(**self.options)
         self.rates.append(motion.fps)
         return motion
 
-    def sources(self, given: Sequence[Path], every: bool = False) -> list[Source]:
+    def sources(self, paths: Sequence[Path], every: bool = False) -> list[Source]:
         """The motions of files, as ``--clip``, ``--figure`` or their own names (a.glb#Walk) select them. every: all
         clips where nothing does."""
-        return [source for path in given for source in sources_of(path, self.clip, self.figure, every)]
+        return [source for path in paths for source in sources_of(path, self.clip, self.figure, every)]
 
     def say_resampled(self, rate_of: Callable[[], float]) -> None:
         """Log in one line how many of the motions that were read have another frame rate than a model's, for which a
@@ -84,7 +84,9 @@ def read_options(command: Callable[..., None]) -> Callable[..., None]:
     def with_read(
         unit_in: str | None, fps_in: float | None, clip: str | None, figure: str | None, **options: Any
     ) -> None:
-        given = {"unit": unit_in, "fps": fps_in, **{name: options.pop(name) for name in ("asf", "partial", "rest")}}
-        command(read=Read(given, clip, figure), **options)
+        reader_options = {"unit": unit_in, "fps": fps_in}
+        for name in ("asf", "partial", "rest"):
+            reader_options[name] = options.pop(name)
+        command(read=Read(reader_options, clip, figure), **options)
 
     return with_read

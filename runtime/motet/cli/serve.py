@@ -62,6 +62,6 @@ def serve(
         application,
         host,
         port,
-        ready=lambda found: click.echo(f"serving on http://{shown}:{found}; stop with Ctrl-C", err=True),
+        ready=lambda bound_port: click.echo(f"serving on http://{shown}:{bound_port}; stop with Ctrl-C", err=True),
     )
     click.echo("stopped", err=True)

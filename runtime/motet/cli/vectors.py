@@ -72,8 +72,8 @@ def embed(
             vectors = generator.embed(usable)
     if len(vectors):
         _save(out, vectors)
-        said = f"{out}: {len(vectors)} context vectors of {vectors.shape[1]} numbers"
-        click.echo(json.dumps(rows) if as_json else said)
+        summary = f"{out}: {len(vectors)} context vectors of {vectors.shape[1]} numbers"
+        click.echo(json.dumps(rows) if as_json else summary)
     tries.finish()
 
 
@@ -84,10 +84,10 @@ def _save(out: Path, vectors: Floats) -> None:
 
 
 def _indexes(folder: Path) -> list[Path]:
-    found = sorted(folder.glob("*.npz")) if folder.is_dir() else [folder]
-    if not found:
+    files = sorted(folder.glob("*.npz")) if folder.is_dir() else [folder]
+    if not files:
         raise FormatError(folder, "no indexes of shards (.npz) are in it")
-    return found
+    return files
 
 
 @click.command()
@@ -152,6 +152,6 @@ def _told(hits: Sequence[Hit], as_json: bool) -> None:
         click.echo(json.dumps([{**asdict(hit), "path": str(hit.path)} for hit in hits]))
     else:
         for hit in hits:
-            said = ", in place: compared with the path that its feet imply" if hit.in_place else ""
+            note = ", in place: compared with the path that its feet imply" if hit.in_place else ""
             doubt = "" if hit.like else "? "
-            click.echo(f"{hit.score:6.2f}  {doubt}{hit.place}  {hit.start:.1f} to {hit.stop:.1f} s{said}")
+            click.echo(f"{hit.score:6.2f}  {doubt}{hit.place}  {hit.start:.1f} to {hit.stop:.1f} s{note}")

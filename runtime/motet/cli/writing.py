@@ -110,8 +110,8 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
             raise click.UsageError("--like writes only motions, --onto the character with them: give one of the two")
         if onto and onto.suffix.lower() not in BODIES:
             raise click.UsageError(f"--onto takes a character with its mesh ({' '.join(BODIES)}), which {onto} is not")
-        given = onto or like
-        character = None if given is None else read_character(given)
+        character_file = onto or like
+        character = None if character_file is None else read_character(character_file)
         command(output=Output(character, fps, in_place, onto), **options)
 
     return with_output
@@ -141,10 +141,10 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output:
     fields = r"\{(name|clip)\}"
 
     def named(source: Source | str) -> Path:
-        def name(found: re.Match[str]) -> str:
+        def name(field: re.Match[str]) -> str:
             if isinstance(source, str):
                 return source
-            return source.name if found[1] == "name" else source.label
+            return source.name if field[1] == "name" else source.label
 
         return Path(re.sub(fields, name, str(out)))
 
@@ -153,17 +153,17 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output:
 
     onto = output is not None and output.onto is not None
     if onto:
-        found = [named(source) for source in sources for _ in range(samples)]
+        targets = [named(source) for source in sources for _ in range(samples)]
     elif re.search(fields, str(out)):
-        found = [place for source in sources for place in numbered(named(source), samples)]
+        targets = [place for source in sources for place in numbered(named(source), samples)]
     else:
-        found = numbered(out, len(sources) * samples)
-    if len(set(found)) < len(found) and not onto:
+        targets = numbered(out, len(sources) * samples)
+    if len(set(targets)) < len(targets) and not onto:
         raise click.UsageError(
             "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"
         )
-    given = {source.path.resolve() for source in sources if isinstance(source, Source)}
-    for place in found:
+    inputs = {source.path.resolve() for source in sources if isinstance(source, Source)}
+    for place in targets:
         output.check(place) if output else check_writable(place)
-        _spare(place, given)
-    return found
+        _spare(place, inputs)
+    return targets

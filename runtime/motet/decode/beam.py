@@ -79,10 +79,13 @@ def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> lis
         words = np.concatenate([np.take_along_axis(words, parents[:, :, None], 1), chosen[:, :, None]], axis=2)
         places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * beams).ravel() % len(alive)
         state = {name: np.take(array, places, axis=0) for name, array in following.items()}
-    return [
-        [Hypothesis(tuple(ids[: ids.index(end)]), one, one) for ids, one in zip(*row, strict=True) if np.isfinite(one)]
-        for row in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)
-    ]
+    hypotheses: list[list[Hypothesis]] = []
+    for sequences, probabilities in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True):
+        hypotheses.append([])
+        for ids, score in zip(sequences, probabilities, strict=True):
+            if np.isfinite(score):
+                hypotheses[-1].append(Hypothesis(tuple(ids[: ids.index(end)]), score, score))
+    return hypotheses
 
 
 def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Scores, Ids, Ids]:
@@ -90,15 +93,17 @@ def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Sco
 
     left: log-probabilities (N, V) of the words after those ``alive``; used up.
     """
-    (rows, beams), width, one = scores.shape, min(scores.shape[1], left.shape[1]), np.arange(len(left))
+    rows, beams = scores.shape
+    width = min(beams, left.shape[1])
+    each = np.arange(len(left))
     pool = np.full((rows * beams, width), -np.inf)
     words = np.full((rows * beams, width), end, dtype=np.int64)
     pool[:, 0] = scores.ravel()  # ended hypotheses are kept unchanged
     for place in range(width):  # a few passes of argmax take a fraction of argpartition's time
         likeliest = left.argmax(axis=1)
         words[alive, place] = likeliest
-        pool[alive, place] = scores.ravel()[alive] + left[one, likeliest]
-        left[one, likeliest] = -np.inf
+        pool[alive, place] = scores.ravel()[alive] + left[each, likeliest]
+        left[each, likeliest] = -np.inf
     pool = pool.reshape(rows, -1)
     words = words.reshape(rows, -1)
     order = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
@@ -124,7 +129,7 @@ def draw_sequences(
     """
     rows = len(context)
     noise = noise_of(limits, draws) if noise is None else noise
-    found = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
+    words = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
     scores = np.zeros(rows * draws)
     alive = np.arange(rows * draws)  # the draws that have not ended; those that begin alike are neighbours
     row = two_rows(np.arange(rows))  # of each beginning, as the last word and the state
@@ -138,7 +143,7 @@ def draw_sequences(
         left = limits.possible(outputs["log_probabilities"].astype(np.float64), length)
         shares = np.cumsum(np.exp((left - left.max(axis=1, keepdims=True)) / temperature), axis=1)
         chosen = _spread(shares / shares[:, -1:], begun, noise[length, alive % draws])
-        found[alive, length] = chosen
+        words[alive, length] = chosen
         scores[alive] += outputs["log_probabilities"][begun, chosen]
         goes_on = chosen != limits.end
         longer = (begun * left.shape[1] + chosen)[goes_on]
@@ -149,7 +154,7 @@ def draw_sequences(
         row = row[parent]
         state = {name: array[parent] for name, array in following.items()}
     return [
-        _counted(found[at : at + draws].tolist(), scores[at : at + draws].tolist(), limits.end)
+        _counted(words[at : at + draws].tolist(), scores[at : at + draws].tolist(), limits.end)
         for at in range(0, rows * draws, draws)
     ]
 
@@ -163,8 +168,8 @@ def _spread(shares: Scores, begun: Ids, uniform: Floats) -> Ids:
     return chosen
 
 
-def _counted(found: list[list[int]], scores: list[float], end: int) -> list[Drawn]:
-    sequences = [tuple(ids[: ids.index(end)]) for ids in found]
+def _counted(words: list[list[int]], scores: list[float], end: int) -> list[Drawn]:
+    sequences = [tuple(ids[: ids.index(end)]) for ids in words]
     score = dict(zip(sequences, scores, strict=True))
     return [Drawn(ids, score[ids], times) for ids, times in Counter(sequences).items()]
 
@@ -187,7 +192,7 @@ def consensus(
 
 def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
     """The drawn sequences by falling :func:`agreement` with all draws; of equal ones the most probable first."""
-    scores = agreement([one.ids for one in drawn], np.array([one.times for one in drawn]))
+    scores = agreement([sequence.ids for sequence in drawn], np.array([sequence.times for sequence in drawn]))
     falling = -scores.round(9)  # what only rounding tells apart is equal
     order = sorted(range(len(drawn)), key=lambda i: (falling[i], -drawn[i].log_probability))
     return [Hypothesis(drawn[i].ids, drawn[i].log_probability, float(scores[i])) for i in order]
@@ -198,7 +203,7 @@ def agreement(sequences: Sequence[tuple[int, ...]], times: Ids) -> Scores:
 
     In common: the mean of two F1, of the words and of the pairs of neighbouring words that both have.
     """
-    found = np.zeros(len(sequences))
+    agreements = np.zeros(len(sequences))
     for order in (1, 2):
         columns: dict[tuple[tuple[int, ...], int], int] = {}  # of an n-gram for the first, second, ... time
         places = []
@@ -211,8 +216,8 @@ def agreement(sequences: Sequence[tuple[int, ...]], times: Ids) -> Scores:
         marks[tuple(np.array(places, dtype=np.intp).reshape(-1, 2).T)] = 1
         sizes = marks.sum(axis=1)
         shared = 2 * (marks @ marks.T) / np.maximum(sizes[:, None] + sizes, 1)  # a product counts what both have
-        found += shared @ (times / times.sum()) / 2
-    return found
+        agreements += shared @ (times / times.sum()) / 2
+    return agreements
 
 
 def score_words(step: Graph, contexts: Floats, rows: Ids, words: Ids) -> Scores:
@@ -221,22 +226,22 @@ def score_words(step: Graph, contexts: Floats, rows: Ids, words: Ids) -> Scores:
     step: as :func:`beam_search`. contexts: (R, C). rows: (N,) of contexts. words: (N, W), the start, the words, the
     end, and 0 behind it. Sequences of one row share the steps of the words with which they all begin.
     """
-    found = np.zeros(len(rows))
+    totals = np.zeros(len(rows))
     group = rows
     state = zero_state(step, len(contexts))
     count = int(words.max()) + 1
-    for given, coming in zip(words.T, words.T[1:], strict=False):
+    for previous, coming in zip(words.T, words.T[1:], strict=False):
         alive = np.flatnonzero(coming)
         if not len(alive):
             break
-        _, first, same = np.unique(group[alive] * count + given[alive], return_index=True, return_inverse=True)
+        _, first, same = np.unique(group[alive] * count + previous[alive], return_index=True, return_inverse=True)
         chosen = two_rows(alive[first])
         before = {name: array[group[chosen]] for name, array in state.items()}
-        outputs, state = advance(step, before, {"word": given[chosen], "context": contexts[rows[chosen]]})
+        outputs, state = advance(step, before, {"word": previous[chosen], "context": contexts[rows[chosen]]})
         group = np.zeros_like(rows)
         group[alive] = same
-        found[alive] += outputs["log_probabilities"][same, coming[alive]]
-    return found
+        totals[alive] += outputs["log_probabilities"][same, coming[alive]]
+    return totals
 
 
 @dataclass(frozen=True)

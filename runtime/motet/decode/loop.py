@@ -29,18 +29,18 @@ class Loop:
     settings: type[Settings] = Settings
     batch: int = 64
 
-    def defaults(self, given: Mapping[str, Any]) -> dict[str, float]:
+    def defaults(self, values: Mapping[str, Any]) -> dict[str, float]:
         """The settings of a bundle; BundleError for one that is missing, not a number or out of range."""
-        own = {name: given[name] for name in self.settings.RANGES if given.get(name) is not None}
-        return dict(vars(self.settings.read(own, "defaults")))
+        known = {name: values[name] for name in self.settings.RANGES if values.get(name) is not None}
+        return dict(vars(self.settings.read(known, "defaults")))
 
-    def settled(self, defaults: Mapping[str, float], given: Mapping[str, float | None]) -> dict[str, float]:
+    def settled(self, defaults: Mapping[str, float], values: Mapping[str, float | None]) -> dict[str, float]:
         """All settings: the user's, and the defaults in place of None.
 
         DecodingError for one that is unknown or out of range.
         """
         try:
-            chosen = {name: self.settings.check(name, value) for name, value in given.items() if value is not None}
+            chosen = {name: self.settings.check(name, value) for name, value in values.items() if value is not None}
         except SettingError as error:
             raise DecodingError(str(error)) from error
         return {**defaults, **chosen}
@@ -60,12 +60,12 @@ def advance(step: Graph, state: State, inputs: Arrays) -> tuple[dict[str, NDArra
     return outputs, {name: outputs[source] for name, source in step.spec.feedback.items()}
 
 
-def zero_state(step: Graph, rows: int, given: Collection[str] = ()) -> State:
-    """The fed back inputs (rows, ...) of a step before the first one, but for those ``given``: zeros.
+def zero_state(step: Graph, rows: int, provided: Collection[str] = ()) -> State:
+    """The fed back inputs (rows, ...) of a step before the first one, but for those ``provided``: zeros.
 
     A state that grows starts with the sizes that the contract says, 0 along the axis that it grows on.
     """
-    names = [name for name in step.spec.feedback if name not in given]
+    names = [name for name in step.spec.feedback if name not in provided]
     return {name: np.zeros((rows, *step.spec.start_shape(name)), dtype=step.spec.input(name).dtype) for name in names}
 
 
@@ -119,10 +119,10 @@ class Recorded:
         return self._next("uniform", size, dtype)
 
     def _next(self, kind: str, size: tuple[int, ...], dtype: type[np.float32]) -> Floats:
-        found = next(self._left[kind], None)
-        if found is None or found.shape != size:
+        draw = next(self._left[kind], None)
+        if draw is None or draw.shape != size:
             raise BundleError(f"the golden vectors lack {kind} numbers of shape {size}")
-        numbers: Floats = found.astype(dtype)
+        numbers: Floats = draw.astype(dtype)
         return numbers
 
 
@@ -161,7 +161,8 @@ class RowNoise:
         index, place = divmod(tick, self.BLOCK)
         if index != self._index:
             generators = (np.random.Generator(np.random.PCG64([seed, index])) for seed in self.seeds)
-            self._block = np.stack([one.random((self.BLOCK, self.width), np.float32) for one in generators], axis=1)
+            blocks = [generator.random((self.BLOCK, self.width), np.float32) for generator in generators]
+            self._block = np.stack(blocks, axis=1)
             self._index = index
         noise: Floats = self._block[place]
         return noise

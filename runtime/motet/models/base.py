@@ -62,8 +62,8 @@ class BundleModel(ABC):
         if unknown := sorted(manifest.settings.keys() - known.keys()):
             expected = ", ".join(known) or "none"
             raise BundleError(f"manifest, settings.{unknown[0]}: is unknown; expected {expected}")
-        given = manifest.settings
-        self._tuned = {kind: kind.read(given.get(name, {}), f"settings.{name}") for name, kind in known.items()}
+        settings = manifest.settings
+        self._tuned = {kind: kind.read(settings.get(name, {}), f"settings.{name}") for name, kind in known.items()}
         self.sizes: Sizes = {"D": len(self.contract.channels)}
 
     def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
@@ -78,12 +78,12 @@ class BundleModel(ABC):
         """A table by name, its shape checked like in :meth:`bind`; BundleError where it is missing or does not fit."""
         if name not in self.tables:
             raise BundleError(f"manifest, tables: there is no table {name!r}")
-        found = self.tables[name]
+        array = self.tables[name]
         try:
-            bind_tensor(TensorSpec(name, found.shape, str(found.dtype)), shape, dtype, self.sizes)
+            bind_tensor(TensorSpec(name, array.shape, str(array.dtype)), shape, dtype, self.sizes)
         except BundleError as error:
             raise BundleError(f"manifest, tables: {error}") from error
-        return found
+        return array
 
     @classmethod
     def load(cls, bundle: Bundle, options: SessionOptions | None = None) -> Self:
@@ -126,7 +126,7 @@ class BundleModel(ABC):
         return tuple(getattr(self.graphs[self.ROLES[-1]], "providers", ())) if self.ROLES else ()
 
     @abstractmethod
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """The complete run of the golden vectors (docs/reference/bundle.md): outputs from its inputs and settings."""
 
     def meaning(self, frames: Array) -> Arrays:

@@ -153,20 +153,24 @@ class DescribeModel(LanguageModel):
         """
         name = self._decoding(decoding, draws)
         if name == "known":
-            found = self._answers(motions_of(motions), beams, progress)
-            return found[0] if isinstance(motions, Motion) else found
-        loop, (first,) = self.LOOPS[name] if name else self.loop, seeds_of(seed, 1, DecodingError)
-        given = {"beams": beams, "draws": draws}
-        settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), given)}
+            described = self._answers(motions_of(motions), beams, progress)
+            return described[0] if isinstance(motions, Motion) else described
+        loop = self.LOOPS[name] if name else self.loop
+        (first,) = seeds_of(seed, 1, DecodingError)
+        counts = {"beams": beams, "draws": draws}
+        settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), counts)}
         if "draws" in settings:
             settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
         contexts = self.embed(motions_of(motions))
         least = self.settings(ConfidenceSettings).log_probability
         decode = self.vocabulary.decode
-        rows = [
-            [Description(decode(one.ids), one.log_probability, one.score, one.log_probability >= least) for one in row]
-            for row in self._hypotheses(loop, contexts, settings, progress)
-        ]
+        rows: list[list[Description]] = []
+        for hypotheses in self._hypotheses(loop, contexts, settings, progress):
+            rows.append([])
+            for hypothesis in hypotheses:
+                log_probability = hypothesis.log_probability
+                text = decode(hypothesis.ids)
+                rows[-1].append(Description(text, log_probability, hypothesis.score, log_probability >= least))
         return rows[0] if isinstance(motions, Motion) else rows
 
     def _decoding(self, decoding: str | None, draws: int | None) -> str | None:
@@ -184,18 +188,19 @@ class DescribeModel(LanguageModel):
         beam = self.LOOPS["beam"]
         count = int(beam.settled(beam.defaults(self.manifest.defaults), {"beams": beams})["beams"])
         least = self.known.settings.sure
-        found = list[list[Description]]()
+        answers = list[list[Description]]()
         for start in range(0, len(motions), AT_ONCE):
             frames = [self.frames(motion) for motion in motions[start : start + AT_ONCE]]
-            vectors = [self.contexts([one], "space")[0] for one in frames]  # one by one: padding changes how sums round
-            lengths = [len(one) / self.fps for one in frames]
-            paths = [path_of(one, self.contract) for one in frames]
+            # one by one: padding changes how sums round
+            vectors = [self.contexts([values], "space")[0] for values in frames]
+            lengths = [len(values) / self.fps for values in frames]
+            paths = [path_of(values, self.contract) for values in frames]
             seen = [Seen(*row) for row in zip(vectors, lengths, *zip(*paths, strict=True), strict=True)]
             for row in self.known.answers(seen, count):
-                said = [(text, math.log(max(chance, LEAST)), chance) for text, chance in row]
-                found.append([Description(*one, one[2] >= least) for one in said])
-            progress(len(found), len(motions))
-        return found
+                likely = [(text, math.log(max(chance, LEAST)), chance) for text, chance in row]
+                answers.append([Description(*scored, scored[2] >= least) for scored in likely])
+            progress(len(answers), len(motions))
+        return answers
 
     def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
         """What happens in a motion of any length: consecutive parts, each with its best description.
@@ -211,16 +216,16 @@ class DescribeModel(LanguageModel):
         settings = self.settings(TimelineSettings)
         beam = self.LOOPS["beam"]
         if self.known is not None:
-            how = self.known.settings
-            spans = windows(len(motion), motion.fps, TimelineSettings(how.window, how.hop))
-            path = best_path(self._kinds(motion, spans, progress), how.change * 0.5 / how.hop)
+            known_settings = self.known.settings
+            spans = windows(len(motion), motion.fps, TimelineSettings(known_settings.window, known_settings.hop))
+            path = best_path(self._kinds(motion, spans, progress), known_settings.change * 0.5 / known_settings.hop)
             return self._parts(motion, edges(spans, path))
         spans = windows(len(motion), motion.fps, settings)
         contexts = self.embed([motion[start:stop] for start, stop in spans])
         likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
         ids = self.vocabulary.ids
-        said = [(ids[SOS], *best.ids, ids[EOS]) for best, *_ in likeliest]
-        scores = near_scores(self.graphs["step"], contexts, said, round(settings.near / settings.hop), progress)
+        sentences = [(ids[SOS], *best.ids, ids[EOS]) for best, *_ in likeliest]
+        scores = near_scores(self.graphs["step"], contexts, sentences, round(settings.near / settings.hop), progress)
         return self._parts(motion, edges(spans, best_path(scores, settings.change)))
 
     def _kinds(self, motion: Motion, spans: Sequence[tuple[int, int]], progress: Progress) -> Iterator[Array]:
@@ -237,29 +242,35 @@ class DescribeModel(LanguageModel):
         most = int(MAX_SECONDS * motion.fps + 1e-9)
         skipped = [max(0, b - a - most) // 2 for a, b in pairwise(cuts)]  # at the start of a part that is too long
         middles = [motion[a + off : b][:most] for (a, b), off in zip(pairwise(cuts), skipped, strict=True)]
-        found = [row[0] for row in self.describe(middles)]
-        inner = [cut for cut, (one, two) in zip(cuts[1:-1], pairwise(found), strict=True) if one.text != two.text]
+        descriptions = [row[0] for row in self.describe(middles)]
+        inner = []
+        for cut, (before, after) in zip(cuts[1:-1], pairwise(descriptions), strict=True):
+            if before.text != after.text:
+                inner.append(cut)
         if len(inner) < len(cuts) - 2:
             return self._parts(motion, [cuts[0], *inner, cuts[-1]])
         times = pairwise(cut / motion.fps for cut in cuts)
-        return [Part(**asdict(said), start=a, stop=b) for said, (a, b) in zip(found, times, strict=True)]
+        parts = []
+        for description, (start, stop) in zip(descriptions, times, strict=True):
+            parts.append(Part(**asdict(description), start=start, stop=stop))
+        return parts
 
     def _hypotheses(
         self, loop: Loop, contexts: Floats, settings: Mapping[str, Any], progress: Progress = silent
     ) -> list[list[Hypothesis]]:
         """The hypotheses of many contexts, decoded in batches of the loop's size."""
         rest = {name: value for name, value in settings.items() if name != "max_words"}
-        found: list[list[Hypothesis]] = []
+        rows: list[list[Hypothesis]] = []
         for start in range(0, len(contexts), loop.batch):
             batch = contexts[start : start + loop.batch]
-            found += loop.run(self.graphs["step"], batch, self.limits(settings), **rest)
-            progress(len(found), len(contexts))
-        return found
+            rows += loop.run(self.graphs["step"], batch, self.limits(settings), **rest)
+            progress(len(rows), len(contexts))
+        return rows
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The context vector (C,) float32 of a motion, or (N, C) of several; MotionError like :meth:`frames`."""
-        found = self.contexts([self.frames(motion) for motion in motions_of(motions)])
-        return found[0] if isinstance(motions, Motion) else found
+        vectors = self.contexts([self.frames(motion) for motion in motions_of(motions)])
+        return vectors[0] if isinstance(motions, Motion) else vectors
 
     def score(self, motion: Motion, sentence: str) -> float:
         """Log-probability of a sentence given a motion; unknown words count as UNK, and a TextWarning names them."""
@@ -272,15 +283,15 @@ class DescribeModel(LanguageModel):
         start, end, *banned = map(self.vocabulary.ids.__getitem__, (SOS, EOS, PAD, UNK))
         return Limits(start, end, int(settings["max_words"]), [start, *banned])
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Frames (T, D), and noise where the loop draws, to ids (W, words) int64 and log-probabilities (W,)."""
-        extra = {"noise": given["noise"]} if "noise" in given else {}
+        extra = {"noise": inputs["noise"]} if "noise" in inputs else {}
         chosen = self.loop.settled(self.defaults, settings)
-        (row,) = self._hypotheses(self.loop, self.contexts([given["frames"]]), {**chosen, **extra})
-        ids = np.zeros((len(row), max(len(found.ids) for found in row)), dtype=np.int64)
-        for place, found in zip(ids, row, strict=True):
-            place[: len(found.ids)] = found.ids
-        return {"ids": ids, "log_probabilities": np.array([found.log_probability for found in row])}
+        (row,) = self._hypotheses(self.loop, self.contexts([inputs["frames"]]), {**chosen, **extra})
+        ids = np.zeros((len(row), max(len(hypothesis.ids) for hypothesis in row)), dtype=np.int64)
+        for place, hypothesis in zip(ids, row, strict=True):
+            place[: len(hypothesis.ids)] = hypothesis.ids
+        return {"ids": ids, "log_probabilities": np.array([hypothesis.log_probability for hypothesis in row])}
 
 
 def windows(frames: int, fps: float, settings: TimelineSettings) -> list[tuple[int, int]]:
@@ -295,7 +306,7 @@ def windows(frames: int, fps: float, settings: TimelineSettings) -> list[tuple[i
 def near_scores(
     step: Graph,
     contexts: Floats,
-    said: Sequence[tuple[int, ...]],
+    sentences: Sequence[tuple[int, ...]],
     near: int,
     progress: Progress = silent,
     at_once: int = 512,
@@ -306,19 +317,19 @@ def near_scores(
     window are scored for its sentence; the others get minus infinity. progress: counts windows. at_once: pairs scored
     in one batch.
     """
-    places = {ids: place for place, ids in enumerate(sorted(set(said)))}
+    places = {ids: place for place, ids in enumerate(sorted(set(sentences)))}
     words = padded([np.array(ids) for ids in places], "int64")[0]
-    own = np.array([places[ids] for ids in said])
-    nearby = [np.unique(own[max(0, row - near) : row + near + 1]) for row in range(len(own))]
-    rows = np.repeat(np.arange(len(own)), list(map(len, nearby)))
+    sentence_of_row = np.array([places[ids] for ids in sentences])
+    nearby = [np.unique(sentence_of_row[max(0, row - near) : row + near + 1]) for row in range(len(sentence_of_row))]
+    rows = np.repeat(np.arange(len(sentence_of_row)), list(map(len, nearby)))
     columns = np.concatenate(nearby)
-    found = np.full((len(said), len(places)), -np.inf)
+    scores = np.full((len(sentences), len(places)), -np.inf)
     for start in range(0, len(rows), at_once):
         row = rows[start : start + at_once]
         column = columns[start : start + at_once]
-        found[row, column] = score_words(step, contexts, row, words[column])
-        progress(int(row[-1]) + 1, len(said))
-    return found
+        scores[row, column] = score_words(step, contexts, row, words[column])
+        progress(int(row[-1]) + 1, len(sentences))
+    return scores
 
 
 def best_path(scores: Iterable[Array], change: float, at_once: int = AT_ONCE) -> list[int]:
@@ -355,9 +366,9 @@ def _agreed(back: list[NDArray[np.intp]], columns: int) -> list[int]:
     for place in range(len(back) - 1, -1, -1):
         ends = back[place][ends]
         if (ends == ends[0]).all():
-            found = _traced(back[:place], int(ends[0]))
+            path = _traced(back[:place], int(ends[0]))
             del back[: place + 1]
-            return found
+            return path
     return []
 
 

@@ -22,9 +22,9 @@ from motet.text.vocabulary import TextRules, Vocabulary
 MAX_SECONDS = 30.0  # of a motion that a model takes, as in the paper's training data
 
 
-def texts_of(given: str | Iterable[str]) -> list[str]:
+def texts_of(sentences: str | Iterable[str]) -> list[str]:
     """A sentence, or several, as a list; ArgumentError for anything else."""
-    texts = list(given) if is_many(given) else [given]
+    texts = list(sentences) if is_many(sentences) else [sentences]
     for text in texts:
         needs(text, str, "a sentence")
     return [str(text) for text in texts]
@@ -97,15 +97,15 @@ class LanguageModel(BundleModel):
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """Vectors (N, C) float32 of the sequences (T_i, ...) that the encoder of a role takes."""
         encoder = self.graphs[role]
-        given = encoder.spec.inputs[0]
+        values_tensor = encoder.spec.inputs[0]
         context = encoder.spec.outputs[0]
-        found = np.empty((len(sequences), context.size(1)), dtype=np.float32)
+        vectors = np.empty((len(sequences), context.size(1)), dtype=np.float32)
         order = np.argsort(list(map(len, sequences)), kind="stable")  # similar lengths together
         for start in range(0, len(order), 32):  # 47 motions take 28 ms on one thread, and in batches of 64 they take 75
             rows = two_rows(order[start : start + 32])
-            values, lengths = padded([sequences[row] for row in rows], given.dtype)
-            found[rows] = encoder({given.name: values, "lengths": lengths})[context.name]
-        return found
+            values, lengths = padded([sequences[row] for row in rows], values_tensor.dtype)
+            vectors[rows] = encoder({values_tensor.name: values, "lengths": lengths})[context.name]
+        return vectors
 
 
 def padded(sequences: Sequence[NDArray[Any]], dtype: str) -> tuple[NDArray[Any], NDArray[np.int64]]:

@@ -87,7 +87,10 @@ def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None
 
 def kind_of(manifest: Manifest) -> type[BundleModel]:
     """The class of a manifest's verb and loop; BundleError for an unknown verb, or a loop of another verb."""
-    by_loop = {loop: kind for kind in KINDS if manifest.verb == kind.VERB for loop in kind.LOOPS}
+    by_loop: dict[str, type[BundleModel]] = {}
+    for kind in KINDS:
+        if manifest.verb == kind.VERB:
+            by_loop |= dict.fromkeys(kind.LOOPS, kind)
     if not by_loop:
         verbs = ", ".join(sorted({kind.VERB for kind in KINDS}))
         raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {verbs}")

@@ -113,8 +113,8 @@ class Known:
     @cached_property
     def _kinds(self) -> tuple[NDArray[np.uint8], NDArray[np.intp]]:
         """The Q different sets of kinds that sentences name (Q, K), and which of them each sentence names (S,)."""
-        found, places = np.unique(self.names, axis=0, return_inverse=True)
-        return found, places.reshape(-1)
+        kinds, places = np.unique(self.names, axis=0, return_inverse=True)
+        return kinds, places.reshape(-1)
 
     @property
     def sets(self) -> NDArray[np.uint8]:
@@ -133,19 +133,19 @@ class Known:
     @cached_property
     def _told(self) -> Array:
         """Which sets of kinds sentences about which actions name (A, Q)."""
-        told = np.zeros(self._right.shape)
-        told[self.said, self._kinds[1]] = 1
-        return told
+        sentence_exists = np.zeros(self._right.shape)
+        sentence_exists[self.said, self._kinds[1]] = 1
+        return sentence_exists
 
     def near(self, vectors: Floats) -> tuple[Array, Array]:
         """How much each action counts (N, A), 1 in all, by the motions near vectors (N, E); and the greatest
         similarity (N,)."""
-        how, (motions, views) = self.settings, self.vectors.shape[:2]
+        settings, (motions, views) = self.settings, self.vectors.shape[:2]
         every = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: motions * views].T
         alike = every.reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
         best = alike.max(axis=1, keepdims=True)
-        least = np.sort(alike, axis=1)[:, -min(how.near, motions)][:, None]
-        weights = np.where(alike >= least, np.exp((alike - best) / how.temperature), 0.0)
+        least = np.sort(alike, axis=1)[:, -min(settings.near, motions)][:, None]
+        weights = np.where(alike >= least, np.exp((alike - best) / settings.temperature), 0.0)
         counted = np.zeros((len(vectors), len(self.shown)))
         np.add.at(counted.T, self.actions, weights.T)
         return counted / weights.sum(axis=1, keepdims=True), best[:, 0]
@@ -158,19 +158,19 @@ class Known:
     def answers(self, seen: Sequence[Seen], count: int = 1) -> list[list[Answer]]:
         """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of
         :data:`NOTHING` where the motion is too short, or like none that is known."""
-        how = self.settings
-        found = list[list[Answer]]()
-        for one in seen:  # one by one, so that each gets the very bits that it gets alone
-            counted, (similarity,) = self.near(one.vector[None])
+        settings = self.settings
+        answers = list[list[Answer]]()
+        for motion in seen:  # one by one, so that each gets the very bits that it gets alone
+            counted, (similarity,) = self.near(motion.vector[None])
             (row,), (share,) = counted, self.shares(counted)
-            if one.seconds < how.shortest or similarity < how.outside:
-                found.append([Answer(NOTHING, 0.0)])
+            if motion.seconds < settings.shortest or similarity < settings.outside:
+                answers.append([Answer(NOTHING, 0.0)])
                 continue
             best = [int(q) for q in np.argsort(-share, kind="stable")[:count] if share[q] > 0]
             chances = self.probability(share[best])
-            said = [self._sentence(q, row, one) for q in best]
-            found.append([Answer(text, float(chance)) for text, chance in zip(said, chances, strict=True)])
-        return found
+            sentences = [self._sentence(q, row, motion) for q in best]
+            answers.append([Answer(text, float(chance)) for text, chance in zip(sentences, chances, strict=True)])
+        return answers
 
     def probability(self, share: Array) -> Array:
         """How probable it is that sentences are right, of the ``share`` (N,) of near motions that each is right about.
@@ -238,7 +238,7 @@ def known_of(model: BundleModel) -> Known:
     """The known motions of a model, from its tables; BundleError where one is missing or does not fit."""
     table = model.table
     text = table("known_sentences", "BYTES", "uint8").tobytes().decode("utf-8", "replace").split("\n")
-    found = Known(
+    known = Known(
         table("known_vectors", "MOTIONS VIEWS E", "int8"),
         table("known_actions", "MOTIONS", "int16"),
         table("known_shown", "ACTIONS KINDS", "uint8"),
@@ -248,9 +248,9 @@ def known_of(model: BundleModel) -> Known:
         table("known_ways", "SENTENCES 3", "int16"),
         model.settings(AnswerSettings),
     )
-    for name, rows in (("known_actions", found.actions), ("known_said", found.said)):
-        if not len(rows) or rows.min() < 0 or rows.max() >= len(found.shown):
-            raise BundleError(f"manifest, tables: {name!r} has numbers that are none of {len(found.shown)} actions")
-    if len(text) != len(found.said) or not found.vectors.size:
-        raise BundleError(f"manifest, tables: 'known_sentences' has {len(text)} lines, expected {len(found.said)}")
-    return found
+    for name, rows in (("known_actions", known.actions), ("known_said", known.said)):
+        if not len(rows) or rows.min() < 0 or rows.max() >= len(known.shown):
+            raise BundleError(f"manifest, tables: {name!r} has numbers that are none of {len(known.shown)} actions")
+    if len(text) != len(known.said) or not known.vectors.size:
+        raise BundleError(f"manifest, tables: 'known_sentences' has {len(text)} lines, expected {len(known.said)}")
+    return known

@@ -90,11 +90,11 @@ class FillModel(BundleModel):
             return self._filled(travelling(motions), cast(Sequence[Gap], gaps))
         if len(gaps) != len(motions):
             raise MotionError(f"{len(motions)} motions need a list of gaps for each, not {len(gaps)}")
-        found = list[Motion]()
-        for motion, own in zip(motions, cast(Sequence[Sequence[Gap]], gaps), strict=True):
-            found.append(self._filled(travelling(motion), own))
-            progress(len(found), len(motions))
-        return found
+        filled = list[Motion]()
+        for motion, motion_gaps in zip(motions, cast(Sequence[Sequence[Gap]], gaps), strict=True):
+            filled.append(self._filled(travelling(motion), motion_gaps))
+            progress(len(filled), len(motions))
+        return filled
 
     def _filled(self, motion: Motion, gaps: Sequence[Gap]) -> Motion:
         spans = self._spans(motion, gaps)
@@ -186,16 +186,16 @@ class FillModel(BundleModel):
         plain = bridge(past, after, frames, pace)
         if not frames:
             return plain
-        rows = (one[None].astype(np.float32) for one in (past, plain, after))
+        rows = (values[None].astype(np.float32) for values in (past, plain, after))
         filled: Array = put_at(self.loop.run(self.graphs["filler"], *rows)[0], pose)
         return filled
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Placed frames "past" (P, E) and "after" (A, E), and the number of "frames" of the settings, to "filled"."""
         count = int(settings["frames"])
         if not 1 <= count <= self.longest:
             raise BundleError(f"golden vectors fill a gap of 1 to {self.longest} frames, not {count}")
-        return {"filled": self.frames_between(given["past"], given["after"], count)}
+        return {"filled": self.frames_between(inputs["past"], inputs["after"], count)}
 
     def _joined(self, first: Motion, second: Motion, seconds: float) -> tuple[Motion, Motion, Motion]:
         """The first motion, the transition, and the second placed after it; all in the channels of the first."""
@@ -230,7 +230,7 @@ class FillModel(BundleModel):
     def _between(self, before: Motion, after: Motion, count: int) -> Motion | None:
         """``count`` frames between two parts of a motion, at its own rate, in its channels; None where they cannot be
         retargeted onto its figure."""
-        own, figure, past, behind = self._sides(before, after)
+        sides, figure, past, behind = self._sides(before, after)
         span = (count + 1) * self.fps / before.fps
         filled = max(0, round(span) - 1)
         new = self.frames_between(past, behind, filled, span / (filled + 1))
@@ -238,7 +238,7 @@ class FillModel(BundleModel):
         times = len(past[-2:]) - 1 + np.arange(count + 2) / (count + 1) * (filled + 1)
         frames = spline(np.concatenate([past[-2:], new, behind[:2]]), times)
         ends = replace(before, values=np.concatenate([before.values[-1:], after.values[:1]]))
-        return from_model_figure(unplaced(frames, replace(figure[:1], fps=before.fps)), own, ends)
+        return from_model_figure(unplaced(frames, replace(figure[:1], fps=before.fps)), sides, ends)
 
     def _sides(self, before: Motion, after: Motion) -> tuple[Motion, Motion, Array, Array]:
         """What is known about a gap, at the model's rate: both sides on their own figure, the same on the humanoid, and
@@ -246,11 +246,11 @@ class FillModel(BundleModel):
         seen = round(SEEN * before.fps)
         past = before[-seen:].continuous().resample(self.fps, to_end=True)
         behind = after[:seen].continuous().resample(self.fps)
-        for part, given, name in ((past, before, "before"), (behind, after, "after")):
+        for part, side, name in ((past, before, "before"), (behind, after, "after")):
             if len(part) < self.least:
                 need = f"at least {self.least / self.fps:.2g} s of motion ({self.least} frames at {self.fps:g} fps)"
-                raise MotionError(f"a gap needs {need} {name} it, but there are {given.duration:.2g} s")
-        own = replace(past, values=np.concatenate([past.values, behind.values]))
-        figure = on_humanoid(own)
+                raise MotionError(f"a gap needs {need} {name} it, but there are {side.duration:.2g} s")
+        sides = replace(past, values=np.concatenate([past.values, behind.values]))
+        figure = on_humanoid(sides)
         frames = placed(figure)
-        return own, figure, frames[: len(past)], frames[len(past) :]
+        return sides, figure, frames[: len(past)], frames[len(past) :]

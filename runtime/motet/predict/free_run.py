@@ -26,21 +26,21 @@ def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int
     again, about the L frames before. Where it gives them all as ``trajectory``, they are taken at once: the step would
     only hand them out.
     """
-    given = seed.shape[1]
+    seed_count = seed.shape[1]
     frames = np.concatenate([seed, np.empty((len(seed), count, seed.shape[2]), dtype=np.float32)], axis=1)
     for n in range(0, count, horizon):
-        found = encoder({"frames": np.ascontiguousarray(frames[:, n : n + given])})
-        coming = frames[:, n + given : n + given + horizon]
-        whole = found.get("trajectory", seed[:, :0])[:, : coming.shape[1]]
+        encoded = encoder({"frames": np.ascontiguousarray(frames[:, n : n + seed_count])})
+        coming = frames[:, n + seed_count : n + seed_count + horizon]
+        whole = encoded.get("trajectory", seed[:, :0])[:, : coming.shape[1]]
         if whole.shape == coming.shape:
             coming[:] = whole
             continue
-        state = zero_state(step, len(seed), found) | {k: v for k, v in found.items() if k in step.spec.feedback}
-        constant = {k: v for k, v in found.items() if k not in state and step.spec.takes(k)}
+        state = zero_state(step, len(seed), encoded) | {k: v for k, v in encoded.items() if k in step.spec.feedback}
+        constant = {k: v for k, v in encoded.items() if k not in state and step.spec.takes(k)}
         for frame in np.moveaxis(coming, 1, 0):
             outputs, state = advance(step, state, constant)
             frame[:] = outputs["frame"]
-    return frames[:, given:]
+    return frames[:, seed_count:]
 
 
 LOOPS: Mapping[str, Loop] = {"free_run": Loop(free_run, {}, {"frame": "batch D"}, FreeRunSettings, batch=4096)}

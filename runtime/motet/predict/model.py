@@ -54,11 +54,11 @@ class PredictModel(BundleModel):
         encoder = graphs["encoder"].spec
         step = graphs["step"].spec
         self.bind("encoder", {"frames": "batch L D"}, {})
-        bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, given=encoder.outputs)
+        bind("step", step, self.loop.inputs, self.loop.outputs, self.sizes, provided=encoder.outputs)
         self.seed_frames = self.sizes["L"]
         if self.knows_errors:
             known = (*encoder.inputs, *encoder.outputs)
-            bind("error", graphs["error"].spec, {}, {"error": "batch N"}, self.sizes, given=known)
+            bind("error", graphs["error"].spec, {}, {"error": "batch N"}, self.sizes, provided=known)
             if self.sizes["N"] != self.horizon:
                 raise BundleError(f"graph error: outputs {self.sizes['N']} errors for a horizon of {self.horizon}")
 
@@ -114,23 +114,25 @@ class PredictModel(BundleModel):
         where ``beyond`` is not a motion-code model.
         """
         count = self.count(seconds, frames)
-        given = [travelling(motion) for motion in motions_of(motions)]
+        travelled = [travelling(motion) for motion in motions_of(motions)]
         needs(beyond, GenerateModel | None, "beyond to be a model, such as motet.load('generate')")
         if beyond is not None and count > self.horizon:
-            found = self._beyond(given, count, append, progress, beyond, seeds_of(seed, len(given), DecodingError))
+            seeds = seeds_of(seed, len(travelled), DecodingError)
+            predicted = self._beyond(travelled, count, append, progress, beyond, seeds)
         else:
-            found = []
-            seen = [self._seen(motion) for motion in given]
-            for start in range(0, len(given), self.loop.batch):
+            predicted = []
+            seen = [self._seen(motion) for motion in travelled]
+            for start in range(0, len(travelled), self.loop.batch):
                 part = seen[start : start + self.loop.batch]
                 following = self.next_frames([last for *_, last in part], count)
-                found += [self._shown(new, *one[:2], append) for one, new in zip(part, following, strict=True)]
-                progress(len(found), len(given))
-        return found[0] if isinstance(motions, Motion) else found
+                for (whole, figure, _), new in zip(part, following, strict=True):
+                    predicted.append(self._shown(new, whole, figure, append))
+                progress(len(predicted), len(travelled))
+        return predicted[0] if isinstance(motions, Motion) else predicted
 
     def _beyond(
         self,
-        given: Sequence[Motion],
+        motions: Sequence[Motion],
         count: int,
         append: bool,
         progress: Progress,
@@ -138,12 +140,12 @@ class PredictModel(BundleModel):
         seeds: Sequence[int],
     ) -> list[Motion]:
         """More frames than the horizon, all but the first by a code model."""
-        found = list[Motion]()
-        for motion, seed in zip(given, seeds, strict=True):
+        predicted = list[Motion]()
+        for motion, seed in zip(motions, seeds, strict=True):
             start = self.predict(motion, frames=self.sure, append=True)
-            found += futures(writer, start, count, [seed], append, predicted=self.sure / self.fps)
-            progress(len(found), len(given))
-        return found
+            predicted += futures(writer, start, count, [seed], append, predicted=self.sure / self.fps)
+            progress(len(predicted), len(motions))
+        return predicted
 
     def futures(  # noqa: PLR0913  settings, all but the first of which have a default
         self,
@@ -193,17 +195,17 @@ class PredictModel(BundleModel):
         Each row is the same as alone, bit for bit with one thread.
         DecodingError for a number of frames out of range, MotionError for seeds of another shape.
         """
-        given = np.asarray(seeds, dtype=np.float32)
+        seed_rows = np.asarray(seeds, dtype=np.float32)
         count = self.count(None, frames)
         shape = (self.seed_frames, len(self.contract.channels))
-        if given.ndim != 3 or given.shape[1:] != shape:
+        if seed_rows.ndim != 3 or seed_rows.shape[1:] != shape:
             takes = f"the model takes (batch, {shape[0]}, {shape[1]})"
-            raise MotionError(f"seeds of shape {given.shape} do not fit: {takes}")
-        if not np.isfinite(given).all():
+            raise MotionError(f"seeds of shape {seed_rows.shape} do not fit: {takes}")
+        if not np.isfinite(seed_rows).all():
             raise MotionError("seeds must be finite numbers")
-        rows = given[two_rows(np.arange(len(given)))]
-        found: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], rows, count, self.horizon)
-        return found[: len(given)]
+        rows = seed_rows[two_rows(np.arange(len(seed_rows)))]
+        continued: Floats = self.loop.run(self.graphs["encoder"], self.graphs["step"], rows, count, self.horizon)
+        return continued[: len(seed_rows)]
 
     def expected_errors(self, motions: Motion | Sequence[Motion]) -> Floats:
         """Expected joint position error of each predicted frame, in centimetres.
@@ -214,22 +216,22 @@ class PredictModel(BundleModel):
         """
         if not self.knows_errors:
             raise DecodingError(f"{self!r} does not estimate its errors: it has no graph 'error'")
-        given = [travelling(motion) for motion in motions_of(motions)]
-        seeds = np.zeros((len(given), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
-        for row, motion in zip(seeds, given, strict=True):
+        travelled = [travelling(motion) for motion in motions_of(motions)]
+        seeds = np.zeros((len(travelled), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
+        for row, motion in zip(seeds, travelled, strict=True):
             row[:] = self._seen(motion)[2]
-        known = {"frames": seeds[two_rows(np.arange(len(given)))]}
+        known = {"frames": seeds[two_rows(np.arange(len(travelled)))]}
         known |= self.graphs["encoder"](known)
         error = self.graphs["error"]
-        found = 100 * error({t.name: known[t.name] for t in error.spec.inputs})["error"][: len(given)]
-        return found[0] if isinstance(motions, Motion) else found
+        errors = 100 * error({t.name: known[t.name] for t in error.spec.inputs})["error"][: len(travelled)]
+        return errors[0] if isinstance(motions, Motion) else errors
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Seed frames (L, C) and the number of "frames" of the settings to the next frames (frames, C)."""
         count = int(settings["frames"])
         if count > 1000:
             raise BundleError(f"golden vectors hold at most 1000 frames, not {count}")
-        return {"frames": self.next_frames(given["frames"][None], count)[0]}
+        return {"frames": self.next_frames(inputs["frames"][None], count)[0]}
 
     def stream(self, start: Motion | None = None) -> "PredictSession":
         """A session to push frames into as they arrive.

@@ -72,20 +72,20 @@ class SearchModel(LanguageModel):
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The unit vector (E,) float32 of a motion, or vectors (N, E) of several; MotionError like :meth:`frames`."""
-        given = motions_of(motions)
-        found = self.contexts([self.frames(motion) for motion in given], "motion")
-        return found[0] if isinstance(motions, Motion) else found
+        many = motions_of(motions)
+        vectors = self.contexts([self.frames(motion) for motion in many], "motion")
+        return vectors[0] if isinstance(motions, Motion) else vectors
 
     def embed_text(self, sentences: str | Sequence[str]) -> Floats:
         """The unit vector (E,) float32 of a sentence, or vectors (N, E) of several; errors like :meth:`ids`."""
-        given = texts_of(sentences)
-        found = self.contexts([self.ids(text) for text in given], "text")
-        return found[0] if isinstance(sentences, str) else found
+        texts = texts_of(sentences)
+        vectors = self.contexts([self.ids(text) for text in texts], "text")
+        return vectors[0] if isinstance(sentences, str) else vectors
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """Frames (T, D) and a sentence ("text" of the settings) to ids (words,) int64 and the vectors (E,) of both."""
         ids, _ = self.vocabulary.encode(str(settings["text"]))
-        motion = self.contexts([given["frames"]], "motion")
+        motion = self.contexts([inputs["frames"]], "motion")
         text = self.contexts([ids], "text")
         return {"ids": ids, "motion": motion[0], "text": text[0]}
 
@@ -192,10 +192,10 @@ class Index:
             folder = place
             shard = shard or Shard()
         known = [one for one in (before, *(_read(Path(one), model) for one in merge)) if one is not None]
-        found = _renewed(folder, model, known, unit, jobs, shard, progress)
-        if before is None or _state(before) != _state(found):
-            _keep(found, kept, needed=file is not None)
-        return _usable(found)
+        index = _renewed(folder, model, known, unit, jobs, shard, progress)
+        if before is None or _state(before) != _state(index):
+            _keep(index, kept, needed=file is not None)
+        return _usable(index)
 
     @property
     def failed(self) -> dict[Path, str]:
@@ -227,24 +227,24 @@ class Index:
         return [(member, *window) for member in self.members for window in member.windows]
 
     def _nearest(self, query: Query, wanted: int) -> list[Hit]:
-        how = self.model.settings(IndexSettings)
+        settings = self.model.settings(IndexSettings)
         if isinstance(query, str):
             vector = self.model.embed_text(query)
-            least = how.like_text
+            least = settings.like_text
         else:
             vector = direction(self.model, query)
-            least = how.like_motion
+            least = settings.like_motion
         scores = self.vectors @ vector
-        found: dict[str, Hit] = {}
+        hits: dict[str, Hit] = {}
         for row in self._best_first(scores):
             member, start, stop = self._windows[row]
-            if member.name not in found:
+            if member.name not in hits:
                 place = self.folder / member.path
                 score = float(scores[row])
-                found[member.name] = Hit(place, start, stop, score, member.clip, member.in_place, score >= least)
-            if len(found) == wanted:
+                hits[member.name] = Hit(place, start, stop, score, member.clip, member.in_place, score >= least)
+            if len(hits) == wanted:
                 break
-        return list(found.values())
+        return list(hits.values())
 
     def _best_first(self, scores: Floats) -> Iterator[int]:
         """The columns of scores (N,) by the model's loop: the few that are mostly enough, then more."""
@@ -261,8 +261,8 @@ def direction(model: SearchModel, motion: Motion) -> Floats:
     """The unit vector (E,) float32 of a motion of any length: the mean direction of its windows; MotionError for one
     that the model cannot take."""
     mean = model.embed([part for _, part in model.windows(motion, model.settings(IndexSettings).window)]).mean(axis=0)
-    found: Floats = mean / np.linalg.norm(mean)
-    return found
+    unit_direction: Floats = mean / np.linalg.norm(mean)
+    return unit_direction
 
 
 def _renewed(
@@ -276,8 +276,8 @@ def _renewed(
 ) -> Index:
     """The current index of a folder, reusing the entries of unchanged files."""
     known: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}  # by path, size and modification time
-    for one in before:
-        known |= _entries(one) if one.unit == unit else {}
+    for index in before:
+        known |= _entries(index) if index.unit == unit else {}
     if not folder.is_dir():
         raise FormatError(folder, "neither a folder of motion files nor an index of one")
     paths = shard.of(files_in(folder, MOCAP))
@@ -286,22 +286,22 @@ def _renewed(
     files = list(map(partial(_file, folder), paths))
     new = [file for file in files if file.state not in known]
     embedded = in_order(partial(_embedded, folder, model=model, unit=unit), new, jobs)
-    found = list[tuple[Member, Floats]]()
+    rows = list[tuple[Member, Floats]]()
     for done, file in enumerate(files, start=1):
-        found += known.get(file.state) or next(embedded)
+        rows += known.get(file.state) or next(embedded)
         progress(done, len(paths))
-    members, vectors = zip(*found, strict=True)
+    members, vectors = zip(*rows, strict=True)
     gone = sorted(path for path in {path for path, _, _ in known} if not (folder / path).exists())
     return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit, shard)
 
 
 def _entries(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
     """The members of each file, by its :attr:`Member.state`, with their vectors (windows, E)."""
-    found: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
+    entries: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
     stops = np.cumsum([len(member.windows) for member in index.members])
     for member, rows in zip(index.members, np.split(index.vectors, stops)[:-1], strict=True):
-        found.setdefault(member.state, []).append((member, rows))
-    return found
+        entries.setdefault(member.state, []).append((member, rows))
+    return entries
 
 
 def _state(index: Index) -> tuple[object, ...]:
@@ -320,7 +320,7 @@ def _embedded(folder: Path, file: Member, model: SearchModel, unit: str | float 
         names = clips(path)
     except MotetError:  # it is said when the file is read
         names = ()
-    found = []
+    entries = []
     for member in [replace(file, clip=name) for name in names] if len(names) > 1 else [file]:
         try:
             motion = read_motion(path, unit=unit, clip=member.clip or None)
@@ -329,12 +329,12 @@ def _embedded(folder: Path, file: Member, model: SearchModel, unit: str | float 
             parts = model.windows(motion, model.settings(IndexSettings).window)
             vectors = model.embed([part for _, part in parts])
             windows = tuple((start, start + part.duration) for start, part in parts)
-            found.append((replace(member, windows=windows, in_place=in_place), vectors))
+            entries.append((replace(member, windows=windows, in_place=in_place), vectors))
         except MotetError as error:
             hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
             fault = str(error).removeprefix(f"{path}: ") + hint
-            found.append((replace(member, fault=fault), np.empty((0, model.sizes["E"]), np.float32)))
-    return found
+            entries.append((replace(member, fault=fault), np.empty((0, model.sizes["E"]), np.float32)))
+    return entries
 
 
 def _keep(index: Index, file: Path, needed: bool) -> None:
@@ -357,14 +357,14 @@ def _keep(index: Index, file: Path, needed: bool) -> None:
         log.warning("the index is not kept: %s", error)
 
 
-def _usable(found: Index) -> Index:
+def _usable(index: Index) -> Index:
     """An index, once files that vanished are logged; MotionError where it has no motion."""
-    for path in found.vanished:
+    for path in index.vanished:
         log.warning("%s has vanished since it was indexed", path)
-    if not len(found.vectors):
-        path, fault = next(iter(found.failed.items()))
-        raise MotionError(f"none of {len(found.members)} motion files of {found.folder} can be used: {path}: {fault}")
-    return found
+    if not len(index.vectors):
+        path, fault = next(iter(index.failed.items()))
+        raise MotionError(f"none of {len(index.members)} motion files of {index.folder} can be used: {path}: {fault}")
+    return index
 
 
 def _read(file: Path, model: SearchModel) -> Index:

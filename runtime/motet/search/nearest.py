@@ -22,12 +22,12 @@ def nearest(scores: Floats, count: int) -> Ids:
     """The columns (..., count) of the greatest of scores (..., N), best first, of equal ones the first."""
     falling = -scores.reshape(-1, scores.shape[-1])
     count = min(count, falling.shape[1])
-    found = np.zeros((len(falling), count), dtype=np.int64)
-    for row, chosen in zip(falling, found, strict=True):
+    nearest_rows = np.zeros((len(falling), count), dtype=np.int64)
+    for row, chosen in zip(falling, nearest_rows, strict=True):
         last = np.partition(row, count - 1)[count - 1]
         near = np.flatnonzero(~(row > last))  # all that are as great as the last one wanted, of which the first count
         chosen[:] = near[np.argsort(row[near], kind="stable")][:count]
-    return found.reshape(*scores.shape[:-1], count)
+    return nearest_rows.reshape(*scores.shape[:-1], count)
 
 
 LOOPS: Mapping[str, Loop] = {"nearest": Loop(nearest, {}, {}, NearestSettings)}
