@@ -13,9 +13,9 @@ LARGE_FUNCTION = 250
 MOST_LARGE_FUNCTIONS = 239
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 296
-MOST_TUPLE_ASSIGNMENTS = 29
-MOST_NESTED_COMPREHENSIONS = 93
+MOST_BANNED_NAMES = 57
+MOST_TUPLE_ASSIGNMENTS = 26
+MOST_NESTED_COMPREHENSIONS = 85
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -85,17 +85,17 @@ ONE_WAY = {
 CEILINGS = {
     "motet": 3_200,
     "motet.bench": 5_200,
-    "motet.bundle": 10_200,
-    "motet.cli": 16_600,
+    "motet.bundle": 10_300,
+    "motet.cli": 16_700,
     "motet.compose": 7_600,
     "motet.corpus": 9_200,
-    "motet.decode": 3_900,
+    "motet.decode": 4_000,
     "motet.draw": 12_000,
     "motet.figures": 32_400,
     "motet.formats": 37_100,
     "motet.generate": 26_100,
     "motet.live": 5_700,
-    "motet.models": 9_200,
+    "motet.models": 9_300,
     "motet.motion": 16_100,
     "motet.papers": 7_300,
     "motet.predict": 5_400,
