@@ -45,7 +45,11 @@ class Many:
         """The motions of this shard that files, folders, zips and patterns name. every: all clips where nothing says
         which."""
         files = self.shard.of(list(enumerate(files_of(paths))))
-        return [replace(source, number=number) for number, file in files for source in self.read.sources([file], every)]
+        sources: list[Source] = []
+        for number, file in files:
+            for source in self.read.sources([file], every):
+                sources.append(replace(source, number=number))
+        return sources
 
     def answers(self, verb: Verb, sources: Sequence[Source], label: str, named: bool = True) -> Iterator[Answer]:
         """The answers in order, with progress where they are not printed as they come. named: failures are said."""

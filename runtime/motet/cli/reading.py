@@ -49,7 +49,10 @@ class Read:
     def sources(self, paths: Sequence[Path], every: bool = False) -> list[Source]:
         """The motions of files, as ``--clip``, ``--figure`` or their own names (a.glb#Walk) select them. every: all
         clips where nothing does."""
-        return [source for path in paths for source in sources_of(path, self.clip, self.figure, every)]
+        sources: list[Source] = []
+        for path in paths:
+            sources += sources_of(path, self.clip, self.figure, every)
+        return sources
 
     def say_resampled(self, rate_of: Callable[[], float]) -> None:
         """Log in one line how many of the motions that were read have another frame rate than a model's, for which a

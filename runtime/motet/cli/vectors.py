@@ -128,7 +128,9 @@ def search(
     if shard is not None and file is None:
         raise click.UsageError("--shard writes an index of a part: give --index FILE")
     part = None if shard is None else Shard.parse(shard)
-    parts = [one for given in merge for one in _indexes(given)]
+    parts: list[Path] = []
+    for path in merge:
+        parts += _indexes(path)
     model = load_as(SearchModel, bundle, session)
     motion = read_motion(query, unit=unit_in) if names_motion(query) else None
     if motion is None:
@@ -141,8 +143,8 @@ def search(
     _told(hits, as_json)
     if not hits[0].like:
         click.echo(f"motet: nothing like {query!r} is in {folder}", err=True)
-    for path, fault in index.failed.items():
-        click.echo(f"motet: {path}: {fault}", err=True)
+    for failed, fault in index.failed.items():
+        click.echo(f"motet: {failed}: {fault}", err=True)
     sys.exit(1 if index.failed else 0)
 
 

@@ -152,10 +152,13 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output:
         return [place.with_stem(f"{place.stem}-{i}") if count > 1 else place for i in range(1, count + 1)]
 
     onto = output is not None and output.onto is not None
+    targets: list[Path] = []
     if onto:
-        targets = [named(source) for source in sources for _ in range(samples)]
+        for source in sources:
+            targets += [named(source)] * samples
     elif re.search(fields, str(out)):
-        targets = [place for source in sources for place in numbered(named(source), samples)]
+        for source in sources:
+            targets += numbered(named(source), samples)
     else:
         targets = numbered(out, len(sources) * samples)
     if len(set(targets)) < len(targets) and not onto:

@@ -79,12 +79,15 @@ def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> lis
         words = np.concatenate([np.take_along_axis(words, parents[:, :, None], 1), chosen[:, :, None]], axis=2)
         places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * beams).ravel() % len(alive)
         state = {name: np.take(array, places, axis=0) for name, array in following.items()}
-    hypotheses: list[list[Hypothesis]] = []
-    for sequences, probabilities in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True):
-        hypotheses.append([])
-        for ids, score in zip(sequences, probabilities, strict=True):
-            if np.isfinite(score):
-                hypotheses[-1].append(Hypothesis(tuple(ids[: ids.index(end)]), score, score))
+    return [_hypotheses(*row, end) for row in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)]
+
+
+def _hypotheses(sequences: list[list[int]], scores: list[float], end: int) -> list[Hypothesis]:
+    """The hypotheses of one row, without the places that none took."""
+    hypotheses = []
+    for ids, score in zip(sequences, scores, strict=True):
+        if np.isfinite(score):
+            hypotheses.append(Hypothesis(tuple(ids[: ids.index(end)]), score, score))
     return hypotheses
 
 

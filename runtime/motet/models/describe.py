@@ -162,16 +162,18 @@ class DescribeModel(LanguageModel):
         if "draws" in settings:
             settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
         contexts = self.embed(motions_of(motions))
-        least = self.settings(ConfidenceSettings).log_probability
-        decode = self.vocabulary.decode
-        rows: list[list[Description]] = []
-        for hypotheses in self._hypotheses(loop, contexts, settings, progress):
-            rows.append([])
-            for hypothesis in hypotheses:
-                log_probability = hypothesis.log_probability
-                text = decode(hypothesis.ids)
-                rows[-1].append(Description(text, log_probability, hypothesis.score, log_probability >= least))
+        rows = list(map(self._described, self._hypotheses(loop, contexts, settings, progress)))
         return rows[0] if isinstance(motions, Motion) else rows
+
+    def _described(self, hypotheses: Sequence[Hypothesis]) -> list[Description]:
+        """The hypotheses as sentences, and whether each is probable enough to be relied on."""
+        least = self.settings(ConfidenceSettings).log_probability
+        descriptions = []
+        for hypothesis in hypotheses:
+            log_probability = hypothesis.log_probability
+            text = self.vocabulary.decode(hypothesis.ids)
+            descriptions.append(Description(text, log_probability, hypothesis.score, log_probability >= least))
+        return descriptions
 
     def _decoding(self, decoding: str | None, draws: int | None) -> str | None:
         """How to decode, None for the bundle's loop; DecodingError where that is not possible."""

@@ -133,14 +133,15 @@ class Known:
     @cached_property
     def _told(self) -> Array:
         """Which sets of kinds sentences about which actions name (A, Q)."""
-        sentence_exists = np.zeros(self._right.shape)
-        sentence_exists[self.said, self._kinds[1]] = 1
-        return sentence_exists
+        names = np.zeros(self._right.shape)
+        names[self.said, self._kinds[1]] = 1
+        return names
 
     def near(self, vectors: Floats) -> tuple[Array, Array]:
         """How much each action counts (N, A), 1 in all, by the motions near vectors (N, E); and the greatest
         similarity (N,)."""
-        settings, (motions, views) = self.settings, self.vectors.shape[:2]
+        settings = self.settings
+        motions, views = self.vectors.shape[:2]
         every = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: motions * views].T
         alike = every.reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
         best = alike.max(axis=1, keepdims=True)
@@ -162,7 +163,8 @@ class Known:
         answers = list[list[Answer]]()
         for motion in seen:  # one by one, so that each gets the very bits that it gets alone
             counted, (similarity,) = self.near(motion.vector[None])
-            (row,), (share,) = counted, self.shares(counted)
+            (row,) = counted
+            (share,) = self.shares(counted)
             if motion.seconds < settings.shortest or similarity < settings.outside:
                 answers.append([Answer(NOTHING, 0.0)])
                 continue
@@ -186,7 +188,8 @@ class Known:
         rows = np.flatnonzero((self._kinds[1] == kinds) & (counted[self.said] > 0))
         fits, side = self._fits(rows, seen.turn)
         best = int(rows[np.lexsort((-counted[self.said[rows]], -fits))[0]])
-        text, (way, _, going) = self.sentences[best], self.ways[best]
+        text = self.sentences[best]
+        way, _, going = self.ways[best]
         if going and seen.ahead <= -self.settings.backwards and not BACKWARDS.search(text):
             text += ", backwards"
         if going and side and way != side:

@@ -191,7 +191,11 @@ class Index:
         else:
             folder = place
             shard = shard or Shard()
-        known = [one for one in (before, *(_read(Path(one), model) for one in merge)) if one is not None]
+        known = [] if before is None else [before]
+        for path in merge:
+            merged = _read(Path(path), model)
+            if merged is not None:
+                known.append(merged)
         index = _renewed(folder, model, known, unit, jobs, shard, progress)
         if before is None or _state(before) != _state(index):
             _keep(index, kept, needed=file is not None)
@@ -224,7 +228,11 @@ class Index:
 
     @cached_property
     def _windows(self) -> list[tuple[Member, float, float]]:
-        return [(member, *window) for member in self.members for window in member.windows]
+        windows = []
+        for member in self.members:
+            for start, stop in member.windows:
+                windows.append((member, start, stop))
+        return windows
 
     def _nearest(self, query: Query, wanted: int) -> list[Hit]:
         settings = self.model.settings(IndexSettings)
@@ -291,8 +299,9 @@ def _renewed(
         rows += known.get(file.state) or next(embedded)
         progress(done, len(paths))
     members, vectors = zip(*rows, strict=True)
-    gone = sorted(path for path in {path for path, _, _ in known} if not (folder / path).exists())
-    return Index(model, folder, members, np.concatenate(vectors), tuple(folder / path for path in gone), unit, shard)
+    known_paths = sorted({path for path, _, _ in known})
+    vanished = tuple(folder / path for path in known_paths if not (folder / path).exists())
+    return Index(model, folder, members, np.concatenate(vectors), vanished, unit, shard)
 
 
 def _entries(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
