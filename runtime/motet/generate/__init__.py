@@ -7,6 +7,6 @@ A story draws its parts one after another and keeps the numbers of its sentences
 motion_measures.py). A motion that no sentence describes is continued by continuation.py and its loop continue_codes.py.
 
 Main names: CodesModel (model.py), GenerateModel and Generated (base.py), Writer (codes.py), Memory (memory.py).
-Numbers: CodesSettings (codes.py), ContinuationSettings (continue_codes.py), FamiliaritySettings (model.py), and the
-constants at the head of memory.py and motion_measures.py.
+Numbers: CodesSettings (codes.py), MemorySettings (memory.py), ContinuationSettings (continue_codes.py),
+FamiliaritySettings (model.py), and the constants at the head of motion_measures.py.
 """

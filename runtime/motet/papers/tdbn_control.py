@@ -111,12 +111,12 @@ class TdbnModel(ControlModel):
         """See :meth:`ControlModel.captions`."""
         return captions(parse_segments(script, self.labels))
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """From the start of the first label, at variety 1: a track (T, labels) and noise (T, N) to frames (T, D). With
         several iterations a tick (of the settings), each tick has that many rows of noise."""
         session = self.start(variety=1.0, iterations=settings.get("iterations"), smooth=False)
-        session.noise = RowsOfNoise(given["noise"])
-        return {"frames": session.frames(given["track"])[0]}
+        session.noise = RowsOfNoise(inputs["noise"])
+        return {"frames": session.frames(inputs["track"])[0]}
 
     def _begun(self, start: Motion | str | None) -> tuple[Floats, str | None]:
         """The frames (K, D) that a session begins from, and the label that they show; None after a motion."""

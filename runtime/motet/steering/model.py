@@ -235,8 +235,8 @@ class SteerModel(ControlModel):
         """See :meth:`ControlModel.captions`."""
         return captions(parse_orders(script, self.gaits))
 
-    def replay(self, given: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
         """A track (T, 3) of velocities along x and z, m/s, and facings, radians, to frames (T, D)."""
         session = self.start(hold_feet=False)
-        poses = [session.tick_to(target[None]) for target in given["track"].astype(np.float64)]
+        poses = [session.tick_to(target[None]) for target in inputs["track"].astype(np.float64)]
         return {"frames": session.frames_of(poses)[0]}
