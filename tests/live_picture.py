@@ -16,7 +16,7 @@ STEPS = """(() => {
   motet.stage.zoom(1.7);
   const walk = { gait: 0, x: 0, z: 1.2, facing: 0 };
   for (let i = 0; i < 60; i++) motet.tick(walk);
-  motet.told(document.getElementById("text").value = "wave");
+  motet.obey(document.getElementById("text").value = "wave");
   for (let i = 0; i < 60; i++) motet.tick(walk);
   document.getElementById("pause").click();
 })()"""

@@ -46,7 +46,9 @@ def run() -> Run:
 def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> None:
     report = export_run(run, tmp_path / "x.zip")
     assert set(report["runs"]) >= {"horizon", "beyond"}
-    assert max(rung["error"] for rung in report.values() if "bound" in rung) <= 1e-5
+    for name, rung in report.items():
+        if "bound" in rung:
+            assert rung["error"] <= (rung["bound"] if name.endswith(".far") else 1e-5), name
     bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(Manifest.from_json(run.manifest), run.torch_graphs())
     assert isinstance(bundle, PredictModel)
     seeds = 0.3 * np.random.default_rng(0).normal(size=(7, 10, CHANNELS))

@@ -12,7 +12,7 @@ import motet
 from motet.steering.model import SteerModel
 
 PRESSED = "document.querySelector('#{}').ariaPressed"
-GONE = "(() => { for (let n = 0; n < 90; n++) motet.tick(motet.asked()); return motet.figures[0].root; })()"
+GONE = "(() => { for (let n = 0; n < 90; n++) motet.tick(motet.command()); return motet.figures[0].root; })()"
 
 LED = "new Promise((done) => { (function look() { motet.pilot ? done(motet.pilot.goal) : setTimeout(look, 5); })(); })"
 """The goal of the tap that was made, as soon as the page has handled it."""
@@ -98,7 +98,7 @@ def test_fingers_do_all_on_a_phone_held_upright(file: Path, tmp_path: Path) -> N
         page.touch("touchStart", (x + wide / 2, y + wide / 2))
         page.touch("touchMove", (x + wide / 2, y))
         assert np.hypot(*page.value("motet.hands.pushed")) == pytest.approx(1, abs=0.02)
-        assert page.value("Math.hypot(motet.asked().x, motet.asked().z)") > 2
+        assert page.value("Math.hypot(motet.command().x, motet.command().z)") > 2
         page.touch("touchEnd")
         assert page.value("motet.hands.pushed") == [0, 0]
         before = page.value("motet.view")

@@ -18,7 +18,7 @@ from motet.figures.humanoid import HUMANOID, T_POSE
 from motet.motion.rotations import Array, quat_to_rotmat
 from motet.steering.model import SteerModel
 
-TICKS = "(() => {{ for (let n = 0; n < {}; n++) motet.tick(motet.asked()); return motet.figures[0].root; }})()"
+TICKS = "(() => {{ for (let n = 0; n < {}; n++) motet.tick(motet.command()); return motet.figures[0].root; }})()"
 
 DROP = """(async () => {{
   const file = new File([Uint8Array.from(atob({content}), (letter) => letter.charCodeAt(0))], {name});
@@ -67,8 +67,8 @@ COLOURED = """(() => {
 BUSY = """(() => {
   const said = ["wave", "kick", "bow", "play the violin"], places = [];
   for (let n = 0; n < 120; n++) {
-    if (n % 3 === 0) motet.told(said[n / 3 % 4]);
-    motet.tick(motet.asked());
+    if (n % 3 === 0) motet.obey(said[n / 3 % 4]);
+    motet.tick(motet.command());
     places.push(motet.figures[0].shown(1).places);
   }
   return places;
@@ -130,7 +130,7 @@ def test_acts_are_typed(page: Browser) -> None:
     lowest = min(HUMANOID.index("leftHand"), HUMANOID.index("rightHand"))
     before = page.value(hands)
     assert "kick" in typed(page, "kick")
-    acting = page.value("(motet.tick(motet.asked()), motet.figures[0].acting)")
+    acting = page.value("(motet.tick(motet.command()), motet.figures[0].acting)")
     assert 1 < acting["left"] < 6
     feet = [page.value(f"({TICKS.format(2)}, {hands})")[HUMANOID.index("rightFoot")] for _ in range(60)]
     assert max(feet) > before[lowest] * 0.5
@@ -221,7 +221,7 @@ def test_a_dropped_motion_is_told_and_done(page: Browser, tmp_path: Path) -> Non
     assert "3.0 s at 30 frames a second" in answer
     assert "It goes" in answer
     before = page.value("motet.figures[0].root")
-    assert page.value("(motet.tick(motet.asked()), motet.figures[0].acting)")["left"] > 1.5
+    assert page.value("(motet.tick(motet.command()), motet.figures[0].acting)")["left"] > 1.5
     assert np.hypot(*np.subtract(page.value(TICKS.format(90)), before)[:2]) > 1
 
 
