@@ -99,8 +99,8 @@ def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None =
 
 def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str, Any]:
     """Rung 2: calls with inputs that are far from all data. "rounding" is how far torch comes from itself when their
-    last bits change; a graph that amplifies it, as divisions by small numbers do, is held to a hundred times its own: the
-    roundings within a graph are many."""
+    last bits change; a graph that amplifies it, as divisions by small numbers do, is held to a hundred times its own,
+    as it rounds at many places."""
     rng = np.random.default_rng(7)
     batches = [4, 100]
     largest = 0.0
