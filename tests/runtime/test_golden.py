@@ -65,7 +65,7 @@ def test_vectors_without_a_meaning_are_read_and_frames_of_another_size_refused(n
     model, golden = load(name), bundle.manifest.golden
     assert golden is not None
     arrays = read(bundle.read(golden.file))
-    assert replay(model, packed(arrays), golden)["meaning"] == 0
+    assert replay(model, packed(arrays), golden)["meaning"] <= 1e-9
     older = {key: value for key, value in arrays.items() if not key.startswith("meaning.")}
     assert set(replay(model, packed(older), golden)) == {*model.graphs, "run"}
     frames = arrays["meaning.in.frames"]
