@@ -147,18 +147,22 @@ def test_the_page_runs_and_draws(page: Browser) -> None:
 
 DRAWN = """(async () => {
   const { painter } = motet.scene, draw = painter.draw.bind(painter);
-  const wait = (time) => new Promise((done) => setTimeout(done, time));
+  const frame = () => new Promise((done) => requestAnimationFrame(done));
   let count = 0;
   painter.draw = (...given) => { draw(...given); count++; };
-  motet.state.pause = true;
-  await wait(1500);
-  const counts = [];
-  for (const done of [() => {}, () => motet.stage.turn(5, 0), () => document.body.click()]) {
+  const inFrames = async (frames, enough) => {
     count = 0;
-    done();
-    await wait(200);
-    counts.push(count);
-    await wait(1200);
+    for (let n = 0; n < frames && count < enough; n++) await frame();
+    return count;
+  };
+  const calm = async () => { for (let n = 0; n < 60 && await inFrames(30, Infinity); n++); };
+  motet.state.pause = true;
+  await calm();
+  const counts = [await inFrames(30, Infinity)];
+  for (const change of [() => motet.stage.turn(5, 0), () => document.body.click()]) {
+    change();
+    counts.push(await inFrames(600, 1));
+    await calm();
   }
   delete painter.draw;
   return counts;
