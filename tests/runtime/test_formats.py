@@ -221,4 +221,4 @@ def test_damaged_files_give_a_motion_or_an_error_of_motet(tmp_path: Path, name: 
         file.write_bytes(original[file])
     assert 50 < len(messages) < 400
     assert max(map(len, messages)) < 2000
-    assert slowest < 20  # such files are read in milliseconds
+    assert slowest < 2

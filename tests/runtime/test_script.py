@@ -71,7 +71,7 @@ def test_long_scripts_are_read_in_no_time_and_refused_in_few_words(script: str) 
     started = time.process_time()
     with pytest.raises(ScriptError) as caught:
         parse_segments(script, LABELS)
-    assert time.process_time() - started < 20  # quadratic work would take minutes
+    assert time.process_time() - started < 2
     assert len(str(caught.value)) < 1000
 
 

@@ -114,7 +114,7 @@ def test_a_long_sentence_is_refused_at_once() -> None:
     started = time.process_time()
     with pytest.raises(TextError, match="400000 letters, but at most 2000"):
         vocabulary.encode("a " * 200_000)
-    assert time.process_time() - started < 5  # a microsecond a letter would be 0.4
+    assert time.process_time() - started < 0.1
 
 
 def test_each_digit_is_a_word() -> None:
