@@ -13,7 +13,7 @@ LARGE_FUNCTION = 250
 MOST_LARGE_FUNCTIONS = 239
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 53
+MOST_BANNED_NAMES = 51
 MOST_TUPLE_ASSIGNMENTS = 23
 MOST_NESTED_COMPREHENSIONS = 77
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and

@@ -1,5 +1,5 @@
-"""Write the reference of the Python interface, docs/reference/api.md, from signatures and docstrings:
-``python docs/reference/api.py``."""
+"""The reference of the Python interface, from signatures and docstrings: a page of the site (mkdocs.yml), and what
+``python docs/reference/api.py`` prints."""
 
 import ast
 import inspect
@@ -8,22 +8,20 @@ import textwrap
 from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, is_typeddict
 
 import motet
 import motet.motion
 
-PAGE = Path(__file__).with_suffix(".md")
 HEAD = """# The Python interface
 
 All public names of `motet`, then those of `motet.motion`, in the order of the alphabet. This page is made from
-docstrings by `python docs/reference/api.py`; [architecture.md](architecture.md) has the conventions.
+docstrings; [architecture.md](architecture.md) has the conventions.
 """
 
 
 def page() -> str:
-    """The text of docs/reference/api.md."""
+    """The text of the page, in Markdown."""
     geometry = [name for name in motet.motion.__all__ if name not in motet.__all__]
     first: dict[Any, str] = {}
     parts = [HEAD]
@@ -122,4 +120,4 @@ def prose(text: str | None) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")
+    print(page())
