@@ -134,24 +134,6 @@ def test_acts_ten_times_a_second_do_not_leap(model: SteerModel) -> None:
     assert np.linalg.norm(np.diff(places, n=2, axis=0), axis=3).max() < 0.2
 
 
-def test_each_of_many_acts_as_it_would_alone(model: SteerModel) -> None:
-    acts = [act_of(model, frames=30), act_of(model, "turn", turn=-2.0)]
-    crowd = model.start(characters=3)
-    crowd.control(gait="walk", speed=[0.0, 1.2, 0.0])
-    ticks(crowd, 5)
-    crowd.act(acts, who=[2, 1])
-    alone = [model.start() for _ in range(3)]
-    for i, session in enumerate(alone):
-        session.control(gait="walk", speed=[0.0, 1.2, 0.0][i])
-        ticks(session, 5)
-    alone[2].act(acts[0])
-    alone[1].act(acts[1])
-    for _ in range(70):
-        pose, own = crowd.tick(), [session.tick() for session in alone]
-        assert np.array_equal(pose.rotations, np.concatenate([one.rotations for one in own]))
-        assert np.array_equal(pose.ground, np.concatenate([one.ground for one in own]))
-
-
 def test_an_act_is_broken_off_without_a_leap(model: SteerModel) -> None:
     session = model.start(characters=2, hold_feet=False)
     session.act(None)  # nothing is done yet

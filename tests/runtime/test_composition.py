@@ -65,14 +65,6 @@ def test_a_composed_sentence_is_the_story_of_its_parts(model: CodesModel) -> Non
     np.testing.assert_array_equal(made.frames, model.story(COMPOSED, seed=4).frames)
 
 
-def test_composed_sentences_among_others_are_what_they_are_alone(model: CodesModel) -> None:
-    found = model.generate(["he jumps", COMPOSED, "he bows"], 2, seed=7)
-    for i, text in enumerate(["he jumps", COMPOSED, "he bows"]):
-        for one, alone in zip(found[i], model.generate(text, 2, seed=7 + i), strict=True):
-            np.testing.assert_array_equal(one.frames, alone.frames)
-    assert not np.array_equal(found[1][0].frames[:20], found[1][1].frames[:20])
-
-
 def test_whole_takes_it_as_one_action(model: CodesModel) -> None:
     (made,) = model.generate(COMPOSED, whole=True)
     assert not isinstance(made, Story)

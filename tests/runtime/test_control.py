@@ -1,5 +1,4 @@
 import json
-import pickle
 import threading
 import zipfile
 from dataclasses import replace
@@ -56,13 +55,6 @@ def test_the_documented_loop_gives_the_same_frames(model: TdbnModel) -> None:
     np.testing.assert_array_equal(found.values, np.stack(frames))
 
 
-@pytest.mark.parametrize("variety", [0.0, 0.5, 1.0])
-def test_a_character_moves_as_it_would_alone(model: TdbnModel, variety: float) -> None:
-    together = model.start(characters=5, seed=3, variety=variety).frames(_track(model))
-    alone = model.start(seed=5, variety=variety).frames(_track(model))
-    np.testing.assert_allclose(together[2], alone[0], atol=1e-3)  # degrees; a matrix product rounds by batch size
-
-
 def test_each_character_has_its_own_control(model: TdbnModel) -> None:
     session = model.start("walk", characters=3)
     session.control(walk=[1, 0, 0.5], run=[0, 1, 0.5])
@@ -71,30 +63,6 @@ def test_each_character_has_its_own_control(model: TdbnModel) -> None:
         alone = model.start("walk")
         alone.control(**values)
         np.testing.assert_allclose(mixed[row], np.concatenate([alone.step() for _ in range(60)]), atol=1e-3)
-
-
-def test_seeds_of_characters_can_be_an_array(model: TdbnModel) -> None:
-    listed, array = (model.start(characters=3, seed=s, variety=1.0).step() for s in ([7, 1, 4], np.array([7, 1, 4])))
-    np.testing.assert_array_equal(array, listed)
-
-
-def test_seeds_repeat_and_differ(model: TdbnModel) -> None:
-    first, again, other = (model.start(seed=seed, variety=1.0).frames(_track(model)) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first, again)
-    assert np.abs(first - other).max() > 1
-    quiet = [model.start(seed=seed).frames(_track(model)) for seed in (1, 2)]
-    np.testing.assert_array_equal(*quiet)
-
-
-def test_a_snapshot_continues_with_the_same_frames(model: TdbnModel) -> None:
-    session = model.start(characters=2, seed=4, variety=1.0)
-    session.frames(_track(model)[:13])
-    session.control(walk=0.3, run=[0.7, 0.2])
-    saved = session.snapshot()
-    after = [session.step() for _ in range(40)]
-    session.control(bend=1.0)
-    session.restore(saved)
-    np.testing.assert_array_equal(after, [session.step() for _ in range(40)])
 
 
 def test_many_threads_share_a_model_bit_for_bit(model: TdbnModel) -> None:
@@ -155,11 +123,6 @@ def test_a_run_is_written_as_it_is(model: TdbnModel, tmp_path: Path) -> None:
     root = positions(read_motion(tmp_path / "x.bvh"))[:, 0]
     assert np.linalg.norm((root[-1] - root[0])[[0, 2]]) > 1.5
     np.testing.assert_allclose(root, positions(motion)[:, 0], atol=1e-6)
-
-
-def test_a_model_from_a_bundle_pickles(model: TdbnModel) -> None:
-    copy = pickle.loads(pickle.dumps(model))
-    np.testing.assert_array_equal(copy.start().frames(_track(model)), model.start().frames(_track(model)))
 
 
 @pytest.mark.parametrize(

@@ -30,16 +30,6 @@ def test_hypotheses_are_ranked_and_scored(model: DescribeModel) -> None:
             assert model.score(motion, description.text) == pytest.approx(description.log_probability, abs=1e-4)
 
 
-def test_a_motion_gets_what_it_gets_alone(model: DescribeModel) -> None:
-    motions = [moving(length, seed=length) for length in (5, 30, 2, 17, 30)]
-    together = model.describe(motions, beams=3)
-    for motion, row in zip(motions, together, strict=True):
-        alone = model.describe(motion, beams=3)
-        assert [d.text for d in alone] == [d.text for d in row]
-        np.testing.assert_allclose([d.log_probability for d in alone], [d.log_probability for d in row], rtol=1e-5)
-    assert model.describe([]) == []
-
-
 def test_more_motions_than_fit_one_batch_come_back_in_order(
     model: DescribeModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -113,13 +103,6 @@ def test_windows_hold_whole_frames_of_no_more_than_the_model_takes(
 def test_what_the_model_sees_is_prepared_once(model: DescribeModel) -> None:
     motion = moving(47, fps=25.0)
     np.testing.assert_array_equal(model.frames(model.prepared(motion)), model.frames(motion))
-
-
-def test_progress_is_told(model: DescribeModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model, "loop", replace(model.loop, batch=2))
-    told: list[tuple[int, int]] = []
-    model.describe([moving(9)] * 5, progress=lambda done, total: told.append((done, total)))
-    assert told == [(2, 5), (4, 5), (5, 5)]
 
 
 def test_frames_that_are_not_finite_never_become_a_motion() -> None:

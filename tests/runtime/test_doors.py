@@ -63,6 +63,10 @@ DOORS: dict[str, tuple[Door, str]] = {
     "restore nothing": (lambda m: m.control.start().restore(None), "expected a snapshot of a session, not 'None'"),
     "embed a number in search": (lambda m: m.search.embed_text(3), "expected a sentence"),
     "embed motions of text": (lambda m: m.search.embed("x.bvh"), "expected|sentence|motion"),
+    "gaps of one of two motions": (
+        lambda m: m.fill.fill([m.motion, m.motion], [[(1.0, 1.5)]]),
+        "2 motions need a list of gaps for each, not 1",
+    ),
     "a loop of no length": (lambda m: m.fill.looped(m.motion, seconds=None), "a transition takes more than 0"),
     "scale by 0": (lambda m: m.motion.scaled(0), "a unit is a positive number of metres, not 0"),
     "resample to text": (lambda m: m.motion.resample("30"), "the frame rate must be a positive number, not '30'"),

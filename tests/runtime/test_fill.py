@@ -88,17 +88,6 @@ def test_channels_of_which_the_humanoid_says_nothing_go_straight_through(model: 
     np.testing.assert_allclose(found, np.linspace(extra[29, 0], extra[60, 0], 32), atol=1e-12)
 
 
-def test_several_motions_are_filled_as_they_would_be_alone(model: FillModel, walk: Motion) -> None:
-    told, motions, gaps = list[tuple[int, int]](), [walk, walk[60:]], [[(1.0, 1.5)], [(0.5, 0.9), (1.5, 1.8)]]
-    found = model.fill(motions, gaps, progress=lambda *done: told.append(done))
-    for motion, own, one in zip(motions, gaps, found, strict=True):
-        np.testing.assert_array_equal(one.values, model.fill(motion, own).values)
-    assert told == [(1, 2), (2, 2)]
-    assert model.fill([], []) == []
-    with pytest.raises(MotionError, match="2 motions need a list of gaps for each, not 1"):
-        model.fill(motions, gaps[:1])
-
-
 def test_several_gaps_are_as_one_after_the_other(model: FillModel, walk: Motion) -> None:
     both = model.fill(walk, [(2.0, 2.4), (1.0, 1.5)])
     one = model.fill(spoiled(walk, 240, 288)[:240], [(1.0, 1.5)])

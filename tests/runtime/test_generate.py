@@ -54,15 +54,6 @@ def test_the_log_likelihood_is_the_score_of_the_motion(model: GenerateModel) -> 
                 assert model.score(text, generated.features) == pytest.approx(generated.log_likelihood, abs=1e-3)
 
 
-def test_a_sentence_gets_what_it_gets_alone_with_its_seed(model: GenerateModel) -> None:
-    together = model.generate(TEXTS, seed=5)
-    for i, text in enumerate(TEXTS):
-        assert_same(model.generate(text, seed=np.int64(5 + i)), together[i])
-        assert_same(model.generate([text], seed=[5 + i])[0], together[i])
-    assert len({row[0].log_likelihood for row in model.generate(["walks"] * 4)}) == 4
-    assert model.generate([]) == []
-
-
 def test_more_sentences_than_fit_one_batch_come_back_in_order(
     model: GenerateModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -143,33 +143,6 @@ def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(m
     np.testing.assert_allclose(hands[-1], (0.0, 1.5, 0.35), atol=5e-3)
 
 
-def test_each_of_a_crowd_looks_and_reaches_as_it_would_alone(model: SteerModel) -> None:
-    crowd, alone = model.start(characters=3), [model.start() for _ in range(3)]
-    crowd.look_at([AROUND[1], AROUND[2]], who=[0, 2])
-    crowd.reach("left", (0.3, 1.3, 0.4), who=1)
-    alone[0].look_at(AROUND[1])
-    alone[2].look_at(AROUND[2])
-    alone[1].reach("left", (0.3, 1.3, 0.4))
-    for _ in range(20):
-        together, each = crowd.tick(), [session.tick() for session in alone]
-        for at, pose in enumerate(each):
-            np.testing.assert_array_equal(together.rotations[at], pose.rotations[0])
-
-
-def test_a_snapshot_holds_looks_and_reaches(model: SteerModel) -> None:
-    session = model.start()
-    session.look_at((2, 1, 1))
-    session.reach("right", (-0.3, 1.2, 0.3))
-    ticks(session, 5)
-    saved = session.snapshot()
-    first = ticks(session, 10)[-1]
-    session.look_at(None)
-    session.reach("right", None)
-    ticks(session, 10)
-    session.restore(saved)
-    np.testing.assert_array_equal(ticks(session, 10)[-1].rotations, first.rotations)
-
-
 @pytest.mark.parametrize(
     ("points", "who", "said"),
     [

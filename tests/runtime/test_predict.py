@@ -171,13 +171,6 @@ def test_a_stream_without_a_start_takes_the_contracts_channels() -> None:
     assert session.predict().channels == model.contract.channels
 
 
-def test_a_batch_gives_what_each_seed_gives_alone() -> None:
-    model, seeds = model_of(circle()), np.random.default_rng(1).normal(size=(3, SEED, 9))
-    together = model.next_frames(seeds, 5)
-    for row, seed in zip(together, seeds, strict=True):
-        np.testing.assert_array_equal(model.next_frames(seed[None], 5)[0], row)
-
-
 def test_a_length_in_seconds_is_one_in_frames() -> None:
     whole = circle()
     model = model_of(to_joint_vectors(whole))

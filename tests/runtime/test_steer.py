@@ -101,21 +101,6 @@ def test_targets_of_gaits_that_go_any_way_are_left_and_others_are_near_the_facin
         assert np.abs(wrapped(angle - facing[~stays])).max() <= most
 
 
-def test_each_of_a_crowd_moves_as_it_would_alone(model: SteerModel) -> None:
-    gaits, ways = ["walk", "run", "walk", "run", "zombie", "walk", "run"], np.linspace(-150, 170, 7)
-    speeds = np.array([1.0, 3.0, 1.5, 2.0, 0.5, 0.8, 1.2])
-    crowd, alone = model.start(characters=7), [model.start() for _ in gaits]
-    for way in (0, 60):  # rows of less than a whole vector of the processor round otherwise, if any do
-        crowd.control(gait=gaits, speed=speeds, direction=ways + way)
-        for session, told in zip(alone, zip(gaits, speeds, ways + way, strict=True), strict=True):
-            session.control(gait=told[0], speed=told[1], direction=told[2])
-        for _ in range(60):
-            together, each = crowd.tick(), [session.tick() for session in alone]
-            for part in ("ground", "height", "rotations", "contacts"):
-                single = np.concatenate([getattr(pose, part) for pose in each])
-                np.testing.assert_array_equal(getattr(together, part), single)
-
-
 def test_each_of_many_searches_in_its_turn_and_moves_as_it_would_alone(
     model: SteerModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,28 +131,6 @@ def test_each_of_many_searches_in_its_turn_and_moves_as_it_would_alone(
 def test_phases_that_make_no_sense(model: SteerModel, phases: Any) -> None:
     with pytest.raises(ControlError, match="phases must be whole numbers from 0 to 5, for all or for each of 2"):
         model.start(characters=2, phases=phases)
-
-
-def test_a_snapshot_comes_back_to_the_same_bits(model: SteerModel) -> None:
-    session = model.start(characters=2)
-    session.control(speed=1.4, direction=[0, 45])
-    for _ in range(20):
-        session.tick()
-    snapshot = session.snapshot()
-    first = [session.tick() for _ in range(20)]
-    session.control(gait="run", speed=3)
-    session.tick()
-    for _ in range(2):  # what goes on leaves the snapshot as it is
-        session.restore(snapshot)
-        for pose in first:
-            again = session.tick()
-            np.testing.assert_array_equal(again.rotations, pose.rotations)
-            np.testing.assert_array_equal(again.ground, pose.ground)
-    other = model.start()
-    other.restore(snapshot)  # of another number
-    np.testing.assert_array_equal(other.tick().rotations, first[0].rotations)
-    with pytest.raises(ControlError, match="with held feet does not fit a session without them"):
-        model.start(hold_feet=False).restore(snapshot)
 
 
 def test_feet_that_are_held_slide_less(model: SteerModel) -> None:
