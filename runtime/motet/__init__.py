@@ -10,7 +10,7 @@ from importlib.metadata import version
 from motet import motion
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import SessionOptions
-from motet.compose.compose import Composition, Met
+from motet.compose.compose import Composition, Met, compose
 from motet.compose.plans import Moment, parse_plan, read_plan
 from motet.corpus.checked import Checked, check
 from motet.errors import (
@@ -69,8 +69,9 @@ __all__ = [
     "Passage", "Pose", "PredictModel", "PredictSession", "Quantities", "SaidActs", "ScriptError", "SearchModel",
     "SessionOptions", "SettingError", "Shown", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings",
     "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning", "Understood",
-    "UnitError", "check", "clips", "figures_in", "from_humanoid", "list_bundles", "live_page", "load", "load_as",
-    "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo", "write_live_page",
+    "UnitError", "check", "clips", "compose", "figures_in", "from_humanoid", "list_bundles", "live_page", "load",
+    "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo",
+    "write_live_page",
 ]
 # fmt: on
 

@@ -52,7 +52,8 @@ DOORS: dict[str, tuple[Door, str]] = {
     "a story after a path": (lambda m: m.generate.story("a person walks", after="x"), "expected a motion"),
     "a story after no frames": (lambda m: m.generate.story("a person walks", after=m.empty), "has 0 frames"),
     "embed a number": (lambda m: m.generate.embed(3), "expected a sentence, not '3'"),
-    "compose a number": (lambda m: m.generate.compose([3]), "expected a moment, not '3'"),
+    "compose by a script": (lambda m: motet.compose("0s a person walks; 3s", m.generate), "expected a model such as"),
+    "compose a number": (lambda m: motet.compose(m.generate, [3]), "expected a moment, not '3'"),
     "a moment's pose by path": (lambda m: motet.Moment(0, pose="x.bvh"), "expected a motion, not"),  # type: ignore[arg-type]
     "start with words by name": (lambda m: m.control.start(words="generate"), "expected words of a model"),
     "start at no frames": (lambda m: m.control.start(m.empty), "the motion has 0 frames"),
@@ -89,9 +90,9 @@ def test_what_has_a_motion_is_written(models: Models, tmp_path: Path) -> None:
 
 def test_a_plan_may_be_a_script(models: Models) -> None:
     script = "0s a person walks; 2s"
-    composed = models.generate.compose(script, seed=3)
+    composed = motet.compose(models.generate, script, seed=3)
     np.testing.assert_array_equal(
-        composed.motion.values, models.generate.compose(motet.parse_plan(script), seed=3).motion.values
+        composed.motion.values, motet.compose(models.generate, motet.parse_plan(script), seed=3).motion.values
     )
 
 

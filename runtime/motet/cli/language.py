@@ -15,6 +15,7 @@ from motet.cli.many import Many, many_options, print_list
 from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
 from motet.cli.reading import read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.compose.compose import compose as composition_of
 from motet.compose.plans import parse_plan, read_plan
 from motet.corpus.answers import Answer, Describe, Timeline, to_json
 from motet.formats import READS, read_motion
@@ -311,7 +312,7 @@ def compose(
     moments = read_plan(plan) if Path(plan).suffix.lower() == ".json" else parse_plan(plan)
     model = load_as(CodesModel, bundle, session)
     with noted():
-        composed = model.compose(moments, seed=seed, strict=strict)
+        composed = composition_of(model, moments, seed=seed, strict=strict)
     label = " / ".join(passage.text for passage in composed.passages)
     motion = output.write(out, composed.motion, label, _captions(composed.passages))
     output.finish()

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.compose.compose import Composition, compose
-from motet.compose.plans import Moment, parse_plan
 from motet.decode.loop import Noise, Sample, apart
 from motet.errors import (
     BundleError,
@@ -22,7 +20,6 @@ from motet.errors import (
     MotionError,
     TextError,
     TextWarning,
-    needs,
     warn,
 )
 from motet.figures.humanoid import HUMANOID
@@ -38,7 +35,6 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
 from motet.settings import Range, Seed, Settings
-from motet.steering.model import SteerModel
 from motet.text.clauses import FUNCTION_WORDS, OWN, Passage, Shown, at_odds, parts_of, sentences_of, stem, verbs_of
 from motet.text.numeric_phrases import PACES, Quantities, known_turns, quantities_of
 
@@ -455,26 +451,6 @@ class CodesModel(GenerateModel):
         for kind in short(cast(Mapping[str, float], wanted), measured, request.quantities.either):
             warn(f"{request.text!r} requests {wanted[kind]:g} {kind}; shown: {measured[kind]:.3g}", TextWarning)
         return measured
-
-    def compose(
-        self, moments: str | Sequence[Moment], *, steer: SteerModel | None = None, seed: int = 0, strict: bool = False
-    ) -> Composition:
-        """A motion that shows prompts at their times and meets the places, facings and poses of a plan.
-
-        moments: the plan (:class:`motet.Moment`), such as ``motet.read_plan`` gives; or a script as
-            ``motet.parse_plan`` reads it. Feet are planted. A prompt for walking or running, and nothing else, is
-            steered to its places; any other motion is turned and moved there by up to half a metre a second.
-        steer: the model of walks to places, by default the bundle "control".
-        seed, strict: like :meth:`story`.
-        SettingError for moments that are out of order; MotionError for a place that is out of reach, with the time that
-        it takes, and for a pose that is not a human's or is under the ground; TextError like :meth:`story`.
-        """
-        from motet.models.load import load  # which knows this class
-
-        plan = parse_plan(moments) if isinstance(moments, str) else list(moments)
-        for moment in plan:
-            needs(moment, Moment, "a moment")
-        return compose(plan, self, steer or load("control"), seed, strict)
 
     def stream(self, sentences: str | Sequence[str], **settings: Unpack[StorySettings]) -> Iterator[Motion]:
         """The motion of :meth:`story` in pieces, as they are drawn: each continues the last one.

@@ -15,6 +15,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from motet.compose.compose import compose
 from motet.compose.keys import Key, Moves
 from motet.compose.plans import APART, Moment
 from motet.errors import DecodingError, MotetError, MotionError
@@ -139,7 +140,8 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         if steps.keys() - {0}:
             starts = accumulate(seconds, initial=0.0)
             prompts = [Moment(at, text) for at, text in zip(starts, [*texts, None], strict=True)]
-            composed = self.model.compose(_line(prompts, steps, fps, self.model.fps), steer=self.steer, seed=seed)
+            plan = _line(prompts, steps, fps, self.model.fps)
+            composed = compose(self.model, plan, steer=self.steer, seed=seed)
             return composed.motion.resample(fps)[: request.total_frames]
         plant = request.options is None or request.options.post_processing
         story = self.model.story(texts, seconds=seconds, seed=seed)

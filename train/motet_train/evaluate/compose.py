@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from motet.compose.compose import Met, met, moved
+from motet.compose.compose import Met, compose, met, moved
 from motet.compose.plans import Moment, parse_plan
 from motet.errors import MotionError
 from motet.formats import read_motion
@@ -35,7 +35,7 @@ def compose_report(writer: CodesModel, seed: int = 0) -> dict[str, Report]:
     refused = 0
     for moments in compositions():
         try:
-            composition = writer.compose(moments, seed=seed)
+            composition = compose(writer, moments, seed=seed)
         except MotionError:
             refused += 1
             continue
