@@ -10,7 +10,7 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 239
+MOST_LARGE_FUNCTIONS = 236
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 MOST_BANNED_NAMES = 51
@@ -92,7 +92,7 @@ CEILINGS = {
     "motet.draw": 12_000,
     "motet.figures": 32_400,
     "motet.formats": 37_100,
-    "motet.generate": 26_100,
+    "motet.generate": 26_000,
     "motet.live": 5_700,
     "motet.models": 9_300,
     "motet.motion": 16_100,
