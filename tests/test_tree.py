@@ -95,7 +95,7 @@ CEILINGS = {
     "motet.generate": 26_000,
     "motet.live": 5_700,
     "motet.models": 9_300,
-    "motet.motion": 16_100,
+    "motet.motion": 16_400,
     "motet.papers": 7_300,
     "motet.predict": 5_400,
     "motet.representation": 9_600,

@@ -77,7 +77,7 @@ def _raise_limb(joint: int, height: Array, turned: Array, places: Array) -> None
     # straight down, a shin goes forward, a hand or foot the way its back faces
     side = turned[:, parent, :, 2 if HUMANOID.names[joint].endswith("Foot") else 1]
     turn = swing(bone, _raised(bone, side, height))[:, None]
-    hanging = list(HUMANOID.subtree(HUMANOID.names[parent]))
+    hanging = HUMANOID.below(parent)
     places[:, hanging] = places[:, [parent]] + rotated(turn, places[:, hanging] - places[:, [parent]])
     turned[:, hanging] = product(turn, turned[:, hanging])
 

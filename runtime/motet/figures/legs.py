@@ -6,18 +6,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT, LEG, sided
+from motet.figures.humanoid import BONES, HUMANOID, LEG, limb_of
 from motet.figures.two_bones import TwoBones
 from motet.motion.scalar_or_batch import Part, Quaternion, Vector, inverse, plus, product, rotated, rotated_axis
 
 Floats = NDArray[np.float32]
 
 
-LEG_BONES = np.array([[BONES.index(sided(side, part)) for part in LEG] for side in LEFT_RIGHT])
+_LEG_NAMES = limb_of("left", LEG) + limb_of("right", LEG)
+
+LEG_BONES = np.array([BONES.index(name) for name in _LEG_NAMES]).reshape(2, 4)
 """Bones (2, 4) of both legs among the humanoid's."""
 
-
-OFFSETS = HUMANOID.offsets[[[HUMANOID.index(BONES[bone]) for bone in leg] for leg in LEG_BONES]]
+OFFSETS: NDArray[Any] = HUMANOID.offsets[[HUMANOID.index(name) for name in _LEG_NAMES]].reshape(2, 4, 3)
 """Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
 
 
@@ -43,12 +44,11 @@ def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
 
 def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
     """Rotations of poses with others of thighs, shins and feet, of legs as :func:`limbs` gives them."""
-    # joints, their parts, and both sides of each character; or the sides of one, joints, their parts
+    # of one character its sides, their joints and the joints' parts; of many the joints, their parts and both sides
     turned: NDArray[Any] = np.array(legs)
+    by_side = turned[..., None] if len(legs) == 2 else turned[0].transpose(2, 0, 1, 3)
     posed = rotations.copy("K")
-    posed.transpose(1, 2, 0)[LEG_BONES[:, :3]] = (
-        turned[..., None] if len(legs) == 2 else turned[0].transpose(2, 0, 1, 3)
-    )
+    posed.transpose(1, 2, 0)[LEG_BONES[:, :3]] = by_side
     return posed
 
 
@@ -57,6 +57,7 @@ def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quatern
     turned = list[Quaternion]()
     places = list[Vector]()
     above = hips
+    # down the leg, each joint is where the one above it takes its offset
     for local, offset in zip(limb.local, limb.offsets, strict=True):
         place = plus(place, rotated(above, offset))
         above = product(above, local)
@@ -68,9 +69,12 @@ def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quatern
 def reached_by(hips: Quaternion, turned: list[Quaternion], places: list[Vector], target: Vector) -> list[Quaternion]:
     """Rotations of thigh, shin and foot in their parents' frames, of a leg with its ankle at a target; the foot stays
     as it is in the world."""
+    # the knee is a hinge about the shin's x axis
     thigh, shin, foot = turned[:3]
     leg = TwoBones(places[0], places[1], places[2], rotated_axis(shin, 0))
     turn_thigh, turn_shin = leg.turns(leg.eased(target))
+
+    # thigh and shin turn in the world, then each is seen from the joint above it
     thigh = product(turn_thigh, thigh)
     shin = product(turn_shin, shin)
     return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]

@@ -9,12 +9,15 @@ import numpy as np
 from motet.errors import MotionError
 from motet.figures.humanoid import HUMANOID, Figure, JointMap, from_humanoid, map_of, on_humanoid
 from motet.motion.kinematics import (
-    AXES,
+    by_name,
+    channels_of,
     continued,
     global_transforms,
+    has_channels,
     local_rotations,
     local_translations,
     posed,
+    positions,
     skeleton_of,
     with_channels,
 )
@@ -41,10 +44,11 @@ def in_place(motion: Motion) -> Motion:
             figure = Figure.of(motion)
             carrier = figure.fitted.joint_map.carrier(skeleton)
             up = figure.turn.T @ UP
+    # from the root down, every joint that moves keeps its height alone, in the frame of the joint above
     for joint in reversed(skeleton.ancestors(carrier)):
         name = skeleton.names[joint]
         above = skeleton.joints[joint].parent
-        if any(f"{name}.t{axis}" in motion.channels for axis in AXES):
+        if not set(channels_of(name, "t")).isdisjoint(motion.channels):
             rotations, places = global_transforms(motion)
             moved = np.outer(places[:, joint] @ up, up)
             moved = rotated(inverse(rotations[:, above]), moved - places[:, above]) if joint else moved
@@ -63,12 +67,13 @@ def travel_on_root(motion: Motion, joint_map: JointMap | None = None) -> Motion:
     # a root this far below the joint that carries legs and back, in heights, rests at the floor
     if float(np.linalg.norm(skeleton.rest_positions[joint])) < 0.3 * skeleton.height:
         return motion
+    # the root takes the path of the joint that carries the hips, and that joint loses it
     moves = local_translations(motion)[:, [0, joint]]
     rotations, places = global_transforms(motion)
-    way = (places[:, joint] - places[:, 0]) * (1 - UP)
-    moves[:, 0] += way
-    moves[:, 1] -= rotated(inverse(rotations[:, skeleton.joints[joint].parent]), way)
-    names = tuple(f"{skeleton.names[i]}.t{axis}" for i in (0, joint) for axis in AXES)
+    path = (places[:, joint] - places[:, 0]) * (1 - UP)
+    moves[:, 0] += path
+    moves[:, 1] -= rotated(inverse(rotations[:, skeleton.joints[joint].parent]), path)
+    names = channels_of(skeleton.names[0], "t") + channels_of(skeleton.names[joint], "t")
     return with_channels(motion, names, moves.reshape(len(motion), 6), ("length",) * 6)
 
 
@@ -87,11 +92,8 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
         motion = from_humanoid(on_humanoid(motion), like)
     elif set(motion.channels) == set(like.channels):
         return replace(motion.select(like.channels, like.units), skeleton=skeleton)
-    rotations = local_rotations(motion)
-    translations = local_translations(motion)
-    rotations_by_name = {name: rotations[:, i] for i, name in enumerate(skeleton.names)}
-    translations_by_name = {name: translations[:, i] for i, name in enumerate(skeleton.names)}
-    return continued(like[-1:], rotations_by_name, translations_by_name)
+    rotations = by_name(skeleton, local_rotations(motion))
+    return continued(like[-1:], rotations, by_name(skeleton, local_translations(motion)))
 
 
 def _same_figure(skeleton: Skeleton, other: Skeleton) -> bool:
@@ -112,47 +114,43 @@ def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) ->
     position or rotation of the hips.
     """
     skeleton = skeleton_of(motion)
-    hips = _moving_joint(motion)
-    if hips is None or not _has_channels(motion, skeleton.names[hips], "r"):
+    # the first joint with a translation is the hips
+    hips = next((i for i, name in enumerate(skeleton.names) if has_channels(motion, name, "t")), None)
+    if hips is None or not has_channels(motion, skeleton.names[hips], "r"):
         return None
-    name = skeleton.names[hips]
     rotations, places = global_transforms(motion)
     about = axis_to_rotmat("y", np.array(turn))
 
-    # the hips arrive where the mean velocity takes them, at their own height
-    last = global_transforms(before[-1])[1][0, hips]
-    velocity = (_velocity(before, hips, to_end=True) + about @ _velocity(motion, hips)) / 2
-    arrival = last + seconds * velocity
-    start = np.array([arrival[0], places[0, hips, 1], arrival[2]])
+    # from there its path goes on as it did, turned
+    x, _, z = _arrival(motion, before, hips, seconds, about)
+    start = np.array([x, places[0, hips, 1], z])
     path = start + rotated(about, places[:, hips] - places[0, hips])
 
-    # in the frame of the joint above
-    above = skeleton.joints[hips].parent
-    to_parent = np.broadcast_to(np.eye(3), (len(motion), 3, 3))
-    origin = np.zeros((len(motion), 3))
-    if above >= 0:
-        to_parent = inverse(rotations[:, above])
-        origin = places[:, above]
-    turned = product(np.broadcast_to(about, to_parent.shape), rotations[:, hips])
-    return posed(motion, {name: product(to_parent, turned)}, {name: rotated(to_parent, path - origin)})
+    # the other joints go with the hips
+    turned = product(np.broadcast_to(about, (len(motion), 3, 3)), rotations[:, hips])
+    return _with_joint(motion, hips, turned, path)
 
 
-def _moving_joint(motion: Motion) -> int | None:
-    """The first joint with a translation, which the hips are."""
-    for i, name in enumerate(skeleton_of(motion).names):
-        if _has_channels(motion, name, "t"):
-            return i
-    return None
+def _with_joint(motion: Motion, joint: int, turned: Array, path: Array) -> Motion:
+    """The motion with a joint that has rotations (T, 3, 3) and places (T, 3) in the world."""
+    skeleton = skeleton_of(motion)
+    rotations, places = global_transforms(motion)
+    above = skeleton.joints[joint].parent
+    to_parent = inverse(rotations[:, above]) if joint else np.broadcast_to(np.eye(3), turned.shape)
+    moved = rotated(to_parent, path - places[:, above] if joint else path)
+    return posed(motion, {skeleton.names[joint]: product(to_parent, turned)}, {skeleton.names[joint]: moved})
 
 
-def _has_channels(motion: Motion, joint: str, letter: str) -> bool:
-    """Whether a motion has all three channels of a joint's translation ("t") or rotation ("r")."""
-    return {f"{joint}.{letter}{axis}" for axis in AXES} <= set(motion.channels)
+def _arrival(motion: Motion, before: Motion, hips: int, seconds: float, about: Array) -> Array:
+    """The place (3,) to which the mean velocity takes the hips of a motion, turned ``about`` (3, 3), ``seconds`` after
+    another ends."""
+    last = positions(before[-1])[0, hips]
+    velocity = (_velocity(before, hips, to_end=True) + about @ _velocity(motion, hips)) / 2
+    return np.asarray(last + seconds * velocity)
 
 
 def _velocity(motion: Motion, joint: int, to_end: bool = False) -> Array:
     """Velocity (3,) of a joint, lengths per second, at the start or end of a motion; 0 for a single frame."""
     frames = max(1, round(0.2 * motion.fps)) + 1  # the mean over .2 s
-    places = global_transforms(motion[-frames:] if to_end else motion[:frames])[1][:, joint]
-    velocity: Array = (places[-1] - places[0]) * motion.fps / max(1, len(places) - 1)
-    return velocity
+    places = positions(motion[-frames:] if to_end else motion[:frames])[:, joint]
+    return np.asarray((places[-1] - places[0]) * motion.fps / max(1, len(places) - 1))

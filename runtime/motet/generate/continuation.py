@@ -8,8 +8,8 @@ from itertools import islice, product
 import numpy as np
 
 from motet.errors import DecodingError, MotionError
-from motet.figures.feet.contacts import GROUND_PERCENT, feet_of, ground_of
-from motet.figures.feet.hold import hold_feet, windows
+from motet.figures.feet.contacts import GROUND_PERCENT, bell, feet_of, ground_of, windows
+from motet.figures.feet.hold import hold_feet
 from motet.figures.humanoid import HUMANOID, Figure
 from motet.figures.humanoid.bones import LEFT_RIGHT, LEG, ground_under, sided, sole_points
 from motet.generate.base import SETTLED, GenerateModel
@@ -120,9 +120,7 @@ def levelled(contract: MotionContract, frames: Array, known: int, rules: Continu
 
 def averaged(values: Array, reach: int) -> Array:
     """Values (T,) smoothed by a Hann window of ``reach`` frames on either side."""
-    bell = np.hanning(2 * reach + 3)[1:-1]
-    smooth: Array = (windows(values, reach) * (bell / bell.sum())).sum(axis=1)
-    return smooth
+    return np.asarray((windows(values, reach) * bell(reach)).sum(axis=1))
 
 
 def paced(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) -> Array:

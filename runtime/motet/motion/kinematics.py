@@ -23,6 +23,16 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 AXES = ("x", "y", "z")
 
 
+def channels_of(joint: str, letter: str) -> tuple[str, ...]:
+    """The channels of a joint's translation ("t"), Euler angles ("r") or exponential map ("e"), along x, y and z."""
+    return tuple(f"{joint}.{letter}{axis}" for axis in AXES)
+
+
+def has_channels(motion: Motion, joint: str, letter: str) -> bool:
+    """Whether a motion has all three channels of a joint, as :func:`channels_of` names them."""
+    return set(channels_of(joint, letter)) <= set(motion.channels)
+
+
 def skeleton_of(motion: Motion) -> Skeleton:
     """The motion's skeleton; MotionError if it has none."""
     if motion.skeleton is None:
@@ -33,33 +43,36 @@ def skeleton_of(motion: Motion) -> Skeleton:
 def local_rotations(motion: Motion, joints: Sequence[int] | None = None) -> Array:
     """Rotations (T, J, 3, 3) relative to the parent of every joint, or of the joints with the given indices."""
     skeleton = skeleton_of(motion)
-    columns = motion.rotation_columns()
-    wanted = range(len(skeleton.joints)) if joints is None else joints
+    wanted = skeleton.joints if joints is None else [skeleton.joints[i] for i in joints]
     rotations = frames_last((len(motion), len(wanted), 3, 3))
     rotations[:] = np.eye(3)
     # joints with channels, those of one Euler order together
-    for order, places in _by_order([skeleton.joints[i] for i in wanted], columns).items():
-        turning = [skeleton.joints[wanted[place]] for place in places]
-        angles = _angles(motion, turning, order)
-        rotations[:, places] = _about_axes(euler_to_rotmat(angles, order), turning)
+    for order, places in _by_order(wanted, motion.rotation_columns()).items():
+        turning = [wanted[place] for place in places]
+        rotations[:, places] = _about_axes(euler_to_rotmat(_angles(motion, turning, order), order), turning)
     return rotations
 
 
 def _angles(motion: Motion, joints: Sequence[Joint], order: str) -> Array:
     """Angles (T, J, 3) in radians of joints of one Euler order, in this order, 0 without a channel."""
-    columns = motion.rotation_columns()
-    joint_of_angle = []
-    column_of_angle = []
-    for place, joint in enumerate(joints):
-        for column in columns[joint.name]:
-            joint_of_angle.append(place)
-            column_of_angle.append(column)
-    axes = [order.index(motion.channels[column][-1]) for column in column_of_angle]
-    to_radians = [2 * np.pi / TURN[motion.units[column]] for column in column_of_angle]
+    joint_of_angle, columns, turns = _angle_columns(motion, [joint.name for joint in joints])
+    axes = [order.index(motion.channels[column][-1]) for column in columns]
     angles = frames_last((len(motion), len(joints), 3))
     angles[:] = 0.0
-    angles[:, joint_of_angle, axes] = motion.values[:, column_of_angle] * to_radians
+    angles[:, joint_of_angle, axes] = motion.values[:, columns] * (2 * np.pi / turns)
     return angles
+
+
+def _angle_columns(motion: Motion, joints: Sequence[str]) -> tuple[list[int], list[int], Array]:
+    """The Euler angles of joints, one after the other: the place of each one's joint in the list, its column, and a
+    whole turn in its unit."""
+    columns_of = motion.rotation_columns()
+    joint_of_angle = []
+    columns = []
+    for place, name in enumerate(joints):
+        joint_of_angle += [place] * len(columns_of[name])
+        columns += columns_of[name]
+    return joint_of_angle, columns, np.array([TURN[motion.units[column]] for column in columns])
 
 
 def _by_order(joints: Sequence[Joint], names: Container[str] | None = None) -> dict[str, list[int]]:
@@ -130,6 +143,11 @@ def _about_axes(turns: Array, joints: Sequence[Joint], back: bool = False) -> Ar
     return turns
 
 
+def by_name(skeleton: Skeleton, values: Array) -> dict[str, Array]:
+    """Rotations (T, J, 3, 3) or translations (T, J, 3) of all joints as (T, 3, 3) or (T, 3) by the joint's name."""
+    return dict(zip(skeleton.names, np.moveaxis(values, 1, 0), strict=True))
+
+
 def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
     """Rotations (T, J, 3, 3) of joints from those of each (T, 3, 3)."""
     stacked = frames_last((frames, len(rotations), 3, 3))
@@ -183,19 +201,12 @@ def posed(
 def _set_angles(values: Array, motion: Motion, rotations: Mapping[str, Array], leaps: bool) -> None:
     """Set the angles in values (T, D) of a motion's channels to local rotations (T, 3, 3) of joints."""
     skeleton = skeleton_of(motion)
-    columns = motion.rotation_columns()
-    names = [name for name in columns if name in rotations]
+    names = [name for name in motion.rotation_columns() if name in rotations]
     joints = [skeleton.joints[skeleton.index(name)] for name in names]
     angles = eulers_of(side_by_side([rotations[name] for name in names], len(motion)), joints, leaps)
-    joint_of_angle = []
-    column_of_angle = []
-    for place, name in enumerate(names):
-        for column in columns[name]:
-            joint_of_angle.append(place)
-            column_of_angle.append(column)
-    axes = [AXES.index(motion.channels[column][-1]) for column in column_of_angle]
-    turns = [TURN[motion.units[column]] for column in column_of_angle]
-    values[:, column_of_angle] = angles[:, joint_of_angle, axes] * turns / (2 * np.pi)
+    joint_of_angle, columns, turns = _angle_columns(motion, names)
+    axes = [AXES.index(motion.channels[column][-1]) for column in columns]
+    values[:, columns] = angles[:, joint_of_angle, axes] * turns / (2 * np.pi)
 
 
 def places_of(skeleton: Skeleton, turned: Array) -> Array:
@@ -212,26 +223,28 @@ def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: f
     """The motion of rotations in the world (T, J, 3, 3) and of translations (T, 3) of some joints in their parents'
     frames: all in "deg" and "length", with continuous angles."""
     # tips have no rotation
-    turning = []
-    for i, name in enumerate(skeleton.names):
-        if skeleton.children[i] or not name.endswith(END_SUFFIX):
-            turning.append(i)
-    local = turned.copy(order="K")
-    local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
-    angles = np.degrees(eulers_of(local[:, turning], [skeleton.joints[i] for i in turning]))
-    angles_of = dict(zip(turning, np.moveaxis(angles, 1, 0), strict=True))
+    turning = [i for i, name in enumerate(skeleton.names) if skeleton.children[i] or not name.endswith(END_SUFFIX)]
+    local = _in_parents(skeleton, turned)[:, turning]
+    angles = np.degrees(eulers_of(local, [skeleton.joints[i] for i in turning]))
 
     # of each joint first the translation, then the angles
-    names: list[str] = []
-    units: list[str] = []
+    units: dict[str, str] = {}
     columns = []
     for i, name in enumerate(skeleton.names):
-        for letter, unit, values_of in (("t", "length", moved), ("r", "deg", angles_of)):
-            if i in values_of:
-                names += [f"{name}.{letter}{axis}" for axis in AXES]
-                units += [unit] * 3
-                columns.append(values_of[i])
-    return Motion(np.concatenate(columns, axis=1), tuple(names), tuple(units), fps, skeleton)
+        if i in moved:
+            units |= dict.fromkeys(channels_of(name, "t"), "length")
+            columns.append(moved[i])
+        if i in turning:
+            units |= dict.fromkeys(channels_of(name, "r"), "deg")
+            columns.append(angles[:, turning.index(i)])
+    return Motion(np.concatenate(columns, axis=1), tuple(units), tuple(units.values()), fps, skeleton)
+
+
+def _in_parents(skeleton: Skeleton, turned: Array) -> Array:
+    """Rotations (T, J, 3, 3) in each parent's frame, from those in the world."""
+    local = turned.copy(order="K")
+    local[:, 1:] = product(inverse(turned[:, skeleton.parents[1:]]), turned[:, 1:])
+    return local
 
 
 def heading(motion: Motion) -> Array:
@@ -246,11 +259,10 @@ def without_heading(motion: Motion) -> Motion:
     This keeps the sway of the hips within a stride and removes any constant heading or turning rate. A motion without
     root rotation is returned unchanged. The root's translation is not changed.
     """
-    joint = skeleton_of(motion).joints[0]
-    if not {f"{joint.name}.r{axis}" for axis in AXES} <= set(motion.channels) or not len(motion):
+    root = skeleton_of(motion).names[0]
+    if not has_channels(motion, root, "r") or not len(motion):
         return motion
     time = np.arange(len(motion))
-    angle = heading(motion)
-    line: Array = np.polyval(np.polyfit(time, angle, min(1, len(motion) - 1)), time).astype(np.float64)
+    line: Array = np.polyval(np.polyfit(time, heading(motion), min(1, len(motion) - 1)), time).astype(np.float64)
     levelled = axis_to_rotmat("y", -line) @ local_rotations(motion, [0])[:, 0]
-    return posed(motion, {joint.name: levelled}, {}).continuous()
+    return posed(motion, {root: levelled}, {}).continuous()

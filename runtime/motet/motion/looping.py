@@ -6,13 +6,20 @@ longest is taken. A part in which the figure hardly moves beside the rest is non
 nothing. The remaining difference is spread over the loop: rotations by rotation vectors, all else linearly.
 """
 
-from collections.abc import Set
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.kinematics import AXES, global_transforms, local_rotations, local_translations, posed, skeleton_of
+from motet.motion.kinematics import (
+    channels_of,
+    global_transforms,
+    local_rotations,
+    local_translations,
+    posed,
+    skeleton_of,
+)
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
 
@@ -45,21 +52,21 @@ def looped(motion: Motion, shortest: float = 0.7) -> Motion:
     # a share from -1/2 to 1/2 of the difference of the ends is taken off, so that both ends change equally
     share = np.linspace(-0.5, 0.5, len(part))[:, None]
     world = global_transforms(part)[0]
-    above = world[:, skeleton.joints[hips].parent] if hips else np.broadcast_to(np.eye(3), world[:, 0].shape)
+    above = world[:, skeleton.parents[hips]] if hips else np.broadcast_to(np.eye(3), world[:, 0].shape)
 
-    # joints with all three angles turn; all other channels change by their differences
+    # joints with all three angles turn; all other channels change by their differences, but those of the hips' path
     rotations = _closed_rotations(part, hips, world[:, hips], above, share)
     hips_name = skeleton.names[hips]
-    left_open = {f"{hips_name}.{kind}" for kind in ("tx", "ty", "tz", "ry")}
-    for name in rotations:
-        left_open |= {f"{name}.r{axis}" for axis in AXES}
-    closed = replace(part, values=part.values - share * _difference(part, left_open))
+    closed = replace(part, values=part.values - share * _difference(part, hips_name, rotations))
+    return posed(closed, rotations, {hips_name: _level_translation(part, hips, above, share)})[:-1]
 
-    # the hips end at the height at which they begin
+
+def _level_translation(part: Motion, hips: int, above: Array, share: Array) -> Array:
+    """Translations (T, 3) of the hips that end at the height at which they begin, as :func:`_closed_rotations`."""
     translation = local_translations(part)[:, hips]
     height = rotated(above, translation)[:, 1:2]
     rise = rotated(inverse(above), share * (height[-1] - height[0]) * UP)
-    return posed(closed, rotations, {hips_name: translation - rise})[:-1]
+    return np.asarray(translation - rise)
 
 
 def _closed_rotations(part: Motion, hips: int, hips_world: Array, above: Array, share: Array) -> dict[str, Array]:
@@ -83,13 +90,17 @@ def _closed_rotations(part: Motion, hips: int, hips_world: Array, above: Array, 
     return rotations
 
 
-def _difference(part: Motion, open_channels: Set[str]) -> Array:
-    """How much each channel (D,) differs at the end from the beginning, up to whole turns; 0 of channels left open."""
+def _difference(part: Motion, hips: str, turning: Iterable[str]) -> Array:
+    """How much each channel (D,) differs at the end from the beginning, up to whole turns; 0 for the path and heading
+    of the hips and the angles of joints that turn."""
     turns = np.array([TURN.get(unit, np.inf) for unit in part.units])
     difference: Array = part.values[-1] - part.values[0]
     angles = np.isfinite(turns)
     difference[angles] -= np.round(difference[angles] / turns[angles]) * turns[angles]
-    difference[[name in open_channels for name in part.channels]] = 0
+    left_open = {*channels_of(hips, "t"), f"{hips}.ry"}
+    for name in turning:
+        left_open.update(channels_of(name, "r"))
+    difference[[name in left_open for name in part.channels]] = 0
     return difference
 
 
@@ -141,14 +152,21 @@ def _coarse_repetition(poses: Array, least: int, step: int) -> tuple[int, int]:
         by_start.append(np.where(is_lively, distances.diagonal(length), np.inf))
     best = np.array([values.min() for values in by_start])
 
-    # of the lengths that are better than those beside them (the ends do not count as minima) the longest that is
-    # nearly as good: 1.25 times the best difference, or .01 of the height, the variation of a steady walk
+    longest = _longest_of_best(best)
+    start = int(by_start[longest].argmin()) * step
+    return start, start + lengths[longest] * step
+
+
+def _longest_of_best(best: Array) -> int:
+    """Of lengths with the best differences (L,) of ends the index of the longest that is nearly as good as the best.
+
+    Nearly is 1.25 times the best difference, or 0.01 of the height, the variation of a steady walk. It is better than
+    those beside it; the ends do not count as minima.
+    """
     is_minimum = np.zeros(len(best), dtype=bool)
     is_minimum[1:-1] = (best[1:-1] <= best[:-2]) & (best[1:-1] <= best[2:])
     is_minimum[best.argmin()] = True
-    longest = int(np.flatnonzero(is_minimum & (best <= max(1.25 * best.min(), 0.01)))[-1])
-    start = int(by_start[longest].argmin()) * step
-    return start, start + lengths[longest] * step
+    return int(np.flatnonzero(is_minimum & (best <= max(1.25 * best.min(), 0.01)))[-1])
 
 
 def _nearest_pair(poses: Array, start: int, stop: int, least: int, step: int) -> tuple[int, int]:
@@ -165,22 +183,19 @@ def _energy(poses: Array) -> Array:
     """The squared speed (T,) of rows as :func:`_poses` makes them, relative to its mean."""
     speeds = poses[:, poses.shape[1] // 2 :]
     squares = (speeds**2).sum(axis=1)
-    energy: Array = squares / max(float(squares.mean()), 1e-12)
-    return energy
+    return np.asarray(squares / max(float(squares.mean()), 1e-12))
 
 
 def _means(values: Array, length: int) -> Array:
     """The means (T - length,) of ``length`` values each of (T,)."""
     sums = np.cumsum(np.insert(values, 0, 0.0))
-    means: Array = (sums[length:-1] - sums[: -length - 1]) / length
-    return means
+    return np.asarray((sums[length:-1] - sums[: -length - 1]) / length)
 
 
 def _distances(rows: Array, others: Array) -> Array:
     """Distances (T, S) between rows (T, D) and others (S, D)."""
     squares = (rows**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * rows @ others.T
-    distances: Array = np.sqrt(np.maximum(squares, 0))
-    return distances
+    return np.asarray(np.sqrt(np.maximum(squares, 0)))
 
 
 def _poses(motion: Motion, hips: int) -> Array:
@@ -191,8 +206,7 @@ def _poses(motion: Motion, hips: int) -> Array:
     rotations, places = global_transforms(motion)
     to_facing = inverse(twist(rotations[:, hips], UP))[:, None]
     ground = places[:, [hips]] * (1 - UP)
-    places = places[:, skeleton.subtree(skeleton.names[hips])]
+    places = places[:, skeleton.below(hips)]
     velocities = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * SECONDS_APART
     points = np.concatenate([rotated(to_facing, places - ground), rotated(to_facing, velocities)], axis=1)
-    rows: Array = points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height)
-    return rows
+    return np.asarray(points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height))

@@ -12,7 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError
-from motet.motion.kinematics import AXES, euler_of, local_rotations, local_translations, skeleton_of, with_channels
+from motet.motion.kinematics import (
+    channels_of,
+    euler_of,
+    local_rotations,
+    local_translations,
+    skeleton_of,
+    with_channels,
+)
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Joint, Skeleton, partners_of
@@ -45,37 +52,40 @@ def mirror(motion: Motion) -> Motion:
     than Euler angles and translations of joints.
     """
     skeleton = skeleton_of(motion)
-    bad = [name for name in motion.channels if not _is_mirrored(name, skeleton)]
+    bad = _other_channels(motion)
     if bad:
         raise MotionError(f"only Euler angles and translations of joints can be mirrored, not {', '.join(bad)}")
     signs = np.where(np.arange(3) == lateral_axis(skeleton), -1.0, 1.0)
-    values = np.array(motion.values)
+    # a translation along the lateral axis changes its sign, and so do the turns about the other two axes
+    factors = {"r": -signs, "t": signs}
 
     # channels are swapped where the partner has the same ones and its axes are the mirror image
+    values = np.array(motion.values)
     harder = []
     for i, partner in enumerate(partners_of(skeleton.names)):
         for letter in "rt":
-            channels = _same_channels(motion, i, partner, letter)
-            is_same = letter == "t" or _turns_alike(skeleton.joints[i], skeleton.joints[partner], signs)
-            if channels is None or not is_same:
-                harder.append((i, partner, letter))
-                continue
-            # a translation along the lateral axis changes its sign, and so do the turns about the other two axes
-            factors = signs if letter == "t" else -signs
-            for axis, column, partner_column in channels:
-                values[:, column] = factors[axis] * motion.values[:, partner_column]
+            channels = _same_channels(motion, i, partner, letter, signs)
+            if channels is None:
+                harder.append((skeleton.joints[i], partner, letter))
+            for axis, column, partner_column in channels or []:
+                values[:, column] = factors[letter][axis] * motion.values[:, partner_column]
 
     # all others go by rotations and translations
     result = replace(motion, values=values)
-    for i, partner, letter in harder:
-        result = _with_mirrored(result, motion, i, partner, letter, signs)
+    for joint, partner, letter in harder:
+        result = _with_mirrored(result, motion, joint, partner, letter, signs)
     return result
 
 
-def _is_mirrored(channel: str, skeleton: Skeleton) -> bool:
-    """Whether a channel is an Euler angle or a translation of a joint."""
-    joint, _, kind = channel.rpartition(".")
-    return joint in skeleton.names and re.fullmatch("[rt][xyz]", kind) is not None
+def _other_channels(motion: Motion) -> list[str]:
+    """The channels that are no Euler angle and no translation of a joint."""
+    skeleton = skeleton_of(motion)
+    others = []
+    for channel in motion.channels:
+        joint, _, kind = channel.rpartition(".")
+        if joint not in skeleton.names or not re.fullmatch("[rt][xyz]", kind):
+            others.append(channel)
+    return others
 
 
 def _turns_alike(joint: Joint, partner: Joint, signs: Array) -> bool:
@@ -84,15 +94,21 @@ def _turns_alike(joint: Joint, partner: Joint, signs: Array) -> bool:
     return joint.order == partner.order and np.allclose(mirrored, joint.frame, rtol=0, atol=1e-6)
 
 
-def _same_channels(motion: Motion, i: int, partner: int, letter: str) -> list[tuple[int, int, int]] | None:
+def _same_channels(
+    motion: Motion, i: int, partner: int, letter: str, signs: Array
+) -> list[tuple[int, int, int]] | None:
     """The axis, column and partner's column of each channel of joint i's rotation ("r") or translation ("t"); None if
-    its partner has other channels or units."""
-    names = skeleton_of(motion).names
+    its partner has other channels or units, or turns about other axes than those mirrored with signs (3,)."""
+    joint = skeleton_of(motion).joints[i]
+    other = skeleton_of(motion).joints[partner]
+    if letter == "r" and not _turns_alike(joint, other, signs):
+        return None
     columns = {name: column for column, name in enumerate(motion.channels)}
+    names = zip(channels_of(joint.name, letter), channels_of(other.name, letter), strict=True)
     channels = []
-    for axis, axis_name in enumerate(AXES):
-        column = columns.get(f"{names[i]}.{letter}{axis_name}")
-        partner_column = columns.get(f"{names[partner]}.{letter}{axis_name}")
+    for axis, (name, partner_name) in enumerate(names):
+        column = columns.get(name)
+        partner_column = columns.get(partner_name)
         if column is None and partner_column is None:
             continue
         if column is None or partner_column is None or motion.units[column] != motion.units[partner_column]:
@@ -101,27 +117,26 @@ def _same_channels(motion: Motion, i: int, partner: int, letter: str) -> list[tu
     return channels
 
 
-def _with_mirrored(result: Motion, motion: Motion, i: int, partner: int, letter: str, signs: Array) -> Motion:
-    """The result with joint i's rotation ("r") or translation ("t") mirrored from its partner's in the motion: in the
+def _with_mirrored(result: Motion, motion: Motion, joint: Joint, partner: int, letter: str, signs: Array) -> Motion:
+    """The result with a joint's rotation ("r") or translation ("t") mirrored from its partner's in the motion: in the
     channels that it has, and in others that would leave their rest value."""
-    joint = skeleton_of(motion).joints[i]
-    names = [f"{joint.name}.{letter}{axis}" for axis in AXES]
+    names = channels_of(joint.name, letter)
     known = dict(zip(motion.channels, motion.units, strict=True))
-    rest = (0.0, 0.0, 0.0)
-    units = ["length"] * 3
-    if letter == "r":
-        usual = next((known[name] for name in names if name in known), "deg")
-        units = [known.get(name, usual) for name in names]
-        rotations = signs[:, None] * local_rotations(motion, [partner])[:, 0] * signs
-        values = euler_of(rotations, joint) * [TURN[unit] / (2 * np.pi) for unit in units]
-    else:
-        rest = joint.offset
-        values = local_translations(motion)[:, partner] * signs
-    needed = [axis for axis in range(3) if names[axis] in known or _leaves(values[:, axis], rest[axis])]
+    usual = next((known[name] for name in names if name in known), "deg")
+    units = [known.get(name, usual) if letter == "r" else "length" for name in names]
+    values = _mirrored_values(motion, joint, partner, units, signs)
+
+    # a channel is added only where it leaves its rest value by more than rounding
+    rest = (0.0, 0.0, 0.0) if letter == "r" else joint.offset
+    leaves = np.any(np.abs(values - rest) > 1e-9, axis=0)
+    needed = [axis for axis in range(3) if names[axis] in known or leaves[axis]]
     channels = tuple(names[axis] for axis in needed)
     return with_channels(result, channels, values[:, needed], tuple(units[axis] for axis in needed))
 
 
-def _leaves(values: Array, rest: float) -> bool:
-    """Whether any of the values (T,) differs from a rest value by more than rounding."""
-    return bool((np.abs(values - rest) > 1e-9).any())
+def _mirrored_values(motion: Motion, joint: Joint, partner: int, units: list[str], signs: Array) -> Array:
+    """Channels (T, 3) of a joint in three units of angles or of lengths, mirrored from its partner's."""
+    if units[0] == "length":
+        return local_translations(motion)[:, partner] * signs
+    rotations = signs[:, None] * local_rotations(motion, [partner])[:, 0] * signs
+    return euler_of(rotations, joint) * [TURN[unit] / (2 * np.pi) for unit in units]

@@ -47,24 +47,27 @@ class Motion:
         except (TypeError, ValueError) as error:
             raise MotionError(f"the values of a motion must be numbers: {error}") from error
         values.flags.writeable = False
-        for name, value in (
-            ("values", values),
-            ("channels", tuple(self.channels)),
-            ("units", tuple(self.units)),
-            ("fps", float(self.fps)),
-        ):
-            object.__setattr__(self, name, value)
+        # a frozen dataclass refuses assignments, here too
+        self.__dict__.update(
+            values=values,
+            channels=tuple(self.channels),
+            units=tuple(self.units),
+            fps=float(self.fps),
+        )
         if values.ndim != 2 or values.shape[1] != len(self.channels):
             raise MotionError(f"values of shape {values.shape} do not fit {len(self.channels)} channels")
         _check_channels(self.channels, self.units)
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"the frame rate must be a positive number, not {self.fps}")
-        finite = np.isfinite(values)
-        if not finite.all():
-            bad = np.argwhere(~finite)
-            frame, channel = bad[0]
-            place = f"frame {frame}, channel {self.channels[channel]!r} is {values[frame, channel]}"
-            raise MotionError(f"{place}: {len(bad)} values are not finite")
+        if not np.isfinite(values).all():
+            raise MotionError(self._not_finite())
+
+    def _not_finite(self) -> str:
+        """A sentence naming the first value that is not finite."""
+        bad = np.argwhere(~np.isfinite(self.values))
+        frame, channel = bad[0]
+        place = f"frame {frame}, channel {self.channels[channel]!r} is {self.values[frame, channel]}"
+        return f"{place}: {len(bad)} values are not finite"
 
     def __len__(self) -> int:
         return len(self.values)
@@ -162,9 +165,8 @@ class Motion:
         if self.values.size / ratio > 2**28:  # 2 GiB, six hours of a hundred channels at 120 fps
             raise MotionError(f"{self.duration:g} s at {fps:g} fps is too many frames")
         log.debug("resampling %r to %g fps", self, fps)
-        picked = abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
-        values = (self if picked else self.continuous()).values
-        return replace(self, values=resampled(values, ratio, to_end), fps=fps)
+        source = self if is_whole(ratio) else self.continuous()
+        return replace(self, values=resampled(source.values, ratio, to_end), fps=fps)
 
     def continuous(self) -> "Motion":
         """The same poses with angles that do not jump between frames.
@@ -174,24 +176,32 @@ class Motion:
         """
         values = np.array(self.values)
         turns = np.array([TURN.get(unit, np.inf) for unit in self.units])
-        places = {} if self.skeleton is None else self.skeleton.places
-        triples = []
-        singles = []
-        for name, columns in self.rotation_columns().items():
-            if self.skeleton is not None and len(columns) == 3 and name in places:
-                order = self.skeleton.joints[places[name]].order
-                triples.append([columns["xyz".index(axis)] for axis in order])
-            else:
-                singles += columns
+
+        # three angles of a joint change together; those of joints with fewer, or without a skeleton, one by one
+        triples, singles = self._euler_columns()
         if triples:
             values[:, triples] = continuous_euler(values[:, triples], turns[triples])
         if singles:
             values[:, singles] = without_turns(values[:, singles], turns[singles])
+
+        # exponential maps
         maps = [columns for columns in self.rotation_columns("e").values() if len(columns) == 3]
         if maps:
             radians = 2 * np.pi / turns[maps]
             values[:, maps] = continuous_rotvec(values[:, maps] * radians) / radians
         return replace(self, values=values)
+
+    def _euler_columns(self) -> tuple[list[list[int]], list[int]]:
+        """The columns of joints with three Euler angles, three each in the joint's order, and those of all others."""
+        triples = []
+        singles = []
+        for name, columns in self.rotation_columns().items():
+            if self.skeleton is not None and len(columns) == 3 and name in self.skeleton.places:
+                order = self.skeleton.joints[self.skeleton.places[name]].order
+                triples.append([columns["xyz".index(axis)] for axis in order])
+            else:
+                singles += columns
+        return triples, singles
 
     def rotation_columns(self, letter: str = "r") -> Mapping[str, list[int]]:
         """The columns, in the order x, y, z, of each joint with Euler angles ("r") or an exponential map ("e")."""
@@ -223,6 +233,11 @@ def _rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter:
     return columns_of
 
 
+def is_whole(ratio: float) -> bool:
+    """Whether a ratio of frame rates is a whole number but for rounding, so that frames can be picked."""
+    return abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5
+
+
 def resampled(values: Array, ratio: float, to_end: bool = False) -> Array:
     """Values (T, ...) at every ``ratio``-th frame, from the first; the ratio need not be whole.
 
@@ -231,7 +246,7 @@ def resampled(values: Array, ratio: float, to_end: bool = False) -> Array:
     to_end: keep the last frame instead of the first; the remainder is dropped at the start.
     """
     frames = len(values)
-    if abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5:
+    if is_whole(ratio):
         step = round(ratio)
         return values[(frames - 1) % step if to_end and frames else 0 :: step]
     count = int((frames - 1) / ratio + 1e-9) + 1 if frames else 0
@@ -253,14 +268,23 @@ def spline(values: Array, times: Array) -> Array:
     """Like :func:`lines`, on Catmull-Rom splines."""
     if len(values) < 2:
         return np.repeat(values[:1], len(times), axis=0)
-    # beyond each end, continue the parabola through the three nearest frames, or the line through two
-    near = np.array([3.0, -3.0, 1.0] if len(values) > 2 else [2.0, -1.0])
-    ends = [np.tensordot(near, part, 1)[None] for part in (values[: len(near)], values[: -len(near) - 1 : -1])]
-    padded = np.concatenate([ends[0], values, ends[1]])
+    # a cubic between the second and the third of four frames (Catmull and Rom 1974)
+    padded = _extended(values)
     start, s = _between(values, times)
-    a, b, c, d = (padded[start + n] for n in range(4))
-    points: Array = b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
-    return points
+    a = padded[start]
+    b = padded[start + 1]
+    c = padded[start + 2]
+    d = padded[start + 3]
+    return np.asarray(b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a))))
+
+
+def _extended(values: Array) -> Array:
+    """Values (T + 2, ...) with one more frame at each end, on the parabola through the three nearest, or the line
+    through two."""
+    near = np.array([3.0, -3.0, 1.0] if len(values) > 2 else [2.0, -1.0])
+    before = np.tensordot(near, values[: len(near)], 1)
+    after = np.tensordot(near, values[: -len(near) - 1 : -1], 1)
+    return np.concatenate([before[None], values, after[None]])
 
 
 def _between(values: Array, times: Array) -> tuple[NDArray[np.intp], Array]:

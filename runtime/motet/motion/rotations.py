@@ -59,16 +59,19 @@ def euler_to_rotmat(angles: Array, order: str) -> Array:
     part = 1 / (1 + tangent**2)
     cos_a, cos_b, cos_c = np.moveaxis((1 - tangent**2) * part, -1, 0)
     sin_a, sin_b, sin_c = np.moveaxis(2 * tangent * part, -1, 0)
+
+    # R = Ri(a) Rj(b) Rk(c): the row that the first turn leaves as it is
     matrix = frames_last((*angles.shape[:-1], 3, 3))
     matrix[..., i, i] = cos_b * cos_c
     matrix[..., i, j] = -cos_b * sin_c
     matrix[..., i, k] = sin_b
-    matrix[..., j, i] = sin_a * sin_b * cos_c + cos_a * sin_c
-    matrix[..., j, j] = cos_a * cos_c - sin_a * sin_b * sin_c
-    matrix[..., k, i] = sin_a * sin_c - cos_a * sin_b * cos_c
-    matrix[..., k, j] = cos_a * sin_b * sin_c + sin_a * cos_c
-    matrix[..., j, k] = -sin_a * cos_b
-    matrix[..., k, k] = cos_a * cos_b
+
+    # and the two rows that it mixes, which are alike but for a quarter turn of a
+    for row, cos, sin in ((j, cos_a, sin_a), (k, sin_a, -cos_a)):
+        tilted = sin * sin_b
+        matrix[..., row, i] = tilted * cos_c + cos * sin_c
+        matrix[..., row, j] = cos * cos_c - tilted * sin_c
+        matrix[..., row, k] = -sin * cos_b
     return matrix
 
 
@@ -103,17 +106,27 @@ def continuous_euler(angles: Array, turn: Array | float = 2 * np.pi) -> Array:
     # steps of less than a sixth of a turn are nearer than the other solution, of which two angles are half a turn off
     leaping = (np.abs(np.diff(result, axis=0)) > turn / 6).any(axis=(0, -1))
     if leaping.any():
-        leaping_angles = result[:, leaping]
-        turn = turn[leaping]
-        flipped = leaping_angles * [1, -1, 1] + turn / 2
-        # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend
-        # on which of them the frame before took
-        stay, change = ((then - leaping_angles[:-1]) / turn for then in (leaping_angles[1:], flipped[1:]))
-        stay, change = (2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1) for turns in (stay, change))
-        changed = np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1
-        leaping_angles[1:] = np.where(changed[..., None], flipped[1:], leaping_angles[1:])
-        result[:, leaping] = without_turns(leaping_angles, turn)
+        result[:, leaping] = _without_flips(result[:, leaping], turn[leaping])
     return result
+
+
+def _without_flips(angles: Array, turn: Array) -> Array:
+    """:func:`continuous_euler` of angles (T, J, 3) with whole turns (J, 3)."""
+    # the solutions lie as far from each other seen from either: where one is nearer than the other does not depend on
+    # which of them the frame before took
+    flipped = angles * [1, -1, 1] + turn / 2
+    stay = _distance((angles[1:] - angles[:-1]) / turn)
+    change = _distance((flipped[1:] - angles[:-1]) / turn)
+
+    # so every change goes over to the other solution, and every second one back
+    is_flipped = np.cumsum(change < stay - 1e-9, axis=0) % 2 == 1
+    nearest = np.concatenate([angles[:1], np.where(is_flipped[..., None], flipped[1:], angles[1:])])
+    return without_turns(nearest, turn)
+
+
+def _distance(turns: Array) -> Array:
+    """How far (...) rotations are from each other whose Euler angles differ by turns (..., 3), in radians."""
+    return np.asarray(2 * np.pi * np.abs(turns - np.round(turns)).sum(axis=-1))
 
 
 def rotmats_to_euler(matrices: Array, order: str, leaps: bool = False) -> Array:
@@ -157,11 +170,12 @@ def continuous_rotvec(vectors: Array) -> Array:
 
 def _whole_turns(now: Array, after: Array) -> Array:
     """Whole turns to add to rotation vectors (..., 3) to bring them nearest to ``after`` (..., 3)."""
-    angle, other = (np.linalg.norm(vector, axis=-1, keepdims=True) for vector in (now, after))
+    angle = np.linalg.norm(now, axis=-1, keepdims=True)
+    angle_after = np.linalg.norm(after, axis=-1, keepdims=True)
     # a rotation by no angle takes the axis of the frame after it
-    axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(other, 1e-9))
-    turns: Array = axis * (np.round(((after * axis).sum(-1, keepdims=True) - angle) / (2 * np.pi)) * 2 * np.pi)
-    return turns
+    axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(angle_after, 1e-9))
+    along = (after * axis).sum(-1, keepdims=True)
+    return np.asarray(axis * (np.round((along - angle) / (2 * np.pi)) * 2 * np.pi))
 
 
 def rotvec_to_rotmat(vector: Array) -> Array:
@@ -209,18 +223,23 @@ def rotmat_to_quat(matrix: Array) -> Array:
     The largest of the four components is found first and divides the others, so every rotation is exact (Shepperd
     1978).
     """
-    trace = np.trace(matrix, axis1=-2, axis2=-1)[..., None, None]
-    transposed = np.swapaxes(matrix, -1, -2)
-    # row n is 4 q_n q: the quaternion scaled by four times its n-th component
-    scaled = frames_last((*matrix.shape[:-2], 4, 4))
-    scaled[..., :3, :3] = matrix + transposed + (1 - trace) * np.eye(3)
-    difference = matrix - transposed
-    scaled[..., 3, :3] = scaled[..., :3, 3] = difference[..., [2, 0, 1], [1, 2, 0]]
-    scaled[..., 3, 3] = 1 + trace[..., 0, 0]
+    # of the four scaled ones that with the largest component, of length 1 and with w not negative
+    scaled = _scaled_quats(matrix)
     largest = np.argmax(np.diagonal(scaled, axis1=-2, axis2=-1), axis=-1)
     quat = np.take_along_axis(scaled, largest[..., None, None], axis=-2)[..., 0, :]
     quat /= np.linalg.norm(quat, axis=-1, keepdims=True)
     return np.where(quat[..., 3:] < 0, -quat, quat)
+
+
+def _scaled_quats(matrix: Array) -> Array:
+    """The quaternions q of matrices (..., 3, 3) scaled in four ways: row n of (..., 4, 4) is 4 q_n q."""
+    trace = np.trace(matrix, axis1=-2, axis2=-1)[..., None, None]
+    difference = matrix - inverse(matrix)
+    scaled = frames_last((*matrix.shape[:-2], 4, 4))
+    scaled[..., :3, :3] = matrix + inverse(matrix) + (1 - trace) * np.eye(3)
+    scaled[..., 3, :3] = scaled[..., :3, 3] = difference[..., [2, 0, 1], [1, 2, 0]]
+    scaled[..., 3, 3] = 1 + trace[..., 0, 0]
+    return scaled
 
 
 def product(left: Array, right: Array) -> Array:
@@ -256,6 +275,8 @@ def swing(start: Array, end: Array) -> Array:
     versed = axis / np.maximum(1 + cosine, 1e-9)[..., None]
     # 1 - (1 - cosine) instead of the cosine: a direction of 0 gives the identity
     turn = rodrigues(1 - np.sum(versed * axis, axis=-1), axis, versed, axis)
+
+    # half a turn is about the axis that is square to the direction and to the coordinate axis farthest from it
     half = cosine < -1 + 1e-6
     if half.any():
         side = unit(np.cross(start, np.eye(3)[np.argmin(np.abs(start), axis=-1)]))
@@ -268,6 +289,7 @@ def twist(rotations: Array, axis: Array) -> Array:
     length = float(np.linalg.norm(axis))
     if length == 0.0:
         return np.broadcast_to(np.eye(3), rotations.shape)
+    # a quaternion's part along the axis, beside its scalar, is that of the twist
     quats = rotmat_to_quat(rotations)
     along = axis / length
     angles = 2 * angle_of(quats[..., :3] @ along, quats[..., 3])

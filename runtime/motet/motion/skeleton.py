@@ -4,7 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from operator import index
 from typing import Any
@@ -64,8 +64,7 @@ class Skeleton:
             raise MotionError("a skeleton needs at least one joint")
         if self.metres_per_unit is not None and not 0 < self.metres_per_unit < np.inf:
             raise MotionError(f"a length unit must be a positive number of metres, not {self.metres_per_unit}")
-        names = [joint.name for joint in self.joints]
-        double = sorted(name for name, count in Counter(names).items() if count > 1)
+        double = repeated(joint.name for joint in self.joints)
         if double:
             raise MotionError(f"joint names must be unique; repeated: {', '.join(double)}")
         if not np.isfinite([[*joint.offset, *joint.axis] for joint in self.joints]).all():
@@ -137,10 +136,14 @@ class Skeleton:
 
     def subtree(self, name: str) -> tuple[int, ...]:
         """Indices of a joint and all its descendants."""
-        joints = [self.index(name)]
+        return tuple(self.below(self.index(name)))
+
+    def below(self, joint: int) -> list[int]:
+        """Indices of a joint and all that hangs on it, in order."""
+        joints = [joint]
         for i in joints:
             joints.extend(self.children[i])
-        return tuple(sorted(joints))
+        return sorted(joints)
 
     def ancestors(self, joint: int) -> list[int]:
         """Indices of a joint and all that it hangs on, upwards to the root."""
@@ -152,11 +155,14 @@ class Skeleton:
     def scaled(self, metres_per_unit: float) -> "Skeleton":
         """The same skeleton in another length unit; MotionError if its own unit is not known."""
         factor = self.unit_factor(metres_per_unit)
-        joints = tuple(
-            Joint(j.name, j.parent, (j.offset[0] * factor, j.offset[1] * factor, j.offset[2] * factor), j.order, j.axis)
-            for j in self.joints
-        )
-        return Skeleton(joints, metres_per_unit)
+        return replace(self.with_offsets(self.offsets * factor), metres_per_unit=metres_per_unit)
+
+    def with_offsets(self, offsets: Array) -> "Skeleton":
+        """The same skeleton with other offsets (J, 3)."""
+        joints = []
+        for joint, offset in zip(self.joints, offsets.tolist(), strict=True):
+            joints.append(replace(joint, offset=tuple(offset)))
+        return replace(self, joints=tuple(joints))
 
     def unit_factor(self, metres_per_unit: float) -> float:
         """The factor from this skeleton's unit to the other unit."""
@@ -166,31 +172,49 @@ class Skeleton:
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object that :meth:`from_json` reads back without loss."""
-        return {
-            "metres_per_unit": self.metres_per_unit,
-            "joints": [
-                {"name": j.name, "parent": j.parent, "offset": list(j.offset), "order": j.order, "axis": list(j.axis)}
-                for j in self.joints
-            ],
-        }
+        joints = []
+        for joint in self.joints:
+            joints.append(
+                {
+                    "name": joint.name,
+                    "parent": joint.parent,
+                    "offset": list(joint.offset),
+                    "order": joint.order,
+                    "axis": list(joint.axis),
+                }
+            )
+        return {"metres_per_unit": self.metres_per_unit, "joints": joints}
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> "Skeleton":
         """The inverse of :meth:`to_json`; MotionError if it is not a skeleton."""
         try:
-            joints = tuple(
-                Joint(str(j["name"]), index(j["parent"]), _triple(j["offset"]), str(j["order"]), _triple(j["axis"]))
-                for j in data["joints"]
-            )
+            joints = tuple(map(_read_joint, data["joints"]))
             metres = data["metres_per_unit"]
             return Skeleton(joints, None if metres is None else float(metres))
         except (KeyError, TypeError, ValueError) as error:
             raise MotionError(f"not a skeleton: {error}") from error
 
 
+def _read_joint(data: Mapping[str, Any]) -> Joint:
+    """A joint as :meth:`Skeleton.to_json` writes it."""
+    return Joint(
+        str(data["name"]),
+        index(data["parent"]),
+        _triple(data["offset"]),
+        str(data["order"]),
+        _triple(data["axis"]),
+    )
+
+
 def _triple(values: Iterable[float]) -> tuple[float, float, float]:
     x, y, z = map(float, values)
     return x, y, z
+
+
+def repeated(names: Iterable[str]) -> list[str]:
+    """The names that are there more than once, in alphabetical order."""
+    return sorted(name for name, count in Counter(names).items() if count > 1)
 
 
 def metres(unit: str | float) -> float:

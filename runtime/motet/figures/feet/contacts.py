@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.motion.kinematics import positions, skeleton_of, with_channels
+from motet.motion.kinematics import channels_of, positions, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, partners_of
@@ -49,6 +49,12 @@ TREMBLE = 0.015
 
 GENERATED_TREMBLE = 0.06
 """The same for feet of models that output only joint angles, which tremble more."""
+
+GRAVITY = 9.81
+"""Metres per second squared."""
+
+RISE_SPAN = 0.05
+"""Seconds over which the upward velocity is measured with which a flight begins."""
 
 ADULT_HEIGHT = 1.7
 """Metres of a figure whose length unit is unknown: those of an adult."""
@@ -85,8 +91,7 @@ def contacts(heights: Array, speeds: Array | None, settings: ContactSettings) ->
 
 def standing(heights: Array, speeds: Array | None, settings: ContactSettings) -> NDArray[np.bool_]:
     """Which points surely stand, as in :func:`contacts`."""
-    stands: NDArray[np.bool_] = contacts(heights, speeds, settings) == 1
-    return stands
+    return np.equal(contacts(heights, speeds, settings), 1)
 
 
 def contacts_of(points: Array, fps: float, settings: ContactSettings = SOLES) -> Array:
@@ -97,8 +102,7 @@ def contacts_of(points: Array, fps: float, settings: ContactSettings = SOLES) ->
 
 def ground_speeds(points: Array, fps: float) -> Array:
     """Speeds (..., T - 1, K) over the ground of points (..., T, K, 3), per frame."""
-    speeds: Array = np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps
-    return speeds
+    return np.asarray(np.linalg.norm(np.diff(points[..., [0, 2]], axis=-3), axis=-1) * fps)
 
 
 def rise(values: Array, start: float, end: float) -> Array:
@@ -113,10 +117,22 @@ def smoothed(points: Array, calm: float, fps: float) -> Array:
     if len(points) < 2 or not reach:
         return points
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (calm * fps)) ** 2)
-    padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
     weights = window / window.sum()
-    smooth: Array = sum(weight * padded[i : i + len(points)] for i, weight in enumerate(weights))
-    return smooth
+    # beyond the ends the points go on as their mirror images in them
+    padded = np.pad(points, ((reach, reach), (0, 0), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.asarray(sum(weight * padded[i : i + len(points)] for i, weight in enumerate(weights)))
+
+
+def windows(values: Array, reach: int) -> Array:
+    """For each of the values (T,) those from ``reach`` before to ``reach`` after it, (T, 2 reach + 1); the first and
+    last value are repeated beyond the ends."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
+
+
+def bell(reach: int) -> Array:
+    """Weights (2 reach + 1,) of a window that fades to both sides, which sum up to 1 (Hann)."""
+    weights = np.hanning(2 * reach + 3)[1:-1]
+    return np.asarray(weights / weights.sum())
 
 
 def feet_of(skeleton: Skeleton) -> list[int]:
@@ -170,9 +186,7 @@ def lay_root_path(
 
     # over the ground, the root moves against the feet that stand
     plane = smoothed(points_from_root[..., [0, 2]], tremble, motion.fps)
-    velocity = np.zeros((0, 2))
-    if len(motion) > 1:
-        velocity = velocity_by_feet(plane, points_from_root[..., 1] + height[:, None], motion.fps)
+    velocity = velocity_by_feet(plane, points_from_root[..., 1] + height[:, None], motion.fps)
     return led_along(motion, velocity, height, metres)
 
 
@@ -189,22 +203,22 @@ def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> 
     path = np.zeros((len(motion), 3))
     path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
     path[:, 1] = height
-    names = tuple(f"{skeleton_of(motion).names[0]}.{kind}" for kind in ("tx", "ty", "tz"))
-    return with_channels(motion, names, path / metres, ("length",) * 3)
+    return with_channels(motion, channels_of(skeleton_of(motion).names[0], "t"), path / metres, ("length",) * 3)
 
 
 def _with_flight(standing: Array, fps: float) -> Array:
     """Heights (T,) of the root in metres, from those at which the feet are on the ground, where it falls freely."""
     heights = standing.tolist()
     speed = 0.0
-    span = max(1, round(0.05 * fps))  # the upward velocity is measured over .05 s
-    gravity = 9.81  # m/s^2
+    span = max(1, round(RISE_SPAN * fps))
     for t in range(1, len(heights)):
-        falling = heights[t - 1] + speed / fps - 0.5 * gravity / fps**2
+        falling = heights[t - 1] + speed / fps - 0.5 * GRAVITY / fps**2
         if falling > heights[t]:
+            # in flight: the feet would have to go down faster than it falls
             heights[t] = falling
-            speed -= gravity / fps
+            speed -= GRAVITY / fps
         else:
+            # on the ground, where the next flight begins with the speed of the last frames
             start = max(0, t - span)
             speed = (heights[t] - heights[start]) * fps / (t - start)
     return np.array(heights)
@@ -217,6 +231,8 @@ def velocity_by_feet(
 
     guess: (T - 1, 2) in m/s, a vote of weight ``trust`` that always counts.
     """
+    if len(points) < 2:
+        return np.zeros((0, 2))
     # each point votes for the velocity that keeps it in place; a vote counts less the higher its point is
     votes = -np.diff(points, axis=0) * fps
     heights = (above[1:] + above[:-1]) / 2
@@ -229,19 +245,24 @@ def velocity_by_feet(
     # the mean of all votes first, then means in which votes count less that disagree with the mean before
     velocity = _mean_vote(votes, nearness, window, trust, guess)
     for _ in range(REWEIGHTINGS):
-        off = votes - velocity[:, None]
-        is_faster = (off * velocity[:, None]).sum(axis=-1) > 0
-        allowed = np.where(is_faster, *ALLOWED)
-        weights = nearness / (1 + (off**2).sum(axis=-1) / allowed**2) ** 2
-        velocity = _mean_vote(votes, weights, window, trust, guess)
+        velocity = _mean_vote(votes, nearness / _disagreement(votes, velocity), window, trust, guess)
     return velocity
+
+
+def _disagreement(votes: Array, velocity: Array) -> Array:
+    """By how much the weights (T, K) of votes (T, K, 2) are divided, 1 or more, the more they differ from a velocity
+    (T, 2): Tukey's biweight, without its end (Beaton and Tukey 1974)."""
+    off = votes - velocity[:, None]
+    is_faster = (off * velocity[:, None]).sum(axis=-1) > 0
+    allowed = np.where(is_faster, *ALLOWED)
+    return np.asarray((1 + (off**2).sum(axis=-1) / allowed**2) ** 2)
 
 
 def _mean_vote(votes: Array, weights: Array, window: Array, trust: float, guess: Array | float) -> Array:
     """The mean (T, 2) over points and a window in time of votes (T, K, 2) with weights (T, K); without any vote within
     reach, the guess."""
     reach = len(window) // 2
+    # sums over the points first, of the weights and of the weighted votes, then over the window
     columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
     total, x, z = (np.convolve(column, window)[reach : reach + len(votes)] for column in columns)
-    mean: Array = (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]
-    return mean
+    return np.asarray((np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None])

@@ -7,7 +7,7 @@ median is 0, so the foot stands where it stood on average. Before and after, the
 knee and ankle follow by two-bone inverse kinematics (:class:`motet.figures.two_bones.TwoBones`).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,11 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.figures.feet.contacts import SOLES, TREMBLE, TREMBLING, ContactSettings, contacts_of, rise, smoothed
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, LEG, Figure, ground_under, leg_length, sided, sole_points
+from motet.figures.feet.contacts import (
+    SOLES,
+    TREMBLE,
+    TREMBLING,
+    ContactSettings,
+    bell,
+    contacts_of,
+    rise,
+    smoothed,
+    windows,
+)
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, LEG, Figure, ground_under, leg_length, limb_of, sole_points
 from motet.figures.humanoid.measure import Fitted
 from motet.figures.two_bones import TwoBones
-from motet.motion.kinematics import AXES, global_transforms, posed, skeleton_of, with_channels
+from motet.motion.kinematics import channels_of, global_transforms, posed, skeleton_of, with_channels
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, quat_to_rotmat, rotated
 from motet.motion.scalar_or_batch import Quaternion, Vector, parts
@@ -88,7 +98,7 @@ def hold_feet(
     for leg, points in zip(legs, np.split(soles, 2, axis=1), strict=True):
         turns = _leg_turns(leg, rotations, places * scale, points, motion.fps, settings)
         for joint, turn in zip(leg.joints, turns, strict=True):
-            hanging = list(skeleton.subtree(skeleton.names[joint]))
+            hanging = skeleton.below(joint)
             turned[:, hanging] = product(turn[..., None, :, :], rotations[:, hanging])
     return _with_turned(motion, turned, legs[0].joints + legs[1].joints)
 
@@ -113,8 +123,7 @@ def _with_turned(motion: Motion, turned: Array, joints: list[int]) -> Motion:
     local = {}
     for i in joints:
         joint = skeleton.joints[i]
-        names = [f"{joint.name}.r{axis}" for axis in AXES]
-        lacking = tuple(name for name in names if name not in motion.channels)
+        lacking = tuple(name for name in channels_of(joint.name, "r") if name not in motion.channels)
         # the humanoid's joints get three angles; those of another figure keep to the ones they have, as knees with one
         if lacking and (skeleton == HUMANOID or len(lacking) == 3):
             still = np.zeros((len(motion), len(lacking)))
@@ -131,7 +140,7 @@ def _measured(motion: Motion, rotations: Array, places: Array, ground: float | N
     if motion.skeleton == HUMANOID:
         soles = sole_points(rotations, places)
         soles[..., 1] -= ground_under(soles) if ground is None else ground
-        return _legs(HUMANOID.places, lambda knee: np.array([1.0, 0.0, 0.0])), 1.0, soles
+        return _legs(HUMANOID.places, np.tile(np.eye(3), (places.shape[1], 1, 1))), 1.0, soles
 
     figure = Figure.of(motion)
     fitted = figure.fitted
@@ -141,7 +150,7 @@ def _measured(motion: Motion, rotations: Array, places: Array, ground: float | N
     soles = _soles(fitted, rotations, places) * scale
     # how thick the soles of another figure are is not known: each of their points is on the ground where it is lowest
     soles[..., 1] -= np.percentile(soles[..., 1], 5, axis=0)
-    return _legs(fitted.joint_map.joints, lambda knee: fitted.aligned[knee][:, 0]), scale, soles
+    return _legs(fitted.joint_map.joints, fitted.aligned), scale, soles
 
 
 def _soles(fitted: Fitted, rotations: Array, places: Array) -> Array:
@@ -153,12 +162,12 @@ def _soles(fitted: Fitted, rotations: Array, places: Array) -> Array:
     return fitted.soles(feet, places)
 
 
-def _legs(joint_of: Mapping[str, int], hinge_of: Callable[[int], Array]) -> list[Leg]:
-    """The left and right leg, from the joint of each bone and the axis of each knee's joint."""
+def _legs(joint_of: Mapping[str, int], aligned: Array) -> list[Leg]:
+    """The left and right leg, from the joint of each bone and the rotations (J, 3, 3) of bones in their joints."""
     legs = []
     for side in LEFT_RIGHT:
-        joints = [joint_of[sided(side, part)] for part in LEG[:3]]
-        legs.append(Leg(joints, hinge_of(joints[1])))
+        joints = [joint_of[bone] for bone in limb_of(side, LEG[:3])]
+        legs.append(Leg(joints, aligned[joints[1], :, 0]))
     return legs
 
 
@@ -194,8 +203,7 @@ def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
 
     # a shift stays below the farthest; short ones are unchanged within a few per cent
     length = np.linalg.norm(shift, axis=-1, keepdims=True) / settings.farthest
-    limited: Array = shift / (1 + length**4) ** 0.25
-    return limited
+    return np.asarray(shift / (1 + length**4) ** 0.25)
 
 
 def _stance_paths(
@@ -257,12 +265,4 @@ def lift(depth: Array, soft: float) -> Array:
     reach = max(1, round(soft))
     # a mean over a window of maxima is at least as high as the depth in its middle
     deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
-    bell = np.hanning(2 * reach + 3)[1:-1]
-    heights: Array = windows(deepest, reach) @ (bell / bell.sum())
-    return heights
-
-
-def windows(values: Array, reach: int) -> Array:
-    """For each of the values (T,) those from ``reach`` before to ``reach`` after it, (T, 2 reach + 1); the first and
-    last value are repeated beyond the ends."""
-    return np.lib.stride_tricks.sliding_window_view(np.pad(values, reach, mode="edge"), 2 * reach + 1)
+    return np.asarray(windows(deepest, reach) @ bell(reach))

@@ -21,7 +21,14 @@ from motet.figures.feet.contacts import (
     velocity_by_feet,
 )
 from motet.figures.humanoid import HUMANOID, ground_under, is_mmm, leg_length, sole_points, to_humanoid, with_figure
-from motet.motion.kinematics import AXES, global_transforms, local_translations, positions, skeleton_of, with_channels
+from motet.motion.kinematics import (
+    channels_of,
+    global_transforms,
+    local_translations,
+    positions,
+    skeleton_of,
+    with_channels,
+)
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
@@ -98,8 +105,7 @@ def with_travel(motion: Motion) -> Motion:
     laid_root = local_translations(lay_root_path(on_humanoid))[:, 0]
     path = (laid_root - root + root[:1]) * [1, 0, 1]
     root_in_file = local_translations(motion)[:, 0] + path @ to_file
-    names = tuple(f"{skeleton_of(motion).names[0]}.t{axis}" for axis in AXES)
-    return with_channels(motion, names, root_in_file, ("length",) * 3)
+    return with_channels(motion, channels_of(skeleton_of(motion).names[0], "t"), root_in_file, ("length",) * 3)
 
 
 def _may_be(motion: Motion, skeleton: Skeleton, settings: TreadmillSettings) -> bool:
@@ -139,16 +145,15 @@ def _strides(motion: Motion, settings: TreadmillSettings) -> bool:
     foot_velocity = _averaged(_slid(motion, points, settings), span)
     foot_speed = np.linalg.norm(foot_velocity, axis=1)
     root_velocity = _averaged(np.diff(root[:, [0, 2]], axis=0) * motion.fps, span)
-    if foot_speed.mean() < settings.speed:
-        return False
-    if np.linalg.norm(root_velocity, axis=1).sum() > settings.share * foot_speed.sum():
+    root_way = np.linalg.norm(root_velocity, axis=1).sum()
+    if foot_speed.mean() < settings.speed or root_way > settings.share * foot_speed.sum():
         return False
 
     # by turns one foot is ahead of the other, and the body stands
     direction = foot_velocity / np.maximum(foot_speed, 1e-9)[:, None]
-    left, right = np.einsum("tfa,ta->ft", _feet_from_root(points, root), direction)
-    is_upright = root[:, 1].mean() - points[..., 1].mean() >= settings.hips
-    return bool(_swing_by_turns(left, right, settings) and is_upright)
+    left, right = _feet_ahead(points, root, direction)
+    height = float(root[:, 1].mean() - points[..., 1].mean())
+    return _swing_by_turns(left, right, settings) and height >= settings.hips
 
 
 def _swing_by_turns(left: Array, right: Array, settings: TreadmillSettings) -> bool:
@@ -159,11 +164,11 @@ def _swing_by_turns(left: Array, right: Array, settings: TreadmillSettings) -> b
     return bool(is_wide and is_opposite)
 
 
-def _feet_from_root(points: Array, root: Array) -> Array:
-    """Where feet are over the ground (T - 1, 2, 2), seen from the root (T, 3), from the second frame on: the means of
-    points (T, P, 3) of both soles."""
+def _feet_ahead(points: Array, root: Array, direction: Array) -> Array:
+    """How far feet are ahead of the root (T, 3) along directions (T - 1, 2), from the second frame on (2, T - 1): the
+    means of points (T, P, 3) of both soles."""
     by_foot = (points - root[:, None])[1:].reshape(-1, 2, len(points[0]) // 2, 3)
-    return np.asarray(by_foot.mean(axis=2)[..., [0, 2]])
+    return np.asarray(np.einsum("tfa,ta->ft", by_foot.mean(axis=2)[..., [0, 2]], direction))
 
 
 def _slid(motion: Motion, points: Array, settings: TreadmillSettings) -> Array:

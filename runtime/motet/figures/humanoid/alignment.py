@@ -11,11 +11,12 @@ and arms hang at the sides of the trunk, knees and elbows are hinges. All is ave
 all frames; results near axes are taken to be exactly these, so that every take of a skeleton gets the same alignment.
 """
 
+from collections.abc import Sequence
 from itertools import permutations
 
 import numpy as np
 
-from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, sided
+from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, limb_of, sided
 from motet.figures.humanoid.joint_map import LIMB_BONES, Body, humanoid_direction
 from motet.motion.rotations import Array, frames_last, product, rotvec_to_rotmat, swing, unit
 
@@ -217,8 +218,8 @@ class Calibration:
         # each stage builds on the joints settled before: trunk, then legs from the hips, and arms from the chest
         self._trunk()
         for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
-            self._leg([sided(side, part) for part in LEG])
-            self._arm([sided(side, part) for part in ARM], sign)
+            self._leg(limb_of(side, LEG))
+            self._arm(limb_of(side, ARM), sign)
 
     def _turns(self, joint: int) -> Array:
         """Rotations (T, 3, 3) of the humanoid's bone for a joint whose A is settled."""
@@ -252,11 +253,8 @@ class Calibration:
     def _trunk(self) -> None:
         """Hips and back: up towards the arms, the joint that carries the arms and those above: up towards the head."""
         body = self.body
-        spine = body.joint_map.spine
-        back = [body.joints["hips"], *spine, *body.joint_map.neck]
-        if "head" in body.joints:
-            back.append(body.joints["head"])
-        chest = len(spine)
+        back = [body.joints["hips"], *body.joint_map.spine, *body.joint_map.neck_and_head]
+        chest = len(body.joint_map.spine)
         legs_left = unit(body.to_left(self.positions, "UpperLeg"))
         arms_left = unit(body.to_left(self.positions, "UpperArm"))
         for i, joint in enumerate(back):
@@ -273,28 +271,32 @@ class Calibration:
         end = self.body.middle(positions, "UpperArm") if i < chest else positions[:, back[-1]]
         return np.asarray(end - start)
 
-    def _leg(self, bones: list[str]) -> None:
+    def _leg(self, bones: Sequence[str]) -> None:
         """Knees are hinges that bend backwards; feet and toes have the hinge's axis."""
         joints = self.body.joints
-        thigh = self._direction(bones[0])
-        shin = self._direction(bones[1])
+        upper_leg, lower_leg, *foot_and_toes = bones
+        thigh = self._direction(upper_leg)
+        shin = self._direction(lower_leg)
         hinge = np.cross(thigh, shin) + self.HINGE * self._turns(joints["hips"])[:, :, 0]
-        self._settle_limb(bones[0], thigh, frame(hinge, -thigh))
-        self._settle_limb(bones[1], shin, frame(hinge, -shin))
+        self._settle_limb(upper_leg, thigh, frame(hinge, -thigh))
+        self._settle_limb(lower_leg, shin, frame(hinge, -shin))
+        for bone in foot_and_toes:
+            if bone in joints:
+                self._foot(bone, self._turns(joints[lower_leg]))
 
-        # feet and toes slope against the level as the humanoid's do
-        shin_turns = self._turns(joints[bones[1]])
+    def _foot(self, bone: str, shin_turns: Array) -> None:
+        """A foot, or toes, slopes against the level as the humanoid's does; without a direction it turns with the shin
+        (T, 3, 3)."""
+        if not self.body.aims[bone]:
+            self._settle(self.body.joints[bone], shin_turns)
+            return
+        along = self._direction(bone)
         to_left = shin_turns[:, :, 0]
-        for bone in bones[2:]:
-            if bone in joints and not self.body.aims[bone]:
-                self._settle(joints[bone], shin_turns)
-            elif bone in joints:
-                along = self._direction(bone)
-                level = frame(to_left, np.cross(along, to_left))
-                slope = swing(np.array([0.0, 0.0, 1.0]), humanoid_direction(bone))
-                self._settle_limb(bone, along, level @ slope.T)
+        level = frame(to_left, np.cross(along, to_left))
+        slope = swing(np.array([0.0, 0.0, 1.0]), humanoid_direction(bone))
+        self._settle_limb(bone, along, level @ slope.T)
 
-    def _arm(self, bones: list[str], sign: float) -> None:
+    def _arm(self, bones: Sequence[str], sign: float) -> None:
         """Elbows are hinges that bend forwards with the arms out to the sides; hands are in line with the forearms."""
         joints = self.body.joints
         shoulder, upper_arm, forearm, hand = bones

@@ -12,7 +12,7 @@ each joint's parent, offset and Euler order.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -31,13 +31,20 @@ NECK = ("neck", "head")
 LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 
-Places = Mapping[str, tuple[str, tuple[float, float, float], str]]
+Triple = tuple[float, float, float]
+
+Places = Mapping[str, tuple[str, Triple, str]]
 """Joint -> parent, "" for none, offset and Euler order."""
 
 
 def sided(side: str, part: str) -> str:
     """The name of a joint on one side: ``sided("left", "UpperArm")`` is "leftUpperArm"."""
     return side + part
+
+
+def limb_of(side: str, parts: Sequence[str]) -> tuple[str, ...]:
+    """The names of a limb's joints on one side, such as those of LEG."""
+    return tuple(sided(side, part) for part in parts)
 
 
 def part_of(bone: str) -> str:
@@ -59,7 +66,13 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
     return tuple(joints)
 
 
-_TABLES = json.loads((files("motet.figures.humanoid") / "humanoid.json").read_text("utf-8"))
+def _table(*path: str) -> dict[str, Any]:
+    """A JSON object of this folder."""
+    table: dict[str, Any] = json.loads(files("motet.figures.humanoid").joinpath(*path).read_text("utf-8"))
+    return table
+
+
+_TABLES = _table("humanoid.json")
 
 # an order's middle axis is the one that the joint turns least about, which keeps poses away from gimbal locks
 HUMANOID = Skeleton(_joints(_TABLES["trunk"], _TABLES["left"], LEFT_RIGHT), metres_per_unit=1.0)
@@ -77,9 +90,7 @@ PARENTS = {name: HUMANOID.names[max(0, HUMANOID.joints[HUMANOID.index(name)].par
 T_POSE = HUMANOID.rest_positions + HUMANOID.offsets[0]
 """Positions (J, 3) of the humanoid's joints in the T-pose, with the soles at y = 0."""
 
-SOLE: Mapping[str, tuple[tuple[float, float, float], ...]] = {
-    part: tuple(map(tuple, points)) for part, points in _TABLES["soles"].items()
-}
+SOLE: Mapping[str, tuple[Triple, ...]] = {part: tuple(map(tuple, row)) for part, row in _TABLES["soles"].items()}
 """Points of the sole in the frames of the foot (heel, ball) and of the toes (tip)."""
 
 
@@ -107,36 +118,13 @@ def ground_under(soles: Array) -> float:
 FINGERS: Places = _TABLES["fingers"]
 """VRM's fingers of the left hand, each after its parent, "Hand" or another finger's bone."""
 
-MMM_SKELETON = Skeleton(
-    _joints(
-        {
-            "root": ("", (0.0, 0.0, 0.0), "yzx"),
-            "BP": ("root", (0.0, 0.08, 0.0), "xyz"),
-            "BT": ("BP", (0.0, 0.12, 0.0), "xyz"),
-            "BLN": ("BT", (0.0, 0.232, 0.0), "xyz"),
-            "BUN": ("BLN", (0.0, 0.03, 0.0), "xyz"),
-            "BUN_end": ("BUN", (0.0, 0.13, 0.0), "xyz"),
-        },
-        {
-            "H": ("root", (0.052, 0.0, 0.0), "xyz"),
-            "K": ("H", (0.0, -0.245, 0.0), "xyz"),
-            "A": ("K", (0.0, -0.246, 0.0), "xyz"),
-            "F": ("A", (0.0, -0.033, 0.075), "xyz"),
-            "F_end": ("F", (0.0, -0.006, 0.04), "xyz"),
-            "SC": ("BT", (0.087, 0.188, 0.0), "xyz"),
-            "S": ("SC", (0.11, 0.0, 0.0), "xyz"),
-            "E": ("S", (0.0, -0.188, 0.0), "xyz"),
-            "W": ("E", (0.0, -0.145, 0.0), "xyz"),
-            "W_end": ("W", (0.0, -0.108, 0.0), "xyz"),
-        },
-        ("L", "R"),
-        scale=1.7,  # metres: the height of the body, which the file does not state
-    ),
-    metres_per_unit=1.0,
-)
+MMM_HEIGHT = 1.7
+"""Metres of the body of MMM files, which do not state it."""
+
+MMM_SKELETON = Skeleton(_joints(**_table("mmm.json"), sides=("L", "R"), scale=MMM_HEIGHT), metres_per_unit=1.0)
 """The figure of MMM files (KIT), which have no skeleton, and one channel for each angle: the Master Motor Map's
-reference body. Its segments are Winter's fractions of the body's height; it rests with arms down, and a joint turns
-about its three axes one after the other. Here y is up and the figure faces z; it is 1.7 m tall, in metres."""
+reference body. Its segments, in mmm.json, are Winter's fractions of the body's height; it rests with arms down, and a
+joint turns about its three axes one after the other. Here y is up and the figure faces z."""
 
 
 def is_mmm(motion: Motion) -> bool:
@@ -179,7 +167,7 @@ def rig(name: str) -> Skeleton:
     """
     if name not in RIGS:
         raise MotionError(f"there is no rig {name!r}; expected one of {', '.join(RIGS)}")
-    content = json.loads((files("motet.figures.humanoid") / "conventions" / f"{name}.json").read_text("utf-8"))
+    content = _table("conventions", f"{name}.json")
     rig = content["rig"]
     tree = _rig_tree(content)
     names = list(tree)
@@ -209,22 +197,20 @@ def _rig_tree(content: dict[str, Any]) -> Tree:
         parent = joint
 
     # the other joints are the humanoid's
-    positions = dict(zip(HUMANOID.names, T_POSE, strict=True))
     names = _rig_names(content)
-    for humanoid_joint in HUMANOID.joints[1:]:
-        bone = humanoid_joint.name
+    for bone, position in zip(HUMANOID.names[1:], T_POSE[1:], strict=True):
         if bone not in (*SPINE, "neck"):
-            tree[names[bone]] = (names[HUMANOID.names[humanoid_joint.parent]], positions[bone])
+            above = HUMANOID.names[HUMANOID.parents[HUMANOID.index(bone)]]
+            tree[names[bone]] = (names[above], position)
     return tree
 
 
 def _rig_trunk(names: dict[str, list[str]]) -> list[tuple[str, Array]]:
     """The joints of a rig's hips, back and neck, upwards, with their positions (3,), from the names of its bones."""
-    positions = dict(zip(HUMANOID.names, T_POSE, strict=True))
-    back = _shared_out([positions[bone] for bone in ("hips", *SPINE)], len(names["spine"]))
-    neck = _shared_out([positions[bone] for bone in (SPINE[-1], *NECK)], len(names["neck"]) + 1)[:-1]
+    back = _shared_out(("hips", *SPINE), len(names["spine"]))
+    neck = _shared_out((SPINE[-1], *NECK), len(names["neck"]) + 1)[:-1]
     joints = [names["hips"][0], *names["spine"], *names["neck"]]
-    return list(zip(joints, [positions["hips"], *back, *neck], strict=True))
+    return list(zip(joints, [T_POSE[0], *back, *neck], strict=True))
 
 
 def _rig_names(content: dict[str, Any]) -> dict[str, str]:
@@ -243,10 +229,11 @@ def _rig_names(content: dict[str, Any]) -> dict[str, str]:
     return names | tips
 
 
-def _shared_out(chain: list[Array], count: int) -> list[Array]:
-    """Positions (3,) of ``count`` joints along a chain, as far up as retargeting shares turns out."""
+def _shared_out(bones: Sequence[str], count: int) -> list[Array]:
+    """Positions (3,) of ``count`` joints along a chain of bones, as far up as retargeting shares turns out."""
+    chain = T_POSE[[HUMANOID.index(bone) for bone in bones]]
     up_chain = np.arange(1, count + 1) * (len(chain) - 1) / count
-    coordinates = [np.interp(up_chain, range(len(chain)), along) for along in np.transpose(chain)]
+    coordinates = [np.interp(up_chain, range(len(chain)), along) for along in chain.T]
     return list(np.stack(coordinates, axis=1))
 
 

@@ -27,41 +27,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from motet.errors import FormatError, MotionError
-from motet.figures.humanoid.bones import ARM, BONES, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, sided
+from motet.figures.humanoid.bones import ARM, BONES, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, Triple, limb_of, sided
 from motet.motion.rotations import Array, unit
-from motet.motion.skeleton import END_SUFFIX, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Skeleton, repeated
 
-Triple = tuple[float, float, float]
-
-NEEDED = ("hips", "spine", *(sided(side, part) for side in LEFT_RIGHT for part in (*LEG[:3], *ARM[1:3])))
+LIMB_PARTS = (*LEG[:3], *ARM[1:3])
+NEEDED = ("hips", "spine", *limb_of("left", LIMB_PARTS), *limb_of("right", LIMB_PARTS))
 """Bones without which a figure is not taken for a human's; the others stay at rest where it lacks them."""
 
-
-def _partners() -> dict[str, str]:
-    """For each bone of one side its partner."""
-    partners = {}
-    for part in (*LEG, *ARM):
-        left = sided("left", part)
-        right = sided("right", part)
-        partners[left] = right
-        partners[right] = left
-    return partners
-
-
-PARTNERS = _partners()
+PARTNERS: dict[str, str] = {}
 """For each bone of one side its partner."""
 
+for _left, _right in zip(limb_of("left", LEG + ARM), limb_of("right", LEG + ARM), strict=True):
+    PARTNERS[_left] = _right
+    PARTNERS[_right] = _left
 
-def _limb_bones() -> tuple[tuple[str, ...], ...]:
-    """Legs and arms without shoulders of both sides, each from the trunk outwards."""
-    limbs = []
-    for side in LEFT_RIGHT:
-        for parts in (LEG, ARM[1:]):
-            limbs.append(tuple(sided(side, part) for part in parts))
-    return tuple(limbs)
-
-
-LIMB_BONES = _limb_bones()
+LIMB_BONES = (
+    limb_of("left", LEG),
+    limb_of("left", ARM[1:]),
+    limb_of("right", LEG),
+    limb_of("right", ARM[1:]),
+)
 """Legs and arms without shoulders of both sides, each from the trunk outwards."""
 
 UNSIDED = ("hips", "head", "spine", "neck")
@@ -118,17 +104,21 @@ class JointMap:
     def carrier(self, skeleton: Skeleton) -> int:
         """The joint that carries legs and back: the hips, or their ancestor where the back is not theirs."""
         joint = self.joints["hips"]
-        while self.spine[0] not in skeleton.subtree(skeleton.names[joint]):
+        while self.spine[0] not in skeleton.below(joint):
             joint = skeleton.joints[joint].parent
         return joint
 
+    @property
+    def neck_and_head(self) -> tuple[int, ...]:
+        """The joints of the neck and the head's, where there is one."""
+        return self.neck + tuple(joint for bone, joint in self.joints.items() if bone == "head")
+
     def names(self, skeleton: Skeleton) -> dict[str, tuple[str, ...]]:
         """For each bone ("spine" and "neck" for all of the back and of the neck) the names of its joints."""
-        names: dict[str, tuple[str, ...]] = {}
-        for bone, joint in self.joints.items():
-            names[bone] = (skeleton.names[joint],)
-        names["spine"] = tuple(skeleton.names[joint] for joint in self.spine)
-        names["neck"] = tuple(skeleton.names[joint] for joint in self.neck)
+        joints = {bone: (joint,) for bone, joint in self.joints.items()}
+        names = {}
+        for bone, places in {**joints, "spine": self.spine, "neck": self.neck}.items():
+            names[bone] = tuple(skeleton.names[joint] for joint in places)
         return names
 
 
@@ -232,7 +222,7 @@ def check_map(skeleton: Skeleton, joint_map: JointMap) -> JointMap:
         raise MotionError(missing_reason(missing, joint_map))
     for limb, joints in _chains(joint_map).items():
         for upper, lower in pairwise(joints):
-            if lower not in skeleton.subtree(skeleton.names[upper]) or lower == upper:
+            if lower not in skeleton.below(upper) or lower == upper:
                 names = f"{skeleton.names[lower]!r} does not hang on {skeleton.names[upper]!r}"
                 raise MotionError(f"the joints of the {limb} are out of order: {names}")
     return joint_map
@@ -245,8 +235,8 @@ def _chains(joint_map: JointMap) -> dict[str, tuple[int, ...]]:
     chains = {"back": joint_map.spine, "neck": (back, *joint_map.neck)}
     for side in LEFT_RIGHT:
         for limb, first, parts in (("leg", joint_map.joints["hips"], LEG), ("arm", back, ARM)):
-            bones = [sided(side, part) for part in parts]
-            chains[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones if bone in joint_map.joints))
+            bones = [bone for bone in limb_of(side, parts) if bone in joint_map.joints]
+            chains[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones))
     return chains
 
 
@@ -289,13 +279,11 @@ def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, .
     for bone, names in _entries(path).items():
         if bone not in known:
             raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
-        unknown = [name for name in names if name not in skeleton.names]
-        if unknown:
-            its = ", ".join(skeleton.names)
-            raise FormatError(path, f"{bone}: the skeleton has no joint {unknown[0]!r}; it has {its}")
-        places[bone] = tuple(skeleton.index(name) for name in names)
-    counts = Counter(chain.from_iterable(places.values()))
-    twice = sorted(skeleton.names[joint] for joint, count in counts.items() if count > 1)
+        try:
+            places[bone] = tuple(skeleton.index(name) for name in names)
+        except MotionError as error:
+            raise FormatError(path, f"{bone}: {error}") from error
+    twice = repeated(skeleton.names[joint] for joint in chain.from_iterable(places.values()))
     if twice:
         raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
     return places
@@ -320,8 +308,7 @@ def _entries(path: Path) -> dict[str, list[str]]:
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object; ValueError where a key appears twice, which json takes silently."""
-    counts = Counter(key for key, _ in pairs)
-    twice = sorted(key for key, count in counts.items() if count > 1)
+    twice = repeated(key for key, _ in pairs)
     if twice:
         raise ValueError(f"{', '.join(twice)} appears twice")
     return dict(pairs)
@@ -533,28 +520,40 @@ def _absent_in_chain(convention: Convention, chain: str, names: Set[str]) -> int
 
 def _match(convention: Convention, skeleton: Skeleton, written: tuple[str, ...]) -> _Match:
     """The map that a convention makes of a skeleton's names, as they are written."""
-    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in convention.prefixes) or NO_PREFIX
-    bare = [_without_prefix(name, pattern) for name in written]
+    bare = _without_prefixes(convention, written)
     names = [_plain(name) for name in bare]
     _check_hips(convention, skeleton, names)
 
     # the first joint of each name that a bone can have; of back and neck all joints
-    places: dict[str, int] = {}
-    for i, name in enumerate(names):
-        places.setdefault(name, i)
+    places = dict(zip(reversed(names), reversed(range(len(names))), strict=True))
     joints = _limb_joints(convention, places)
-    spine = _chain(convention, "spine", places)
-    neck = _chain(convention, "neck", places)
-
     score = _score(convention, names, bare, joints)
+
     # other makers' figures of these names have joints besides, or rest in another pose
-    is_whole = score[0] >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names)
-    rest = convention.rest if is_whole else None
-    axes = {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
-    absent = -score[2]
-    confidence = round(1.0 - 0.3 * absent / max(absent + score[0], 1), 2)
-    joint_map = JointMap(joints, spine, neck, convention.title, confidence, rest, convention.points, axes)
+    count, _, minus_absent = score
+    is_whole = count >= sum(not name.endswith(END_SUFFIX) for name in skeleton.names)
+    joint_map = JointMap(
+        joints=joints,
+        spine=_chain(convention, "spine", places),
+        neck=_chain(convention, "neck", places),
+        convention=convention.title,
+        confidence=round(1.0 + 0.3 * minus_absent / max(count - minus_absent, 1), 2),
+        rest=convention.rest if is_whole else None,
+        points=convention.points,
+        axes=_known_axes(convention, names),
+    )
     return _Match(score, joint_map)
+
+
+def _without_prefixes(convention: Convention, names: Sequence[str]) -> list[str]:
+    """Names without the prefixes that a convention's names can have."""
+    pattern = "|".join(f"(?:{prefix})[ _:.-]*" for prefix in convention.prefixes) or NO_PREFIX
+    return [_without_prefix(name, pattern) for name in names]
+
+
+def _known_axes(convention: Convention, names: Sequence[str]) -> dict[int, str]:
+    """For each joint by plain names the axes that the convention states (:attr:`JointMap.axes`)."""
+    return {i: convention.axes[name] for i, name in enumerate(names) if name in convention.axes}
 
 
 CHAINS = ("spine", "neck")

@@ -10,7 +10,18 @@ import numpy as np
 
 from motet.errors import MotionError, UnitError, listed
 from motet.figures.humanoid.alignment import Calibration, alignments_of_pose, axes_agree, body_frame, rests_in_motion
-from motet.figures.humanoid.bones import HUMANOID, LEFT_RIGHT, LEG, SOLE, SPINE, T_POSE, leg_length, part_of, sided
+from motet.figures.humanoid.bones import (
+    HUMANOID,
+    LEFT_RIGHT,
+    LEG,
+    SOLE,
+    SPINE,
+    T_POSE,
+    leg_length,
+    limb_of,
+    part_of,
+    sided,
+)
 from motet.figures.humanoid.joint_map import BY_THE_TREE, LIMB_BONES, NEEDED, Body, JointMap, humanoid_direction
 from motet.figures.humanoid.joint_tree import map_of
 from motet.motion.kinematics import skeleton_of
@@ -92,7 +103,8 @@ def fit(skeleton: Skeleton, joint_map: JointMap, rotations: Array, places: Array
 
 
 def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
-    # from the rest pose, where that is a standing body
+    """The figure from the first of four sources that shows how its joints stand."""
+    # its rest pose, where that is a standing body
     rest = body.skeleton.rest_positions
     leg = leg_of(body, places[0] if len(places) else rest)
     frame_at_rest = body_frame(rest, body)
@@ -100,23 +112,28 @@ def _fit(body: Body, rotations: Array, places: Array) -> Fitted:
     if frame_at_rest is not None and not moving:
         return _fit_at_rest(body, leg, frame_at_rest)
 
-    # else from the axes of its joints, where the convention is known to have some
-    known = bool(len(places)) and axes_agree(body, rotations, places)
-    if not known and body.joint_map.axes:
+    # the axes of its joints, where the convention is known to have some
+    if len(places) and axes_agree(body, rotations, places):
+        return _fit_in_frames(body, leg, rotations, places, known=True, moving=moving)
+    if body.joint_map.axes:
         body = Body(body.skeleton, replace(body.joint_map, axes={}))
+    return _fit_by_frames(body, leg, rotations, places, moving)
 
-    # else from the first frame, where that is a T-pose or all there is, or from what bodies do in all frames
-    if not known and len(places):
-        first = body_frame(places[0], body, exact=True)
-        if first is not None and (len(places) == 1 or _is_t_pose(body, places[0], first)):
-            return _fit_in_first_frame(body, leg, rotations[0], places[0], first)
-    if not known:
-        if len(places) < 2:
-            remedy = "use a file of this figure that rests in a T-pose (to read a motion, as its rest=, --rest)"
-            raise MotionError(f"the rest pose is not a standing body: {remedy}")
-        check_stance(body, places)
-        check_frames(body, places, dict.fromkeys(LEFT_RIGHT, unit(body.to_left(places, "UpperLeg"))))
-    return _fit_in_frames(body, leg, rotations, places, known=known, moving=moving)
+
+def _fit_by_frames(body: Body, leg: float, rotations: Array, places: Array, moving: bool) -> Fitted:
+    """A figure of which nothing but its frames shows how its joints stand, as :func:`_fit_in_frames`."""
+    # its first frame, where that is a T-pose or all there is
+    first = body_frame(places[0], body, exact=True) if len(places) else None
+    if first is not None and (len(places) == 1 or _is_t_pose(body, places[0], first)):
+        return _fit_in_first_frame(body, leg, rotations[0], places[0], first)
+
+    # what bodies do in all frames
+    if len(places) < 2:
+        remedy = "use a file of this figure that rests in a T-pose (to read a motion, as its rest=, --rest)"
+        raise MotionError(f"the rest pose is not a standing body: {remedy}")
+    check_stance(body, places)
+    check_frames(body, places, dict.fromkeys(LEFT_RIGHT, unit(body.to_left(places, "UpperLeg"))))
+    return _fit_in_frames(body, leg, rotations, places, known=False, moving=moving)
 
 
 def _fit_at_rest(body: Body, leg: float, frame: Array) -> Fitted:
@@ -191,8 +208,7 @@ def _heights(body: Body, leg: float, rise: Array | None) -> dict[str, float]:
                 continue
             joint = body.joints[bone]
             usual = -SOLE[part][0][1] * scale
-            hanging = list(body.skeleton.subtree(body.skeleton.names[joint]))
-            below = 0.0 if rise is None else float(rise[joint] - rise[hanging].min())
+            below = 0.0 if rise is None else float(rise[joint] - rise[body.skeleton.below(joint)].min())
             heights[bone] = below if below > 0.3 * usual or part == "Toes" else usual
     return heights
 
@@ -201,7 +217,7 @@ def leg_of(body: Body, pose: Array) -> float:
     """Length of thigh and shin in the skeleton's unit, the mean of both sides; MotionError for bones without length."""
     bones = [bone for bone in NEEDED if bone not in ("hips", "spine") and body.aims[bone]]
     lengths = {bone: float(np.linalg.norm(body.along(pose, bone))) for bone in bones}
-    leg = sum(lengths[sided(side, part)] for side in LEFT_RIGHT for part in LEG[:2]) / 2
+    leg = sum(lengths[bone] for bone in limb_of("left", LEG[:2]) + limb_of("right", LEG[:2])) / 2
     short = [body.skeleton.names[body.joints[bone]] for bone, length in lengths.items() if length <= 0.02 * leg]
     if short or not leg > 0:
         remedy = "a human's limbs have lengths: export the skeleton with its offsets"
@@ -291,32 +307,41 @@ def check_frames(body: Body, positions: Array, hinges: dict[str, Array]) -> None
     hinges: of each side the axis (T, 3) about which the knee bends, to the left, however the thigh is turned. A knee
     bends the wrong way only where the pelvis agrees: recorded thighs can be twisted by much.
     """
+    # feet point where knees bend away from
     forward_of_toes = []
-    wrong = 0
-    bent = 0
-    left = body.to_left(positions, "UpperLeg")
     for side, hinge in hinges.items():
-        thigh = body.direction(positions, sided(side, "UpperLeg"))
-        shin = body.direction(positions, sided(side, "LowerLeg"))
         foot = sided(side, "Foot")
         if body.aims[foot]:
-            forward = np.cross(hinge, -shin)
+            forward = np.cross(hinge, -body.direction(positions, sided(side, "LowerLeg")))
             forward_of_toes.append(np.sum(forward * body.direction(positions, foot), axis=-1))
-        bend = np.cross(thigh, shin)
-        is_bent = np.linalg.norm(bend, axis=-1) > 0.3  # the sine of the knee's angle
-        is_forward = (np.sum(bend * hinge, axis=-1) < 0) & (np.sum(bend * left, axis=-1) < 0)
-        bent += int(is_bent.sum())
-        wrong += int((is_bent & is_forward).sum())
     if forward_of_toes and np.median(forward_of_toes) < -0.3:
         raise MotionError(
             "the feet point backwards: left and right are swapped, or the frames turn inside out: name the joints in a "
             "map, or export the file anew"
         )
+
+    # knees bend backwards, where they bend
+    bent, wrong = _knee_frames(body, positions, hinges)
     if bent >= 0.1 * len(positions) and wrong > 0.6 * bent:
         raise MotionError(
             "the knees bend forwards: the frames turn inside out (a wrong order of rotations?), or this is no human: "
             "export the file anew"
         )
+
+
+def _knee_frames(body: Body, positions: Array, hinges: dict[str, Array]) -> tuple[int, int]:
+    """In how many frames of either knee it is bent, and in how many of these forwards, as :func:`check_frames`."""
+    bent = 0
+    wrong = 0
+    left = body.to_left(positions, "UpperLeg")
+    for side, hinge in hinges.items():
+        thigh = body.direction(positions, sided(side, "UpperLeg"))
+        bend = np.cross(thigh, body.direction(positions, sided(side, "LowerLeg")))
+        is_bent = np.linalg.norm(bend, axis=-1) > 0.3  # the sine of the knee's angle
+        is_forward = (np.sum(bend * hinge, axis=-1) < 0) & (np.sum(bend * left, axis=-1) < 0)
+        bent += int(is_bent.sum())
+        wrong += int((is_bent & is_forward).sum())
+    return bent, wrong
 
 
 ALONG = 0.82

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from motet.figures.humanoid.joint_tree import map_of
 from motet.figures.humanoid.measure import Fitted, check_frames, fit, height_of, unit_of, upright
 from motet.figures.humanoid.soles import Mesh, on_own_soles
 from motet.motion.kinematics import (
+    by_name,
     chained,
     global_transforms,
     local_rotations,
@@ -122,12 +123,9 @@ class Figure:
         still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
         if self.fitted.up is None:  # measured in frames, not at rest
             still = local_rotations(self.first)[0]
-            offsets = local_translations(self.first)[0].tolist()
-            offsets[0] = skeleton.joints[0].offset
-            joints = []
-            for joint, offset in zip(skeleton.joints, offsets, strict=True):
-                joints.append(replace(joint, offset=tuple(offset)))
-            skeleton = replace(skeleton, joints=tuple(joints))
+            offsets = local_translations(self.first)[0]
+            offsets[0] = skeleton.offsets[0]
+            skeleton = skeleton.with_offsets(offsets)
         if skeleton.metres_per_unit is None:
             skeleton = replace(skeleton, metres_per_unit=unit_of(skeleton, self.fitted.leg).metres)
         return skeleton, relaxed(skeleton, still, self.fitted.body.joints)
@@ -196,21 +194,28 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     fitted = fit(skeleton, joint_map, rotations, places)
     check_frames(fitted.body, places, _knee_hinges(rotations, fitted))
 
+    # its frames are turned upright, brought to the humanoid and laid on the ground
     length_unit = unit_of(skeleton, fitted.leg)
     turn, turn_note = upright(fitted, places)
     retargeted, figure = Figure(fitted, motion[:1], turn)._retargeted(rotations, places, motion.fps)
     folded_note = f"the joint {skeleton.names[0]!r} above the hips is folded in" if joint_map.joints["hips"] else None
     notes = (*fitted.notes, length_unit.note, turn_note, folded_note)
-    metres = length_unit.metres
+    return _findings(retargeted, figure, length_unit.metres, tuple(note for note in notes if note))
+
+
+def _findings(motion: Motion, figure: Figure, metres: float | None, notes: tuple[str, ...]) -> Humanoid:
+    """A motion on the humanoid with what is found about its figure. metres: of one unit of its lengths, if known."""
+    fitted = figure.fitted
+    joint_map = fitted.joint_map
     return Humanoid(
-        motion=retargeted,
-        joints=joint_map.names(skeleton),
+        motion=motion,
+        joints=joint_map.names(fitted.body.skeleton),
         convention=joint_map.convention,
         confidence=round(joint_map.confidence * fitted.confidence, 2),
         unit=metres,
         leg=None if metres is None else fitted.leg * metres,
         height=None if metres is None else height_of(fitted) * metres,
-        notes=tuple(note for note in notes if note),
+        notes=notes,
         figure=figure,
     )
 
@@ -249,17 +254,16 @@ def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Arra
     aligned = product(rotations, fitted.aligned)
     turned = {bone: aligned[:, joint] for bone, joint in joint_map.joints.items()}
     if not fitted.pelvis:
-        to_legs = swing(turned["hips"][:, :, 0], fitted.body.to_left(places, "UpperLeg"))
-        turned["hips"] = product(to_legs, turned["hips"])
+        # the pelvis turns the shortest way to where the legs' joints lie
+        left_of_hips = turned["hips"][:, :, 0]
+        turned["hips"] = product(swing(left_of_hips, fitted.body.to_left(places, "UpperLeg")), turned["hips"])
 
     # back and neck share out the turns of as many joints as the figure has there
     spine = [aligned[:, joint] for joint in joint_map.spine]
-    neck = [aligned[:, joint] for joint in joint_map.neck]
-    turned |= _shared(SPINE, [turned["hips"], *spine])
-    if "head" in turned:
-        neck.append(turned["head"])
+    neck = [aligned[:, joint] for joint in joint_map.neck_and_head]
+    turned |= _spread([turned["hips"], *spine], SPINE)
     if neck:
-        turned |= _shared(NECK, [spine[-1], *neck])
+        turned |= _spread([spine[-1], *neck], NECK)
 
     # bones that the figure lacks, and tips, go with their parents
     for bone, parent in PARENTS.items():
@@ -267,29 +271,29 @@ def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Arra
     return side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], len(rotations))
 
 
-def _shared(bones_of_chain: Sequence[str], chain: list[Array]) -> dict[str, Array]:
-    """World rotations (T, 3, 3) of a chain of bones that share out those of a chain of joints, as :func:`_spread`."""
-    return dict(zip(bones_of_chain, _spread(chain, len(bones_of_chain)), strict=True))
+Key = TypeVar("Key", str, int)
 
 
-def _spread(chain: list[Array], count: int) -> list[Array]:
-    """World rotations (T, 3, 3) of ``count`` joints of another chain with the same ends, from those of a chain.
+def _spread(chain: list[Array], others: Sequence[Key]) -> dict[Key, Array]:
+    """World rotations (T, 3, 3) of the joints of another chain with the same ends, from those of a chain.
 
-    The first rotation is that of the joint that carries the chain and is not among the result; the last of both
+    The first rotation is that of the joint that carries both chains, which is not among the others; the last of both
     chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
     """
     stacked = side_by_side(chain, len(chain[0]))
-    # where the new joints are on the old chain: after which joint, and by which part of the way to the next
-    up_chain = np.arange(1, count + 1) * (len(chain) - 1) / max(count, 1)
+    # where the other joints are on the chain: after which joint, and by which part of the way to the next
+    up_chain = np.arange(1, len(others) + 1) * (len(chain) - 1) / max(len(others), 1)
     below = np.ceil(up_chain).astype(int) - 1
     part = up_chain - below
     shared: Array = stacked[:, below + 1]
+
+    # between two joints a share of the turn from the lower to the upper one
     inner = np.flatnonzero(part < 1)
     if len(inner):
         lower = stacked[:, below[inner]]
         turn = rotmat_to_rotvec(product(inverse(lower), shared[:, inner]))
         shared[:, inner] = product(lower, rotvec_to_rotmat(turn * part[inner, None]))
-    return list(np.moveaxis(shared, 1, 0))
+    return dict(zip(others, np.moveaxis(shared, 1, 0), strict=True))
 
 
 def from_humanoid(
@@ -320,21 +324,33 @@ def from_humanoid(
     skeleton, still = figure.posture
     source, places = _facing_as_figure(motion, fitted) if ahead else global_transforms(motion)
 
-    # the figure's joints turn in the world as the humanoid's bones do, and the path is scaled by the legs' lengths
+    # the figure's joints turn in the world as the humanoid's bones do
     turned = _figure_rotations(source, fitted, skeleton, still)
-    scale = fitted.leg / leg_length()
-    path = places[:, HIPS].mean(axis=1) * scale
+
+    # the middle between its hip joints takes the humanoid's path, scaled by the lengths of the legs
+    path = places[:, HIPS].mean(axis=1) * (fitted.leg / leg_length())
     path -= fitted.body.middle(places_of(skeleton, turned), "UpperLeg")
 
-    # the body is raised onto its soles, as those of its mesh are or as the humanoid's
+    # the body is raised onto its soles
+    turned, rise = _onto_soles(fitted, skin, (source, places), turned, path, motion.fps)
+    path[:, 1] += rise
+    return motion_of(skeleton, turned, _translations(fitted, skeleton, turned, path), motion.fps)
+
+
+def _onto_soles(
+    fitted: Fitted,
+    skin: Mapping[int, Array] | None,
+    source: tuple[Array, Array],
+    turned: Array,
+    path: Array,
+    fps: float,
+) -> tuple[Array, Array | float]:
+    """A figure's rotations (T, J, 3, 3), and how far (T,) it is raised above its root's path (T, 3), to stand on the
+    soles of its mesh, or on soles like the humanoid's. source: rotations and positions of the humanoid's joints."""
     mesh = Mesh(fitted.body, skin or {})
-    if mesh.has_soles() and len(motion):
-        turned, rise = on_own_soles(mesh, (source, places), turned, path, scale, motion.fps)
-        path[:, 1] += rise
-    else:
-        path[:, 1] += _rise_of_joints(fitted, (source, places), turned, path)
-    translations = {fitted.joint_map.carrier(skeleton): _from_parent(fitted, skeleton, turned, path)}
-    return motion_of(skeleton, turned, translations, motion.fps)
+    if mesh.has_soles() and len(turned):
+        return on_own_soles(mesh, source, turned, path, fitted.leg / leg_length(), fps)
+    return turned, _rise_of_joints(fitted, source, turned, path)
 
 
 def _facing_as_figure(motion: Motion, fitted: Fitted) -> tuple[Array, Array]:
@@ -359,52 +375,51 @@ def _rise_of_joints(fitted: Fitted, source: tuple[Array, Array], turned: Array, 
     return fitted.leg / leg_length() * ground - bones.ground_under(soles)
 
 
-def _from_parent(fitted: Fitted, skeleton: Skeleton, turned: Array, path: Array) -> Array:
-    """Translations (T, 3) of a figure's carrier in its parent's frame, from rotations (T, J, 3, 3) of its joints and
-    the path (T, 3) of its root."""
+def _translations(fitted: Fitted, skeleton: Skeleton, turned: Array, path: Array) -> dict[int, Array]:
+    """Translations (T, 3) of the joint that carries legs and back in its parent's frame, by its index, from rotations
+    (T, J, 3, 3) of all joints and the path (T, 3) of the root."""
     carrier = fitted.joint_map.carrier(skeleton)
     if not carrier:
-        return path
+        return {0: path}
     figure = places_of(skeleton, turned)
     above = skeleton.joints[carrier].parent
     from_above = figure[:, carrier] + path - figure[:, above] - skeleton.offsets[0]
-    return rotated(inverse(turned[:, above]), from_above)
+    return {carrier: rotated(inverse(turned[:, above]), from_above)}
 
 
 def _figure_rotations(source: Array, fitted: Fitted, skeleton: Skeleton, still: Array) -> Array:
     """Rotations in the world (T, J, 3, 3) of a figure's joints, from those of the humanoid's."""
-    joint_map = fitted.joint_map
-    wanted = _bone_rotations(source, joint_map)
-    wanted.setdefault(joint_map.carrier(skeleton), wanted[joint_map.joints["hips"]])
-
-    # joints that are bones turn as these, times the constant of their rest pose
+    # joints that are bones turn as the humanoid's, times the constant of their rest pose
+    wanted = _bone_rotations(source, fitted.joint_map, skeleton)
     turned = frames_last((len(source), len(skeleton.joints), 3, 3))
     known = list(wanted)
     turned[:, known] = product(side_by_side(list(wanted.values()), len(source)), inverse(fitted.aligned[known]))
 
-    # all others keep their local rotation
-    hands = [joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT]
+    # all others keep their local rotation; one between forearm and hand, as CMU's wrists, takes the hand's twist
+    hands = {fitted.joint_map.joints.get(sided(side, "Hand")) for side in LEFT_RIGHT}
     for i, joint in enumerate(skeleton.joints):
         if i not in wanted:
             turned[:, i] = product(turned[:, joint.parent], still[i]) if i else still[0]
-            # a joint between forearm and hand, as CMU's wrists, takes the hand's twist
-            hand = next((child for child in skeleton.children[i] if child in hands), None)
-            if hand is not None:
-                to_hand = product(inverse(turned[:, i]), turned[:, hand])
-                turned[:, i] = product(turned[:, i], twist(to_hand, skeleton.offsets[hand]))
+            for hand in hands.intersection(skeleton.children[i]):
+                turned[:, i] = _with_twist_of(turned[:, hand], turned[:, i], skeleton.offsets[hand])
     return turned
 
 
-def _bone_rotations(source: Array, joint_map: JointMap) -> dict[int, Array]:
+def _with_twist_of(hand: Array, wrist: Array, axis: Array) -> Array:
+    """Rotations (T, 3, 3) in the world of a joint with the hand's twist about the bone (3,) between them."""
+    return product(wrist, twist(product(inverse(wrist), hand), axis))
+
+
+def _bone_rotations(source: Array, joint_map: JointMap, skeleton: Skeleton) -> dict[int, Array]:
     """Joint -> rotations (T, 3, 3) of its bone, from those of the humanoid's joints (T, J, 3, 3): back and neck share
-    out the turns of the humanoid's among as many joints as the figure has there."""
-    wanted = {joint: source[:, HUMANOID.index(bone)] for bone, joint in joint_map.joints.items()}
-    back = [source[:, HUMANOID.index(bone)] for bone in ("hips", *SPINE)]
-    neck = [source[:, HUMANOID.index(bone)] for bone in (SPINE[-1], *NECK)]
-    wanted |= dict(zip(joint_map.spine, _spread(back, len(joint_map.spine)), strict=True))
-    # the head is the last of the chain, whether the figure has a joint for it or not
-    shared = _spread(neck, len(joint_map.neck) + ("head" in joint_map.joints))
-    wanted |= dict(zip(joint_map.neck, shared, strict=False))
+    out the turns of the humanoid's among as many joints as the figure has there, and the joint that carries legs and
+    back turns with the hips."""
+    turned = by_name(HUMANOID, source)
+    wanted = {joint: turned[bone] for bone, joint in joint_map.joints.items()}
+    wanted |= _spread([turned[bone] for bone in ("hips", *SPINE)], joint_map.spine)
+    # the neck ends in the head, whether the figure has a joint for it or not
+    wanted |= _spread([turned[bone] for bone in (SPINE[-1], *NECK)], joint_map.neck_and_head)
+    wanted.setdefault(joint_map.carrier(skeleton), turned["hips"])
     return wanted
 
 
@@ -480,17 +495,21 @@ def _finger_turns(
     for joint, bone, bend in zip(chain, pointing, FINGER_BENDS, strict=False):
         # each bone bends against the bone before, about the part of the axis that is across it
         aside = unit(axis - (axis @ bone) * bone)
-        sine = np.cross(before, bone) @ aside
-        cosine = before @ bone - (before @ aside) * (bone @ aside)
-        present = float(np.arctan2(sine, cosine))
-        yield joint, max(0.0, np.radians(bend) * share - present) * aside
+        yield joint, max(0.0, np.radians(bend) * share - _bend(before, bone, aside)) * aside
         before = bone
+
+
+def _bend(before: Array, bone: Array, axis: Array) -> float:
+    """The angle in radians by which a bone (3,) is bent against the bone before about an axis across it."""
+    sine = np.cross(before, bone) @ axis
+    cosine = before @ bone - (before @ axis) * (bone @ axis)
+    return float(np.arctan2(sine, cosine))
 
 
 def _fingers(skeleton: Skeleton, hand: int) -> dict[str, list[int]]:
     """The fingers of a hand by the names of its joints: the joints of each, from the knuckle on."""
     fingers: dict[str, list[int]] = {}
-    for joint in skeleton.subtree(skeleton.names[hand]):
+    for joint in skeleton.below(hand):
         name = skeleton.names[joint].lower()
         finger = next((words for words in FINGER_SHARES if re.search(words, name)), None)
         within_palm = finger != "thumb" and re.search("meta|carpal|palm|inhand", name)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.figures.feet.contacts import rise, smoothed
+from motet.figures.feet.contacts import bell, rise, smoothed, windows
 from motet.figures.humanoid.bones import HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
 from motet.figures.humanoid.joint_map import Body
 from motet.motion.kinematics import places_of
@@ -60,8 +60,7 @@ class Mesh:
         """The joints that are, or are below, that of a bone."""
         if bone not in self.body.joints:
             return []
-        skeleton = self.body.skeleton
-        return list(skeleton.subtree(skeleton.names[self.body.joints[bone]]))
+        return self.body.skeleton.below(self.body.joints[bone])
 
     def has_soles(self) -> bool:
         """Whether a foot has points."""
@@ -211,7 +210,5 @@ def _standing_feet(soles: Array, fps: float) -> tuple[Array, NDArray[np.bool_]]:
 def _envelope(values: Array, reach: float) -> Array:
     """A smooth curve (T,) that is nowhere below values (T,), wider than they by ``reach`` frames on either side."""
     frames = max(1, round(reach))
-    padded = np.pad(values, 2 * frames, mode="edge")
-    highest = np.lib.stride_tricks.sliding_window_view(padded, 2 * frames + 1).max(axis=1)
-    weights = np.hanning(2 * frames + 3)[1:-1]
-    return np.asarray(np.convolve(highest, weights / weights.sum(), mode="valid"))
+    highest = windows(np.pad(values, frames, mode="edge"), frames).max(axis=1)
+    return np.asarray(np.convolve(highest, bell(frames), mode="valid"))
