@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 236
+MOST_LARGE_FUNCTIONS = 213
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 MOST_BANNED_NAMES = 51
 MOST_TUPLE_ASSIGNMENTS = 23
-MOST_NESTED_COMPREHENSIONS = 77
+MOST_NESTED_COMPREHENSIONS = 72
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -90,9 +90,9 @@ CEILINGS = {
     "motet.corpus": 9_200,
     "motet.decode": 4_000,
     "motet.draw": 12_000,
-    "motet.figures": 32_400,
+    "motet.figures": 32_000,
     "motet.formats": 37_100,
-    "motet.generate": 26_000,
+    "motet.generate": 25_900,
     "motet.live": 5_700,
     "motet.models": 9_300,
     "motet.motion": 16_400,
