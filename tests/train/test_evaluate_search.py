@@ -1,6 +1,7 @@
 """How well a search model finds, by a model whose answers are known."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from motet.motion.motion import Motion
 from motet.search.model import IndexSettings
 from motet.search.nearest import LOOPS
+from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, plain, split_as
@@ -87,3 +89,17 @@ def test_the_rank_of_a_model_that_takes_the_next_one(corpus: SplitStore) -> None
     assert report["text"] == {"first_1": 0, "first_5": 1, "first_10": 1, "median_rank": 2}
     # of equally likely ones the first of the store comes first
     assert report["likelihood_text"] == {"first_1": 0.2, "first_5": 1, "first_10": 1, "median_rank": 3}
+
+
+def test_a_part_without_new_sentences_is_named_or_leaves_its_figure_out(store: Store) -> None:
+    records = [replace(entry, sentences=("a person walks",)) for entry in store.records]
+    model = FakeSearch(store)
+    with pytest.raises(DataError, match=r"no sentence to search by: the test motions have none .* pool test"):
+        search_report(model, split_as(told(store, "search"), replace(store, records=tuple(records))))  # type: ignore[arg-type]
+
+    # only the validation part has nothing new: the limit that it would choose is unknown
+    records[-5:] = store.records[-5:]
+    records[:-10] = store.records[:-10]
+    report = search_report(model, split_as(told(store, "search"), replace(store, records=tuple(records))))  # type: ignore[arg-type]
+    assert np.isnan(report["like"]["text_least"])
+    assert report["text"]["first_1"] == 1

@@ -3,9 +3,8 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -154,13 +153,16 @@ class Descent:
             losses.append(loss.item())
         if len(parts) > 1:
             # the sum over parts, in units of the first, becomes a mean
-            for parameter in self.net.parameters():
-                if parameter.grad is not None:
-                    parameter.grad *= counts[0] / sum(counts)
+            self._scale_gradients(counts[0] / sum(counts))
         if clip is not None:
             nn.utils.clip_grad_norm_(self.net.parameters(), clip)
         self.optimiser.step()
         return float(np.average(losses, weights=counts)), sum(counts)
+
+    def _scale_gradients(self, factor: float) -> None:
+        for parameter in self.net.parameters():
+            if parameter.grad is not None:
+                parameter.grad *= factor
 
     def _share(self, rows: Any, real: bool) -> tuple[Tensor, float]:
         """This process' share of the mean loss of a part, and the number of things that it is of.
@@ -213,6 +215,7 @@ def _parameter_groups(net: nn.Module, training: Training) -> list[dict[str, Any]
     return [group for group in groups if group["params"]]
 
 
+@dataclass(eq=False)
 class GradientLearner:
     """A net that learns by gradient descent, see :class:`motet_train.trainer.Learner`.
 
@@ -220,27 +223,23 @@ class GradientLearner:
     called before each step with the share of the training that is done. others: further parts with a state.
     """
 
+    net: nn.Module
+    training: Training
+    loss: Callable[[Any], Terms]
+    batches: Callable[[np.random.Generator], Iterable[Batch]]
+    validate: Callable[[], Mapping[str, Any]] = dict
+    on_share: Callable[[float], object] = lambda share: None
+    others: Mapping[str, Part] = field(default_factory=dict)
+
     target = -math.inf
 
-    def __init__(
-        self,
-        net: nn.Module,
-        training: Training,
-        loss: Callable[[Any], Terms],
-        batches: Callable[[np.random.Generator], Iterable[Batch]],
-        validate: Callable[[], Mapping[str, Any]] = dict,
-        on_share: Callable[[float], object] = lambda share: None,
-        others: Mapping[str, Part] = MappingProxyType({}),
-    ) -> None:
+    def __post_init__(self) -> None:
+        net = self.net
+        training = self.training
         if training.batch < distributed.count():
             raise RunError(f"{distributed.count()} processes need batches of at least as many: use a larger --batch")
-        self.training = training
-        self.net = net
-        self.batches = batches
-        self.validate = validate
-        self.on_share = on_share
-        self.descent = Descent(net, loss, training)
-        self.parts: dict[str, Part] = {"net": net, "optimiser": self.descent.optimiser, **others}
+        self.descent = Descent(net, self.loss, training)
+        self.parts: dict[str, Part] = {"net": net, "optimiser": self.descent.optimiser, **self.others}
         self.kept = net
         self.average = None
         if training.average:

@@ -68,34 +68,50 @@ def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT)
     whole. If there is a checkpoint, training resumes after it, on the CPU to the same bits as if it had never stopped.
     RunError if the checkpoint cannot be read or belongs to another training, or the loss is no longer finite.
     """
+    is_first = distributed.rank() == 0
     log = _resume(folder / CHECKPOINT, learner)
     while not _done(log, learner):
         start = log[-1][learner.unit] if log else 0
-        number = learner.first + len(log)
-        stop = min(end for end in learner.ends if end > start)
-        # torch's random numbers depend on the seed, the number of the chunk and the process alone
-        entropy = (seed, number, distributed.rank()) if distributed.rank() else (seed, number)
-        torch.manual_seed(int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]))
-        rng = np.random.default_rng((seed, number))
-        began = time.perf_counter()
-        losses = []
-        for done, loss, weight in learner.chunk(start, stop, rng):
-            losses.append((loss, weight))
-            progress.step(done, learner.ends[-1], learner.unit, loss)
-        seconds = time.perf_counter() - began
-        mean = np.average([loss for loss, _ in losses], weights=[weight for _, weight in losses])
-        # each process has its share of every loss
-        (total,) = distributed.summed([float(mean)], next(learner.kept.parameters()).device)
-        results = {"loss": round(total, 6), **distributed.from_first(learner.validate)}
-        speed = {"seconds": round(seconds, 3), "steps_per_second": round(len(losses) / seconds, 3)}
-        log.append({learner.unit: stop, **results, **speed})
-        if distributed.rank() == 0:
+        rng = _seeded(seed, learner.first + len(log))
+        log.append(_chunk(learner, start, rng, progress))
+        if is_first:
             _write(folder, learner, log)
         progress.chunk(log[-1], learner.ends[-1], learner.unit)
-    if distributed.rank() == 0:
+    if is_first:
         learner.kept.load_state_dict(read_state(folder / WEIGHTS))
     learner.kept.eval()
     return log
+
+
+def _seeded(seed: int, number: int) -> np.random.Generator:
+    """The random numbers of a chunk; torch's depend on the seed, the number of the chunk and the process alone."""
+    entropy = (seed, number, distributed.rank()) if distributed.rank() else (seed, number)
+    torch.manual_seed(int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0]))
+    return np.random.default_rng((seed, number))
+
+
+def _chunk(learner: Learner, start: int, rng: np.random.Generator, progress: Watcher) -> Line:
+    """Train from ``start`` to the end of its chunk, and validate."""
+    stop = min(end for end in learner.ends if end > start)
+    began = time.perf_counter()
+    losses = []
+    weights = []
+    for done, loss, weight in learner.chunk(start, stop, rng):
+        losses.append(loss)
+        weights.append(weight)
+        progress.step(done, learner.ends[-1], learner.unit, loss)
+    seconds = time.perf_counter() - began
+
+    # each process has its share of every loss
+    mean = float(np.average(losses, weights=weights))
+    (total,) = distributed.summed([mean], next(learner.kept.parameters()).device)
+    return {
+        learner.unit: stop,
+        "loss": round(total, 6),
+        **distributed.from_first(learner.validate),
+        "seconds": round(seconds, 3),
+        "steps_per_second": round(len(losses) / seconds, 3),
+    }
 
 
 def kept(log: Sequence[Line], keep: Literal["best", "last"]) -> Line:

@@ -16,7 +16,7 @@ from motet.models.load import load, load_as
 from motet.search.model import SearchModel
 from motet_train.cli.prepare import store_beside
 from motet_train.cli.suites import Inputs, Results, Suite, suite_of
-from motet_train.cli.train_options import unit_in
+from motet_train.cli.train_options import unit_in, with_options
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, part
 from motet_train.evaluate.figures import make_folder, save
@@ -24,32 +24,42 @@ from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import MANIFEST, Run
 from motet_train.settings import read_settings
 
+measurements = with_options(
+    click.option(
+        "--data",
+        type=Path,
+        help="Control: the clips. Predict: text files of the protocol, or the store. Others: the store. [default: the "
+        "run's training data] With --says: a store, or a folder or zip of motion files with a table of sentences, for "
+        "the columns of real trials and of the look-up.",
+    ),
+    click.option(
+        "--says", is_flag=True, help="Generate: try everyday prompts, and count the motions that follow them."
+    ),
+    click.option(
+        "--search",
+        default="search",
+        show_default=True,
+        help="With --says: name or path of the search bundle whose space is used to compare motions and prompts.",
+    ),
+    click.option(
+        "--actions",
+        metavar="PATTERNS",
+        help="Describe: whether the action is right, and the sure ones, of clips of --data by their names, such as "
+        "'ACCAD_*,CC0_*', whatever the model was trained on; or of its own 'test' part.",
+    ),
+    click.option("--composed", is_flag=True, help="Generate: how well compositions meet places, poses and times."),
+)
+
+outputs = with_options(
+    click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys."),
+    click.option("--plots", type=Path, help="Folder for the figures of the papers."),
+)
+
 
 @click.command()
 @click.argument("models", nargs=-1, required=True)
-@click.option(
-    "--data",
-    type=Path,
-    help="Control: the clips. Predict: text files of the protocol, or the store. Others: the store. [default: the "
-    "run's training data] With --says: a store, or a folder or zip of motion files with a table of sentences, for the "
-    "columns of real trials and of the look-up.",
-)
-@click.option("--says", is_flag=True, help="Generate: try everyday prompts, and count the motions that follow them.")
-@click.option(
-    "--search",
-    default="search",
-    show_default=True,
-    help="With --says: name or path of the search bundle whose space is used to compare motions and prompts.",
-)
-@click.option(
-    "--actions",
-    metavar="PATTERNS",
-    help="Describe: whether the action is right, and the sure ones, of clips of --data by their names, such as "
-    "'ACCAD_*,CC0_*', whatever the model was trained on; or of its own 'test' part.",
-)
-@click.option("--composed", is_flag=True, help="Generate: how well compositions meet places, poses and times.")
-@click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys.")
-@click.option("--plots", type=Path, help="Folder for the figures of the papers.")
+@measurements
+@outputs
 @unit_in
 @session_options
 @click.option("--save", "keep", is_flag=True, help="Save the figures in each run, for export.")
@@ -76,25 +86,35 @@ def evaluate(
     motions that follow everyday prompts, their quality, and their distance to their prompts and to recorded motions in
     the space of a search model.
     """
+    # the models and their measurements
     torch.set_num_threads(1)
     if (says or actions or composed) and keep:
         raise click.UsageError("--says, --actions and --composed only print figures: drop --save")
     runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
-    loaded = {name: runs[name].bundle_model() if name in runs else load(name, session) for name in models}
+    loaded: dict[str, BundleModel] = {}
+    for name in models:
+        loaded[name] = runs[name].bundle_model() if name in runs else load(name, session)
     suite = suite_of(loaded, says, actions, composed)
-    bundles = [name for name in models if name not in runs]
-    if keep and bundles:
-        raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
+    _check_outputs(models, runs if keep else None, suite, plots)
+
+    # their data, and the figures
     data_paths = dict.fromkeys(loaded, data) if says or composed else data_of(loaded, suite, data)
-    if plots is not None:  # fail before hours of measuring
-        if not suite.draws:
-            raise click.UsageError(f"--plots is not available for {suite.what}")
-        make_folder(plots)
     search_model = load_as(SearchModel, search, session) if says else None
     results = suite.measure(loaded, Inputs(data_paths, unit_in, search_model))
     _finish(results, runs if keep else {}, plots)
     figures = results.figures[models[0]] if len(models) == 1 else results.figures
     click.echo(json.dumps(figures) if as_json else results.text)
+
+
+def _check_outputs(models: tuple[str, ...], runs: Mapping[str, Run] | None, suite: Suite, plots: Path | None) -> None:
+    """Fail before hours of measuring if figures cannot be saved in ``runs``, or pictures not drawn."""
+    bundles = [name for name in models if runs is not None and name not in runs]
+    if bundles:
+        raise click.UsageError(f"--save stores figures in training runs, but {', '.join(bundles)} is a bundle")
+    if plots is not None:
+        if not suite.draws:
+            raise click.UsageError(f"--plots is not available for {suite.what}")
+        make_folder(plots)
 
 
 def _finish(results: Results, runs: Mapping[str, Run], plots: Path | None) -> None:
@@ -113,17 +133,18 @@ def data_of(models: Mapping[str, BundleModel], suite: Suite, data: Path | None) 
     Without --data, or if it is a model's training corpus, the store prepared from that corpus; otherwise --data;
     otherwise the model's training data, if it still exists.
     """
-    trained_on = {name: _training_data(name, model) for name, model in models.items()}
-    paths = {name: _data_path(Path(name), trained_on[name], data, not suite.data) for name in models}
-    missing = [name for name in models if trained_on[name] and not paths[name]]
-    lost = f"{missing[0]} was trained on {trained_on[missing[0]]}, which is missing" if missing else ""
+    paths: dict[str, Path | None] = {}
+    lost = ""
+    for name, model in models.items():
+        trained_on = _training_data(name, model)
+        path = _data_path(Path(name), trained_on, data, not suite.data)
+        paths[name] = path and part(path, model.manifest.motion.representation)
+        if trained_on and not path:
+            lost = lost or f"{name} was trained on {trained_on}, which is missing"
     if suite.data and not any(paths.values()):
         raise click.UsageError(f"{suite.what} need --data: {suite.data}" + (f" ({lost})" if lost else ""))
     if lost and not suite.data:
         raise DataError(f"{lost}: give --data")
-    for name, path in paths.items():
-        if path is not None:
-            paths[name] = part(path, models[name].manifest.motion.representation)
     return paths
 
 

@@ -1,5 +1,6 @@
 """``motet prepare``, which turns a corpus into a store for training; and the store of a training command."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -84,19 +85,22 @@ def prepare(
     """
     if all(map(is_store, data)):
         merge_stores(data, out)
-        _summarise(out)
-        return
-    corpus = corpus_of(data, **source, described=verb != "predict")
-    if verb == "all" and (figure or fps):
-        raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
-    parts = ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}
+    else:
+        corpus = corpus_of(data, **source, described=verb != "predict")
+        if verb == "all" and (figure or fps):
+            raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
+        _prepare(corpus, out, ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}, shard)
+    _summarise(out)
+
+
+def _prepare(corpus: Corpus, out: Path, parts: Mapping[str, Preparation], shard: str | None) -> None:
+    """Prepare a corpus, or one of its shards."""
     for settings in parts.values():
         _check_unit(corpus, settings)
     part = None if shard is None else Shard.parse(shard)
     corpus = corpus if part is None else corpus.shard(part)
     with preparing(len(corpus)) as done:
         prepare_parts(corpus, out, parts, done, part)
-    _summarise(out)
 
 
 def _summarise(out: Path) -> None:

@@ -117,29 +117,33 @@ def _train(
     context: click.Context, recipes: Mapping[str, Recipe], function: Callable[..., Run], values: dict[str, Any]
 ) -> None:
     """Train with the values of a command's options."""
+    # the recipe, with the options that are settings of it
     shared = {name: values.pop(name) for name in (*SHARED, "preset")}
-    precision = shared.pop("precision")
-    out = shared.pop("out")
-    tables = context.meta.get("motet.tables", {})
-    recipe = changed(recipes[shared["preset"]], tables, {**values, "precision": precision})
-    if precision == "bfloat16" and recipe.training is None:
-        raise SettingsError(f"{recipe.model} trains in float32 only")
-    unused = {name: value for name, value in values.items() if name not in _fields(recipe, values)}
-    about = begun(shared["name"] or out.name, shared)
+    recipe = _changed(context, recipes[shared["preset"]], {**values, "precision": shared.pop("precision")})
+    fields = _fields(recipe, values)
+    unused = {name: value for name, value in values.items() if name not in fields}
 
     def train(job: Job) -> Run:
         run = function(job, **unused)
-        if distributed.rank() == 0:
-            click.echo(_summary(out, run.manifest["training"]))
-            click.echo(f"next: {_next(out, run.manifest)}")
+        _summarise(job.folder, run.manifest)
         return run
 
+    # all others are saved with the run by their long names
+    out = shared.pop("out")
     resume = shared.pop("resume")
     boards = shared.pop("tensorboard")
-    # the settings that are saved with the run, by the options' long names
     names = {option.name: _long(option) for option in context.command.params}
     options = {names[name]: value for name, value in {**shared, **unused}.items()}
+    about = begun(shared["name"] or out.name, shared)
     trained(Job(recipe, about, out, shared["device"]), train, options, resume, boards)
+
+
+def _changed(context: click.Context, recipe: Recipe, values: Mapping[str, Any]) -> Recipe:
+    """The recipe with the settings of a file and, over them, those of options."""
+    recipe = changed(recipe, context.meta.get("motet.tables", {}), values)
+    if values["precision"] == "bfloat16" and recipe.training is None:
+        raise SettingsError(f"{recipe.model} trains in float32 only")
+    return recipe
 
 
 def _fields(recipe: Recipe, names: Collection[str]) -> set[str]:
@@ -158,6 +162,13 @@ def begun(name: str, options: Mapping[str, Any]) -> About:
     log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
     command = shlex.join(["motet", *sys.argv[1:]])
     return About(name, command, options["seed"], options["licence"], options["data_licence"])
+
+
+def _summarise(out: Path, manifest: Mapping[str, Any]) -> None:
+    """Print the figures of a run, and the next command."""
+    if distributed.rank() == 0:
+        click.echo(_summary(out, manifest["training"]))
+        click.echo(f"next: {_next(out, manifest)}")
 
 
 def _next(out: Path, manifest: Mapping[str, Any]) -> str:

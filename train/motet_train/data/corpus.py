@@ -170,20 +170,19 @@ def recordings(
     for file, motion_name in _motions(archive, motion_files(archive) if files is None else files):
         clip = _clip_name(file, motion_name, table or {})
         described = Described() if table is None else table.get(clip)
-        item: Record | Skipped
         if described is None:
-            item = Skipped(clip, "no sentence")
+            yield Skipped(clip, "no sentence")
         elif clip in seen:
-            item = Skipped(clip, f"a second motion of this name: {file}")
+            yield Skipped(clip, f"a second motion of this name: {file}")
         else:
             try:
                 with archive.opened(file) as place:
                     motion = read_motion(place, unit=unit, clip=motion_name)
-                item = _record(clip, motion, described, person(people, clip))
+                item: Record | Skipped = _record(clip, motion, described, person(people, clip))
             except BROKEN as error:
                 item = Skipped(clip, archive.reason(error))
+            yield item
         seen.add(clip)
-        yield item
     for clip in table or ():
         if clip not in seen:
             yield Skipped(clip, NO_MOTION)

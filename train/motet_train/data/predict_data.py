@@ -59,8 +59,8 @@ def store_material(store: Store, name: str, by: str = "subject") -> Material:
         "files": len(parts.train),
         "split": by,
         "skipped": [item.name for item in store.skipped],
-        "validation": [store.records[record].name for record in parts.validation],
-        "test": [store.records[record].name for record in parts.test],
+        "validation": store.names(parts.validation),
+        "test": store.names(parts.test),
     }
     return Material(
         contract,

@@ -83,6 +83,15 @@ class Store:
         """The first record's figure, on which generated motions are shown; None for joint angles alone."""
         return self.skeletons[0] if self.skeletons else None
 
+    def needs_sixd(self, use: str) -> None:
+        """DataError if the store is not in ``root_sixd``. use: that of the store, such as "a codec is trained on"."""
+        if self.representation != "root_sixd":
+            raise DataError(f"{use} root_sixd (motet prepare --for codes), not {self.representation}")
+
+    def names(self, records: Iterable[int]) -> list[str]:
+        """The names of some records."""
+        return [self.records[record].name for record in records]
+
     def sequence(self, record: int, offset: int = 0) -> Floats:
         """The frames (T, D) float32 of one record at one down-sampling offset: a view."""
         start, stop = self.records[record].spans[offset]

@@ -79,11 +79,10 @@ def read_word_vectors(path: Path, words: Collection[str], first: int = 0) -> dic
             raise DataError(f"{place}: expected a word and {size or 'some'} numbers, not {len(numbers)}")
         if word in vectors:
             continue
-        if word in wanted:
+        is_further = word not in wanted and first > 0 and _is_word(word)
+        if word in wanted or is_further:
             vectors[word] = _vector(numbers, place)
-        elif first > 0 and _is_word(word):
-            vectors[word] = _vector(numbers, place)
-            first -= 1
+            first -= is_further
     if not vectors:
         raise DataError(f"{path} has none of the {len(wanted)} words of the sentences")
     return vectors

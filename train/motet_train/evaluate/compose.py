@@ -2,6 +2,7 @@
 prompts drawn without constraints, as a story moved to the start."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ def compositions() -> list[list[Moment]]:
     return [parse_plan(script, lambda path: read_motion(FOLDER / path)) for script in scripts]
 
 
-def compose_report(writer: CodesModel, seed: int = 0) -> dict[str, Report]:
+def compose_report(writer: CodesModel) -> dict[str, Report]:
     """The figures of all compositions, and "unconstrained" those of the same prompts (see :func:`_figures`). refused:
     the number of refused compositions, which count in neither."""
     composed = []
@@ -35,12 +36,12 @@ def compose_report(writer: CodesModel, seed: int = 0) -> dict[str, Report]:
     refused = 0
     for moments in compositions():
         try:
-            composition = compose(writer, moments, seed=seed)
+            composition = compose(writer, moments, seed=0)
         except MotionError:
             refused += 1
             continue
         composed.append((composition.motion, composition.met))
-        story = _unconstrained(writer, moments, seed)
+        story = _unconstrained(writer, moments)
         unconstrained.append((story, met(story, moments)))
     return {
         "composed": {**_figures(composed), "refused": {"count": refused}},
@@ -48,7 +49,7 @@ def compose_report(writer: CodesModel, seed: int = 0) -> dict[str, Report]:
     }
 
 
-def _unconstrained(writer: CodesModel, moments: list[Moment], seed: int) -> Motion:
+def _unconstrained(writer: CodesModel, moments: list[Moment]) -> Motion:
     """The prompts of a composition as a story, moved to its start."""
     # each prompt lasts until the next one, or until the end
     sentences = []
@@ -59,7 +60,7 @@ def _unconstrained(writer: CodesModel, moments: list[Moment], seed: int) -> Moti
             starts.append(moment.at)
     stops = [*starts[1:], moments[-1].at]
     seconds = [stop - start for start, stop in zip(starts, stops, strict=True)]
-    story = writer.story(sentences, seconds=seconds, seed=seed)
+    story = writer.story(sentences, seconds=seconds, seed=0)
     return moved(story.motion, moments[0])
 
 
@@ -68,17 +69,20 @@ def _figures(compositions: Sequence[tuple[Motion, Sequence[Met]]]) -> Report:
     worst joint), and of times in seconds; the speed of standing feet, m/s, how joints tremble, m/s^2, and the largest
     leap, degrees a frame."""
     # how well each goal is met; those at the very start are met by construction
-    goals = [goal for _, goals_met in compositions for goal in goals_met if goal.at > 0]
+    every_goal = chain.from_iterable(goals_met for _, goals_met in compositions)
+    goals = [goal for goal in every_goal if goal.at > 0]
     report: Report = {}
     for kind in ("place", "facing", "pose"):
         errors = [goal.off for goal in goals if goal.what == kind]
-        report[kind] = {"count": len(errors), "mean": float(np.mean(errors)), "worst": max(errors)}
+        report[kind] = {"count": len(errors), **_mean_and_worst(errors)}
     report["pose"]["worst_joint"] = max(goal.worst for goal in goals if goal.what == "pose")
-    delays = [goal.late for goal in goals]
-    report["late"] = {"mean": float(np.mean(delays)), "worst": max(delays)}
-
+    report["late"] = _mean_and_worst([goal.late for goal in goals])
     report["feet"] = _quality([motion for motion, _ in compositions])
     return report
+
+
+def _mean_and_worst(errors: Sequence[float]) -> dict[str, float]:
+    return {"mean": float(np.mean(errors)), "worst": max(errors)}
 
 
 def _quality(motions: Sequence[Motion]) -> dict[str, float]:

@@ -2,6 +2,7 @@
 sharply joints move, for a model and for simple interpolations."""
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from motet_train.evaluate.positions import Flags, jerk, length
 from motet_train.evaluate.tables import Goals, Report, gathered
 from motet_train.models.kinematics import SixdPlaces, tree_of
 
-FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side in LEFT_RIGHT for part in ("Foot", "Toes")]
+FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side, part in product(LEFT_RIGHT, ("Foot", "Toes"))]
 
 MARGIN = 3
 """Frames before and after a gap that are measured with it, so that the seams count."""
@@ -52,8 +53,7 @@ def fill_report(model: FillModel, store: Store) -> Report:
     in cm a second; and "jerk" relative to the recording. Plain keys are the model's; those of :data:`PLAIN_WAYS` and of
     the recording have its name as a suffix.
     """
-    if store.representation != "root_sixd":
-        raise DataError(f"gaps are measured in root_sixd (motet prepare --for codes), not in {store.representation}")
+    store.needs_sixd("gaps are measured in")
     return gathered(_parts(model, store), model.manifest.name)
 
 
@@ -91,15 +91,18 @@ def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Wind
         filled = [fill(window.past, window.after, len(window.truth)) for window in windows]
         places = _places(joints, windows, filled)
         errors = length(places - recorded)[:, MARGIN:-MARGIN]
+        measured = {
+            "cm": 100 * errors.mean(),
+            "cm_going": 100 * errors[going].mean() if going.any() else np.nan,
+            "slide": _slide(places, stands, fps),
+            "jerk": jerk(places, fps) / figures["jerk_recorded"],
+        }
         suffix = f"_{name}" if name else ""
-        figures[f"cm{suffix}"] = 100 * float(errors.mean())
-        figures[f"cm_going{suffix}"] = 100 * float(errors[going].mean()) if going.any() else np.nan
-        figures[f"slide{suffix}"] = _slide(places, stands, fps)
-        figures[f"jerk{suffix}"] = jerk(places, fps) / figures["jerk_recorded"]
+        figures |= {f"{key}{suffix}": float(value) for key, value in measured.items()}
 
     figures["slide_recorded"] = _slide(recorded, stands, fps)
-    figures["of_interpolation"] = figures["cm"] / figures["cm_interpolation"]
-    figures["of_interpolation_going"] = figures["cm_going"] / figures["cm_going_interpolation"]
+    for key in ("", "_going"):
+        figures[f"of_interpolation{key}"] = figures[f"cm{key}"] / figures[f"cm{key}_interpolation"]
     return figures
 
 

@@ -1,7 +1,7 @@
 """The writer of all reports: groups of figures with stable keys, as JSON and as text, and tables of cells."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -78,11 +78,11 @@ def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[st
 
 def _figure_keys(reports: Sequence[Report]) -> list[tuple[str, str]]:
     """Group and key of each figure that any report has, group by group, in the order of the reports."""
-    groups: dict[str, dict[str, None]] = {}
+    groups: dict[str, dict[tuple[str, str], None]] = {}
     for report in reports:
         for group, figures in report.items():
-            groups.setdefault(group, {}).update(dict.fromkeys(figures))
-    return [(group, key) for group, keys in groups.items() for key in keys]
+            groups.setdefault(group, {}).update(dict.fromkeys((group, key) for key in figures))
+    return list(chain.from_iterable(groups.values()))
 
 
 def short_names(names: Sequence[str]) -> list[str]:

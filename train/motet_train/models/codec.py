@@ -20,7 +20,7 @@ from torch.nn import functional
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net, gelu, normalised
+from motet_train.models.net import Net, constants, gelu, normalised
 
 PATH = 3
 """Number of the decoder's first channels: the root's forward, left and turn relative to the way of the moves."""
@@ -136,8 +136,8 @@ class MotionCodec(Net):
         self.places = SixdPlaces(config.tree)
         self.register_buffer("book", torch.zeros(config.moves, 3))
         self.register_buffer("book_scale", torch.ones(3))
-        self.register_buffer("path_scale", torch.tensor([0.05, 0.05, 0.1]), persistent=False)
-        self.register_buffer("steps", (torch.tensor(config.levels * config.groups) // 2).float(), persistent=False)
+        steps = torch.tensor(config.levels * config.groups) // 2
+        constants(self, path_scale=torch.tensor([0.05, 0.05, 0.1]), steps=steps.float())
 
     def train(self, mode: bool = True) -> Self:
         """As in torch, except that an encoder that is not trained stays in evaluation mode."""
@@ -192,11 +192,14 @@ def places_in_world(codec: MotionCodec, frames: Tensor, way: Tensor) -> Tensor:
     z = way[..., 1] + forward * cos - left * sin
     root = torch.stack([x, frames[..., PATH], z], dim=-1)
 
-    # the joints around it, turned by its facing
-    places = codec.places(frames[..., len(ROOT_SIXD) :])
-    facing = way[..., 2] + turn
+    # the joints around it
+    places = _turned(codec.places(frames[..., len(ROOT_SIXD) :]), way[..., 2] + turn)
+    return places + root[..., None, :]
+
+
+def _turned(places: Tensor, facing: Tensor) -> Tensor:
+    """Places (..., J, 3) turned about y by angles (...) in radians."""
     sin = facing.sin()[..., None]
     cos = facing.cos()[..., None]
     across, up, along = places.unbind(-1)
-    turned = torch.stack([across * cos + along * sin, up, along * cos - across * sin], dim=-1)
-    return turned + root[..., None, :]
+    return torch.stack([across * cos + along * sin, up, along * cos - across * sin], dim=-1)

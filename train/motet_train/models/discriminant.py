@@ -27,14 +27,20 @@ def discriminate(net: JointEmbedding, seen: Views) -> None:
     views = normalised(seen.seen, net.seen_mean, net.seen_scale, LIMIT)
     motions = views.mean(dim=2)
     flat = motions.flatten(0, 1)
+    mean = flat.mean(dim=0)
+
+    # what does not matter: differences between views of a motion, and between recordings of an action
     groups = torch.from_numpy(np.unique(seen.groups.reshape(-1), return_inverse=True)[1])
     within = _covariance((views - motions[:, :, None]).flatten(0, 2)) + ACTIONS * _covariance(_around(flat, groups))
     within += RIDGE * within.diagonal().mean() * torch.eye(len(within))
+
+    # the directions in which motions differ most, relative to that
     whitened = torch.linalg.cholesky(torch.linalg.inv(within))
-    axes = torch.linalg.svd((flat - flat.mean(dim=0)) @ whitened, full_matrices=False).Vh[: len(net.motion.weight)]
-    net.motion.weight.zero_()
-    net.motion.weight[: len(axes)] = axes @ whitened.T
-    net.motion.bias.copy_(-net.motion.weight @ flat.mean(dim=0))
+    weight = net.motion.weight
+    axes = torch.linalg.svd((flat - mean) @ whitened, full_matrices=False).Vh[: len(weight)]
+    weight.zero_()
+    weight[: len(axes)] = axes @ whitened.T
+    net.motion.bias.copy_(-weight @ mean)
 
 
 def _covariance(rows: Tensor) -> Tensor:

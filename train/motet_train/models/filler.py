@@ -19,7 +19,7 @@ from torch.nn import functional
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.placed import ROOT_PLACE, mirror
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net, gelu, normalised
+from motet_train.models.net import Net, constants, gelu, normalised, renamed, zero_linear
 
 
 @dataclass(frozen=True)
@@ -47,25 +47,28 @@ class Block(nn.Module):
     def __init__(self, width: int, heads: int, inner: int) -> None:
         super().__init__()
         self.heads = heads
-        # weights keep the names that trained runs have: asked is qkv, mixed is proj, inward and outward are the MLP
         self.norm = nn.LayerNorm(width)
         self.norm_2 = nn.LayerNorm(width)
-        self.asked = nn.Linear(width, 3 * width)
-        self.mixed = nn.Linear(width, width)
-        self.inward = nn.Linear(width, inner)
-        self.outward = nn.Linear(inner, width)
+        self.qkv = nn.Linear(width, 3 * width)
+        self.proj = nn.Linear(width, width)
+        self.mlp_in = nn.Linear(width, inner)
+        self.mlp_out = nn.Linear(inner, width)
+        renamed(self, {"asked": "qkv", "mixed": "proj", "inward": "mlp_in", "outward": "mlp_out"})
         # half of the heads attend to all frames alike
         slopes = torch.cat([0.5 ** torch.linspace(1, 4, heads // 2), torch.zeros(heads - heads // 2)])
-        self.register_buffer("slopes", slopes[:, None, None], persistent=False)
+        constants(self, slopes=slopes[:, None, None])
 
     def forward(self, x: Tensor, apart: Tensor) -> Tensor:
         """(B, T, C) to the same; apart: frames between any two (T, T)."""
-        qkv = self.asked(self.norm(x)).unflatten(-1, (3, self.heads, -1))
+        # attention, less to frames that are far apart
+        qkv = self.qkv(self.norm(x)).unflatten(-1, (3, self.heads, -1))
         queries, keys, values = qkv.permute(2, 0, 3, 1, 4)
         scores = queries @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 - self.slopes * apart
         attended = (scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2)
-        x = x + self.mixed(attended)
-        mlp: Tensor = self.outward(gelu(self.inward(self.norm_2(x))))
+        x = x + self.proj(attended)
+
+        # the feed-forward layer
+        mlp: Tensor = self.mlp_out(gelu(self.mlp_in(self.norm_2(x))))
         return x + mlp
 
 
@@ -83,18 +86,22 @@ class Filler(Net):
         width = config.width
         self.inward = nn.Linear(3 * (config.channels + 3 * len(config.tree.parents)), width)
         self.ends = nn.Sequential(nn.Linear(2 * width, width), nn.GELU(), nn.Linear(width, width))
-        self.told = nn.Linear(4 * config.waves + 1, config.width)
-        self.blocks = nn.ModuleList(Block(config.width, config.heads, config.inner) for _ in range(config.layers))
-        self.norm = nn.LayerNorm(config.width)
-        self.outward = nn.Linear(config.width, config.channels)
-        nn.init.zeros_(self.outward.weight)
-        nn.init.zeros_(self.outward.bias)
+        self.distances = nn.Linear(4 * config.waves + 1, width)
+        renamed(self, {"told": "distances"})
+        self.blocks = nn.ModuleList(Block(width, config.heads, config.inner) for _ in range(config.layers))
+        self.norm = nn.LayerNorm(width)
+        self.outward = zero_linear(width, config.channels)
         self.places = SixdPlaces(config.tree)
+
+        # what mirrors frames, and the waves of distances, of 4 to 100 frames
         sides = mirror()
-        self.register_buffer("mirrored", torch.from_numpy(sides.columns), persistent=False)
-        self.register_buffer("signs", torch.from_numpy(sides.signs), persistent=False)
-        waves = torch.logspace(0, 1, config.waves, base=100.0 / 4) * 4  # of 4 to 100 frames
-        self.register_buffer("frequencies", 2 * torch.pi / waves, persistent=False)
+        waves = torch.logspace(0, 1, config.waves, base=100.0 / 4) * 4
+        constants(
+            self,
+            mirrored=torch.from_numpy(sides.columns),
+            signs=torch.from_numpy(sides.signs),
+            frequencies=2 * torch.pi / waves,
+        )
 
     def forward(self, past: Tensor, plain: Tensor, after: Tensor) -> Tensor:
         """Frames (B, P, E), (B, N, E) and (B, A, E), in metres, to the frames that fill the gap (B, N, E): the mean of
@@ -113,23 +120,15 @@ class Filler(Net):
         """Like forward, without the mirror image: this is trained."""
         frames = torch.cat([past, plain, after], dim=1)
         before = past.shape[1]
-        count = plain.shape[1]
+        stop = before + plain.shape[1]
         # frames since the last one before the gap, and until the first one after it
         place = torch.arange(frames.shape[1], device=frames.device) - before + 1
-        left = count + 1 - place
+        left = plain.shape[1] + 1 - place
 
-        # a token for each frame: the frame, its joints, and the steps from and to its neighbours
-        joints = self.places(frames[..., ROOT_PLACE:]).flatten(2) / 0.3
-        features = torch.cat([normalised(frames, self.mean, self.scale), joints], dim=-1)
-        steps = functional.pad(4 * (features[:, 1:] - features[:, :-1]), (0, 0, 1, 1))
-        x = self.inward(torch.cat([features, steps[:, :-1], steps[:, 1:]], dim=-1))
-
-        # plus both ends of the gap, and the distances from them
-        ends = self.ends(torch.cat([x[:, before - 1], x[:, before + count]], dim=-1))
-        angles = torch.stack([place, left], dim=-1)[..., None] * self.frequencies
-        inside = ((place > 0) & (left > 0)).float()[:, None]
-        distances = torch.cat([angles.sin().flatten(1), angles.cos().flatten(1), inside], dim=-1)
-        x = x + ends[:, None] + self.told(distances)
+        # a token for each frame, plus both ends of the gap, and the distances from them
+        x = self._tokens(frames)
+        ends = self.ends(torch.cat([x[:, before - 1], x[:, stop]], dim=-1))
+        x = x + ends[:, None] + self.distances(self._waves(place, left))
 
         # the transformer
         apart = (place[:, None] - place).abs().float()
@@ -137,10 +136,24 @@ class Filler(Net):
             x = block(x, apart)
 
         # what it adds to the plain way, fading towards the ends
-        added = self.outward(self.norm(x[:, before : before + count])) * self.scale
-        near = torch.stack([place, left])[:, before : before + count, None].float()
+        added = self.outward(self.norm(x[:, before:stop])) * self.scale
+        near = torch.stack([place, left])[:, before:stop, None].float()
         filled: Tensor = plain + (near / (near + self.config.soft)).prod(dim=0) * added
         return filled
+
+    def _tokens(self, frames: Tensor) -> Tensor:
+        """Tokens (B, T, C) of frames (B, T, E), their joints, and the steps from and to their neighbours."""
+        joints = self.places(frames[..., ROOT_PLACE:]).flatten(2) / 0.3
+        features = torch.cat([normalised(frames, self.mean, self.scale), joints], dim=-1)
+        steps = functional.pad(4 * (features[:, 1:] - features[:, :-1]), (0, 0, 1, 1))
+        tokens: Tensor = self.inward(torch.cat([features, steps[:, :-1], steps[:, 1:]], dim=-1))
+        return tokens
+
+    def _waves(self, place: Tensor, left: Tensor) -> Tensor:
+        """(T, 4 waves + 1): sines and cosines of distances (T,) from both ends of the gap, and whether it is inside."""
+        angles = torch.stack([place, left], dim=-1)[..., None] * self.frequencies
+        inside = ((place > 0) & (left > 0)).float()[:, None]
+        return torch.cat([angles.sin().flatten(1), angles.cos().flatten(1), inside], dim=-1)
 
     def joints(self, frames: Tensor) -> Tensor:
         """Joints (..., J, 3) in metres of placed frames (..., E)."""

@@ -147,22 +147,27 @@ def contrast(scores: Tensor, groups: Tensor) -> Tensor:
 
 def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
     """Frames (B, T, C) of lengths (B,) to mean, deviation, least and greatest, and the means of parts: (B, 7 C)."""
-    active = before(lengths, x.shape[1])
-    count = lengths[:, None]
-
     # sums over thirds of the time: sitting down is not standing up
-    place = 3 * torch.arange(x.shape[1], device=x.device)
-    thirds = count[..., None] * torch.arange(3, device=x.device)[:, None]
-    parts = ((place >= thirds) & (place < thirds + count[..., None])).float()
+    parts = _thirds(lengths, x.shape[1])
     sums = parts @ x
     sizes = parts.sum(dim=2, keepdim=True)
 
     # mean, deviation, and extremes of the frames that there are
+    active = before(lengths, x.shape[1])
+    count = lengths[:, None]
     mean = sums.sum(dim=1) / count
     square = _sum((x - mean[:, None]).square(), active) / count
     shown = torch.where(active[..., None], x, x[:, :1])
     means = torch.where(sizes > 0, sums / sizes.clamp(min=1), mean[:, None]).flatten(1)
     return torch.cat([mean, (square + SMALLEST**2).sqrt(), shown.amin(dim=1), shown.amax(dim=1), means], dim=1)
+
+
+def _thirds(lengths: Tensor, frames: int) -> Tensor:
+    """Which of the first frames are in each third of rows of lengths (B,): (B, 3, frames) float32."""
+    place = 3 * torch.arange(frames, device=lengths.device)
+    length = lengths[:, None, None]
+    starts = length * torch.arange(3, device=lengths.device)[:, None]
+    return ((place >= starts) & (place < starts + length)).float()
 
 
 def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:

@@ -3,7 +3,7 @@
 Letters in shapes: B rows, T frames, D channels, J joints, K of them with rotations of their own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +13,11 @@ from torch.nn import functional
 
 from motet.figures.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
-from motet.motion.skeleton import END_SUFFIX
+from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS
 from motet.representation.root_sixd import SIXD_KINDS
+from motet_train.models.net import constants
 
 
 def forward_kinematics(parents: Sequence[int], offsets: Tensor, local: Tensor, bones: Sequence[int]) -> Tensor:
@@ -33,23 +34,32 @@ def forward_kinematics(parents: Sequence[int], offsets: Tensor, local: Tensor, b
     while inner := [joint for joint in level if joint in parents]:
         # the rotations of the joints that have children; the root's are in the world
         if inner != [0]:
-            rows = [level.index(joint) for joint in inner]
-            turned = product(_at(turned, rows), _at(local, [bones.index(joint) for joint in inner]))
+            rows = _places_in(level, inner)
+            turned = product(_at(turned, rows), _at(local, _places_in(bones, inner)))
             place = _at(place, rows)
 
         # the places of these children
         level = [joint for joint, parent in enumerate(parents) if parent in inner]
-        rows = [inner.index(parents[joint]) for joint in level]
+        rows = _places_in(inner, [parents[joint] for joint in level])
         turned = _at(turned, rows)
         place = _at(place, rows) + product(turned, offsets[level].T[:, None, :, None])
         joints = joints + level
         places.append(place)
+    return _in_order(torch.cat(places, dim=2), joints)
 
-    # in the order of the joints, three numbers each
+
+def _places_in(joints: Sequence[int], some: Sequence[int]) -> list[int]:
+    """Where some joints are among others."""
+    return [joints.index(joint) for joint in some]
+
+
+def _in_order(places: Tensor, joints: list[int]) -> Tensor:
+    """Places (3, 1, J, N) of ``joints`` as (N, J, 3), in the order of the joints."""
+    count = len(joints)
     order: list[int] = []
-    for joint in range(len(joints)):
-        order += [joints.index(joint) + axis * len(joints) for axis in range(3)]
-    return torch.unflatten(_at(torch.cat(places, dim=2).flatten(0, 2), order, dim=0).T, 1, (-1, 3))
+    for row in _places_in(joints, range(count)):
+        order += (row, row + count, row + 2 * count)
+    return torch.unflatten(_at(places.flatten(0, 2), order, dim=0).T, 1, (-1, 3))
 
 
 def _at(x: Tensor, rows: Sequence[int], dim: int = 2) -> Tensor:
@@ -95,7 +105,7 @@ class SixdPlaces(nn.Module):
 
     def __init__(self, tree: Tree) -> None:
         super().__init__()
-        self.register_buffer("offsets", torch.tensor(tree.offsets), persistent=False)
+        constants(self, offsets=torch.tensor(tree.offsets))
         self.bones = tree.bones
         self.parents = tree.parents
 
@@ -130,31 +140,35 @@ class VectorPlaces(nn.Module):
     def __init__(self, contract: MotionContract) -> None:
         super().__init__()
         assert contract.skeleton is not None
-        skeleton = contract.skeleton.scaled(1.0)
-        kept = [i for i, joint in enumerate(skeleton.joints) if not joint.name.endswith(END_SUFFIX)]
-        self.parents = [kept.index(skeleton.joints[i].parent) if i else -1 for i in kept]
-        self.register_buffer("offsets", torch.tensor([skeleton.joints[i].offset for i in kept]), persistent=False)
-        at = {name: column for column, name in enumerate(contract.channels)}
-        self.root = [at[name] for name in ROOT_BLOCK]
+        joints = _without_tips(contract.skeleton)
+        self.parents = _parents_among(joints, contract.skeleton)
+        constants(self, offsets=torch.tensor([joint.offset for joint in joints]))
+        self.root = _columns(contract, ROOT_BLOCK)
         # joints without a vector turn with their parents: they see a column of zeros
-        names = [f"{skeleton.names[i]}.{kind}" for i in kept[1:] for kind in VECTOR_KINDS]
-        self.vectors = [at.get(name, len(at)) for name in names]
+        self.vectors: list[int] = []
+        for joint in joints[1:]:
+            self.vectors += _columns(contract, [f"{joint.name}.{kind}" for kind in VECTOR_KINDS])
         self.fps = contract.fps
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units to places (B, T, J, 3) in metres."""
+        # the joints around the root, by its rotation and those of all others
         root = frames[..., self.root]
         facing = root[..., 2].cumsum(1) / self.fps
+        turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
+        vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(self.parents) - 1, 3)
+        local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
+        joints = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
+        return joints.reshape(*frames.shape[:-1], -1, 3) + self._path(root, facing)[..., None, :]
+
+    def _path(self, root: Tensor, facing: Tensor) -> Tensor:
+        """Places (B, T, 3) of the root by its channels (B, T, 6): it goes where it faced in the frame before."""
         before = facing - root[..., 2] / self.fps
         sin = before.sin()
         cos = before.cos()
         x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / self.fps
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / self.fps
-        turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
-        vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(self.parents) - 1, 3)
-        local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
-        joints = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
-        return joints.reshape(*frames.shape[:-1], -1, 3) + torch.stack([x, root[..., 3], z], dim=-1)[..., None, :]
+        return torch.stack([x, root[..., 3], z], dim=-1)
 
 
 def _turn(angle: Tensor, axis: int) -> Tensor:
@@ -204,21 +218,38 @@ def figure_of(contract: MotionContract) -> Figure:
     skeleton = contract.skeleton
     if contract.representation != "root_angles" or skeleton is None or skeleton.metres_per_unit is None:
         return Figure()
-    joints = [joint for joint in skeleton.scaled(1.0).joints if not joint.name.endswith(END_SUFFIX)]
+    joints = _without_tips(skeleton)
     if any(any(joint.axis) for joint in joints):
         return Figure()
-    names = [joint.name for joint in joints]
-    orders = ("yxz", *(joint.order for joint in joints[1:]))
-    channels = [[f"{name}.r{axis}" for axis in order] for name, order in zip(names, orders, strict=True)]
-    channels[0] = ["", "root.pitch", "root.roll"]  # the heading about y is left out
-    at = {channel: column for column, channel in enumerate(contract.channels)}
+    orders = ["yxz"]
+    columns = [_columns(contract, ("", "root.pitch", "root.roll"))]  # the heading about y is left out
+    for joint in joints[1:]:
+        orders.append(joint.order)
+        columns.append(_columns(contract, [f"{joint.name}.r{axis}" for axis in joint.order]))
     return Figure(
-        tuple(names.index(skeleton.names[joint.parent]) if joint.parent >= 0 else -1 for joint in joints),
+        tuple(_parents_among(joints, skeleton)),
         tuple(joint.offset for joint in joints),
-        orders,
-        tuple(tuple(at.get(channel, len(at)) for channel in row) for row in channels),
-        tuple(at[channel] for channel in ROOT_BLOCK),
+        tuple(orders),
+        tuple(map(tuple, columns)),
+        tuple(_columns(contract, ROOT_BLOCK)),
     )
+
+
+def _without_tips(skeleton: Skeleton) -> list[Joint]:
+    """The joints of a figure in metres, without the tips of its bones."""
+    return [joint for joint in skeleton.scaled(1.0).joints if not joint.name.endswith(END_SUFFIX)]
+
+
+def _parents_among(joints: Sequence[Joint], skeleton: Skeleton) -> list[int]:
+    """The index among some joints of each one's parent, -1 for the root, by their indices in the skeleton."""
+    names = [joint.name for joint in joints]
+    return [names.index(skeleton.names[joint.parent]) if joint.parent >= 0 else -1 for joint in joints]
+
+
+def _columns(contract: MotionContract, channels: Iterable[str]) -> list[int]:
+    """The columns of channels of a contract; D for those that it lacks."""
+    columns = {channel: column for column, channel in enumerate(contract.channels)}
+    return [columns.get(channel, len(columns)) for channel in channels]
 
 
 class EulerPlaces(nn.Module):
@@ -236,16 +267,19 @@ class EulerPlaces(nn.Module):
         super().__init__()
         self.parents = figure.parents
         joints = len(figure.parents)
-        axes = torch.tensor([[AXES.index(axis) for axis in order] for order in figure.orders])
+        axes = torch.tensor([list(map(AXES.index, order)) for order in figure.orders])
         # angles about axes that are a mirror image of x, y, z count the other way round
         signs = torch.linalg.det(torch.eye(3)[axes])
         # the entry (i, j) of a joint's matrix lies where i and j are in its order
         place = axes.argsort(dim=1).T
         entries = (3 * place[:, None] + place) * joints + torch.arange(joints)
-        self.register_buffer("columns", torch.tensor(figure.columns).T.flatten(), persistent=False)
-        self.register_buffer("offsets", torch.tensor(figure.offsets), persistent=False)
-        self.register_buffer("units", torch.deg2rad(signs)[:, None], persistent=False)
-        self.register_buffer("entries", entries.flatten(), persistent=False)
+        constants(
+            self,
+            columns=torch.tensor(figure.columns).T.flatten(),
+            offsets=torch.tensor(figure.offsets),
+            units=torch.deg2rad(signs)[:, None],
+            entries=entries.flatten(),
+        )
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D), angles in degrees, to places (B, T, 3 (J - 1)) in metres from the root of the others."""
@@ -267,6 +301,11 @@ class EulerPlaces(nn.Module):
         rows += [sin_y * sin_cos + cos_sin, cos_xz - sin_y * sin_xz, -sin_x * cos_y]
         rows += [sin_xz - sin_y * cos_xz, sin_y * cos_sin + sin_cos, cos_x * cos_y]
         return torch.unflatten(torch.cat(rows).index_select(0, self.entries), 0, (3, 3, -1))
+
+
+def smooth_length(vectors: Tensor, least: float) -> Tensor:
+    """Lengths (...) of vectors (..., K), with gradients at 0. least: what is added to their squares."""
+    return (vectors.square().sum(-1) + least).sqrt()
 
 
 def joint_weights(contract: MotionContract, parts: tuple[str, ...], times: float) -> Tensor:

@@ -21,7 +21,7 @@ from torch.nn import functional
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.action_net import ActionNet, ActionsConfig
 from motet_train.models.codec import CodecConfig, MotionCodec
-from motet_train.models.net import Net, Part, gelu
+from motet_train.models.net import Net, Part, constants, gelu, renamed, zero_linear
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,10 @@ class CodeModelConfig:
     unsaid: float = 0.1
 
 
+OLD_NAMES = {"told": "modulation", "asked": "qkv", "mixed": "proj", "inward": "mlp_in", "outward": "mlp_out"}
+"""Parts of a block, by their names in older runs."""
+
+
 class Block(nn.Module):
     """Attention to the past and a gated feed-forward layer, both modulated by the action."""
 
@@ -50,40 +54,47 @@ class Block(nn.Module):
     def __init__(self, width: int, heads: int, condition: int) -> None:
         super().__init__()
         self.heads = heads
-        # weights keep the names that trained runs have: told is the modulation, asked is qkv, mixed is proj, and inward
-        # and outward are the MLP
-        self.told = nn.Linear(condition, 6 * width)
-        nn.init.zeros_(self.told.weight)
-        nn.init.zeros_(self.told.bias)
-        self.asked = nn.Linear(width, 3 * width, bias=False)
-        self.mixed = nn.Linear(width, width, bias=False)
-        self.inward = nn.Linear(width, 4 * width)
-        self.outward = nn.Linear(4 * width, width)
+        self.modulation = zero_linear(condition, 6 * width)
+        self.qkv = nn.Linear(width, 3 * width, bias=False)
+        self.proj = nn.Linear(width, width, bias=False)
+        self.mlp_in = nn.Linear(width, 4 * width)
+        self.mlp_out = nn.Linear(4 * width, width)
+        renamed(self, OLD_NAMES)
         slopes = 2.0 ** -torch.linspace(1, 8, heads)
-        self.register_buffer("slopes", slopes[:, None, None], persistent=False)
+        constants(self, slopes=slopes[:, None, None])
 
     def forward(self, x: Tensor, condition: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
         """(B, N, C) to the same; past: keys and values (B, H, M, 2 C / H) of the steps before, returned with the new
         ones."""
-        shift, scale, gate, shift_2, scale_2, gate_2 = self.told(condition).chunk(6, dim=-1)
-        attended, past = self._attend(functional.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift, past)
-        x = x + (1 + gate) * self.mixed(attended)
-        mlp = gelu(self.inward(functional.layer_norm(x, x.shape[-1:]) * (1 + scale_2) + shift_2))
-        return x + (1 + gate_2) * self.outward(mlp), past
+        shift, scale, gate, shift_2, scale_2, gate_2 = self.modulation(condition).chunk(6, dim=-1)
+        attended, past = self._attend(_modulated(x, scale, shift), past)
+        x = x + (1 + gate) * self.proj(attended)
+        mlp = gelu(self.mlp_in(_modulated(x, scale_2, shift_2)))
+        return x + (1 + gate_2) * self.mlp_out(mlp), past
 
     def _attend(self, x: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
         # queries of the new steps, keys and values of all
-        qkv = self.asked(x).unflatten(-1, (3, self.heads, -1))
+        qkv = self.qkv(x).unflatten(-1, (3, self.heads, -1))
         queries, keys, values = qkv.permute(2, 0, 3, 1, 4)
         past = torch.cat([past, torch.cat([keys, values], dim=-1)], dim=2)
         keys, values = past.chunk(2, dim=-1)
 
-        # the past counts less the longer ago it is, the future not at all
-        now = torch.arange(x.shape[1], device=x.device) + past.shape[2] - x.shape[1]
-        ago = now[:, None] - torch.arange(past.shape[2], device=x.device)
-        bias = torch.where(ago >= 0, -self.slopes * ago, -torch.inf)
+        # scores, with a bias for how long ago each step was
+        bias = self._bias(x.shape[1], past.shape[2], x.device)
         scores = queries @ keys.transpose(-1, -2) * keys.shape[-1] ** -0.5 + bias
         return (scores.softmax(dim=-1) @ values).transpose(1, 2).flatten(2), past
+
+    def _bias(self, new: int, every: int, device: torch.device) -> Tensor:
+        """Of the last ``new`` steps to all (H, new, every): the past counts less the longer ago it is, the future not
+        at all."""
+        now = torch.arange(new, device=device) + every - new
+        ago = now[:, None] - torch.arange(every, device=device)
+        return torch.where(ago >= 0, -self.slopes * ago, -torch.inf)
+
+
+def _modulated(x: Tensor, scale: Tensor, shift: Tensor) -> Tensor:
+    """A layer norm whose scale and shift are given."""
+    return functional.layer_norm(x, x.shape[-1:]) * (1 + scale) + shift
 
 
 class CodeModel(nn.Module):
@@ -102,10 +113,7 @@ class CodeModel(nn.Module):
         self.masked = nn.Parameter(torch.zeros(width))
         self.blocks = nn.ModuleList(Block(width, config.heads, config.action) for _ in range(config.layers))
         self.before = nn.ModuleList(nn.Embedding(size, width) for size in sizes[:-1])
-        self.heads = nn.ModuleList(
-            nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.GELU(), nn.Linear(width, size))
-            for size in sizes
-        )
+        self.heads = nn.ModuleList(_head(width, size) for size in sizes)
 
     def start(self, rows: int) -> Tensor:
         """What attention knows before the first step: (B, K, H, 0, 2 C / H) of K layers."""
@@ -141,6 +149,11 @@ class CodeModel(nn.Module):
             if part < len(self.before):
                 known = known + self.before[part](codes[..., part])
         return logits
+
+
+def _head(width: int, size: int) -> nn.Sequential:
+    """From what is known of a step to the logits of a part's codes."""
+    return nn.Sequential(nn.LayerNorm(width), nn.Linear(width, width), nn.GELU(), nn.Linear(width, size))
 
 
 @dataclass(frozen=True)
@@ -250,31 +263,39 @@ class MotionCodes(Net):
 
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder of sentences, the step and its parts, and the codec's two ways."""
-        writer = self.config.writer
-        codec = self.config.codec
-        parts = len(self.sizes)
+        return {"encoder": self.text.encoder(), **self._writer_graphs(), **self._codec_graphs()}
 
-        # the step of the writer, and the parts of a step
-        action, age = (TensorSpec(name, ("batch",), "int64") for name in ("action", "age"))
-        codes = TensorSpec("codes", ("batch", parts), "int64")
-        known = TensorSpec("known", ("batch", writer.width))
-        numbers = TensorSpec("numbers", ("batch", self.writer.seen.in_features))
+    def _writer_graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """The step, and the codes of its parts."""
+        # what goes in, with the past of attention
+        writer = self.config.writer
+        codes = TensorSpec("codes", ("batch", len(self.sizes)), "int64")
+        action = TensorSpec("action", ("batch",), "int64")
+        age = TensorSpec("age", ("batch",), "int64")
         size = 2 * writer.width // writer.heads
         shape = ("batch", writer.layers, writer.heads, "past", size)
         past = TensorSpec("past", shape)
-        longer = TensorSpec("next_past", shape)
-        start = {"past": (writer.layers, writer.heads, 0, size)}
-        stepped = GraphSpec((codes, action, age, past), (known, numbers, longer), {"past": "next_past"}, start)
-        chances = TensorSpec("log_probabilities", ("batch", parts, max(self.sizes)))
 
-        # codes to frames, and frames to codes
+        # what comes out
+        known = TensorSpec("known", ("batch", writer.width))
+        numbers = TensorSpec("numbers", ("batch", self.writer.seen.in_features))
+        next_past = TensorSpec("next_past", shape)
+        scores = TensorSpec("log_probabilities", ("batch", len(self.sizes), max(self.sizes)))
+        start = {"past": (writer.layers, writer.heads, 0, size)}
+        step = GraphSpec((codes, action, age, past), (known, numbers, next_past), {"past": "next_past"}, start)
+        return {
+            "step": (Part(self, self.step), step),
+            "part": (Part(self, self.part), GraphSpec((known, codes), (scores,))),
+        }
+
+    def _codec_graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+        """Codes to frames, and frames to codes."""
+        codec = self.config.codec
+        codes = TensorSpec("codes", ("batch", "steps", len(self.sizes)), "int64")
+        body = TensorSpec("codes", ("batch", "steps", codec.groups), "int64")
         frames = TensorSpec("frames", ("batch", "steps", codec.hop, codec.channels))
-        written, body = (TensorSpec("codes", ("batch", "steps", count), "int64") for count in (parts, parts - 1))
         moves = TensorSpec("moves", ("batch", "steps", 3))
         return {
-            "encoder": self.text.encoder(),
-            "step": (Part(self, self.step), stepped),
-            "part": (Part(self, self.part), GraphSpec((known, codes), (chances,))),
-            "decoder": (Part(self, self.decode), GraphSpec((written,), (frames, moves))),
+            "decoder": (Part(self, self.decode), GraphSpec((codes,), (frames, moves))),
             "tokens": (Part(self, self.to_codes), GraphSpec((frames,), (body,))),
         }

@@ -61,6 +61,18 @@ class Part(nn.Module):
         self.forward = function
 
 
+def renamed(module: nn.Module, names: Mapping[str, str]) -> None:
+    """Load weights of older runs, too. names: the old name of a part -> its name in ``module``."""
+
+    def rename(module: nn.Module, state: dict[str, Any], prefix: str, *details: Any) -> None:
+        for key in list(state):
+            old, dot, rest = key.removeprefix(prefix).partition(".")
+            if key.startswith(prefix) and old in names:
+                state[f"{prefix}{names[old]}{dot}{rest}"] = state.pop(key)
+
+    module.register_load_state_dict_pre_hook(rename)  # type: ignore[no-untyped-call]
+
+
 def tuples(value: Any) -> Any:
     """A value from JSON with its lists as tuples."""
     if isinstance(value, Mapping):
@@ -84,6 +96,20 @@ def normalised(frames: Tensor, mean: Tensor, scale: Tensor, limit: float = Z_LIM
     """
     divisor = torch.where(scale > 0, scale, torch.inf)
     return ((frames - mean) / divisor).clamp(-limit, limit)
+
+
+def constants(module: nn.Module, **tensors: Tensor) -> None:
+    """Give a module tensors that move to a device with it, and are not among its weights."""
+    for name, tensor in tensors.items():
+        module.register_buffer(name, tensor, persistent=False)
+
+
+def zero_linear(inputs: int, outputs: int) -> nn.Linear:
+    """A linear layer that gives 0 until it is trained."""
+    layer = nn.Linear(inputs, outputs)
+    nn.init.zeros_(layer.weight)
+    nn.init.zeros_(layer.bias)
+    return layer
 
 
 def gelu(x: Tensor) -> Tensor:

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, Part, gelu, normalised
+from motet_train.models.net import Net, Part, constants, gelu, normalised, zero_linear
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -76,34 +76,41 @@ class Trajectory(nn.Module):
         moved = seen - config.held
         k = config.polynomials
 
-        def polynomials(points: Tensor, count: int) -> Tensor:
-            """Orthonormal ones (T, count) at points (T), all 0 at 0."""
-            basis: Tensor = torch.linalg.qr(points[:, None] ** torch.arange(1, count + 1))[0]
-            return basis
-
+        # functions of the past and of the future
         self.past = nn.Parameter(2 * polynomials(torch.arange(steps, 0, -1.0) / steps, config.past))
         self.register_buffer("future", GAIN * polynomials(torch.arange(1.0, config.frames + 1) / config.frames, k))
+
+        # the MLP over all channels
         self.dropout = nn.Dropout(config.dropout)
         self.inward = nn.Linear(seen * (config.past + 1), config.hidden)
         self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
-        self.outward = nn.Linear(config.hidden, moved * k)
-        nn.init.zeros_(self.outward.weight)
-        nn.init.zeros_(self.outward.bias)
+        self.outward = zero_linear(config.hidden, moved * k)
+
+        # the linear map of each channel alone
         self.limit = nn.Parameter(torch.ones(moved))
         self.ordinary = nn.Parameter(torch.zeros(moved, steps, k))
         self.outlying = nn.Parameter(torch.zeros(moved, steps, k))
 
     def forward(self, seed: Tensor) -> Tensor:
         """Seed (B, L, D) to steps (B, N, M)."""
+        # coefficients (B, K, M) by the MLP on all channels
         past = torch.einsum("blc,lk->bkc", GAIN * (seed - seed[:, -1:])[:, :-1], self.past)
         hidden = self.blocks(self.inward(self.dropout(torch.cat([past.flatten(1), seed[:, -1]], 1))))
         together = self.outward(gelu(hidden)).view(-1, self.config.polynomials, len(self.limit))
+
+        # and by each channel alone, from ordinary and outlying steps
         moved = seed[..., self.config.held :]
         step = GAIN * (moved[:, 1:] - moved[:, :-1])
         usual = self.limit * torch.tanh(step / self.limit)
         ordinary = torch.einsum("blc,clk->bkc", usual, self.ordinary)
         alone = ordinary + torch.einsum("blc,clk->bkc", step - usual, self.outlying)
         return torch.einsum("tk,bkc->btc", self.future, together + alone)
+
+
+def polynomials(points: Tensor, count: int) -> Tensor:
+    """Orthonormal polynomials (T, count) at points (T,), all 0 at 0."""
+    basis: Tensor = torch.linalg.qr(points[:, None] ** torch.arange(1, count + 1))[0]
+    return basis
 
 
 def error_signs(seed: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
@@ -152,23 +159,28 @@ class ErrorHead(nn.Module):
         """
         middle = logarithms.mean(0)
         spread = logarithms.std(0).clamp_min(1e-3)
-        signs = ((logarithms - middle) / spread).double()
-        law = torch.zeros(len(self.bias), self.weight.shape[1] + 1, dtype=torch.float64, requires_grad=True)
-        law.data[:, -1] = errors.double().mean(0).log()
-        descent = torch.optim.LBFGS([law], max_iter=200, line_search_fn="strong_wolfe")
+        weight, bias = _likeliest_law(((logarithms - middle) / spread).double(), errors)
+        self.weight.copy_(weight / spread)
+        self.bias.copy_(bias - (weight * middle / spread).sum(-1))
 
-        def loss() -> Tensor:
-            descent.zero_grad()
-            log = (signs * law[:, :-1]).sum(-1) + law[:, -1]
-            lost = (log + errors * torch.exp(-log)).mean() + 1e-2 * law[:, :-1].square().mean()
-            lost.backward()  # type: ignore[no-untyped-call]
-            return lost
 
-        with torch.enable_grad():
-            descent.step(loss)  # type: ignore[no-untyped-call]
-        fitted = law.detach()
-        self.weight.copy_(fitted[:, :-1] / spread)
-        self.bias.copy_(fitted[:, -1] - (fitted[:, :-1] * middle / spread).sum(-1))
+@torch.enable_grad()
+def _likeliest_law(signs: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
+    """The weights (N, S) and the bias (N,) by which normalised signs (B, N, S) explain errors (B, N) best."""
+    law = torch.zeros(signs.shape[1], signs.shape[2] + 1, dtype=torch.float64, requires_grad=True)
+    law.data[:, -1] = errors.double().mean(0).log()
+    descent = torch.optim.LBFGS([law], max_iter=200, line_search_fn="strong_wolfe")
+
+    def loss() -> Tensor:
+        descent.zero_grad()
+        log = (signs * law[:, :-1]).sum(-1) + law[:, -1]
+        lost = (log + errors * torch.exp(-log)).mean() + 1e-2 * law[:, :-1].square().mean()
+        lost.backward()  # type: ignore[no-untyped-call]
+        return lost
+
+    descent.step(loss)  # type: ignore[no-untyped-call]
+    fitted = law.detach()
+    return fitted[:, :-1], fitted[:, -1]
 
 
 class Predictor(Net):
@@ -193,11 +205,14 @@ class Predictor(Net):
         self.doubt = ErrorHead(config.frames) if config.doubts else None
         kept = list(config.kept)
         channels = config.channels
-        self.register_buffer("kept", torch.tensor(kept), persistent=False)
-        self.register_buffer("relative", (torch.arange(len(kept)) < config.held).float(), persistent=False)
-        self.register_buffer("placing", torch.eye(channels)[kept[config.held :]], persistent=False)
-        self.register_buffer("mirrored", torch.tensor(config.mirrored or range(channels)), persistent=False)
-        self.register_buffer("signs", torch.tensor(config.signs or [1.0] * channels), persistent=False)
+        constants(
+            self,
+            kept=torch.tensor(kept),
+            relative=(torch.arange(len(kept)) < config.held).float(),
+            placing=torch.eye(channels)[kept[config.held :]],
+            mirrored=torch.tensor(config.mirrored or range(channels)),
+            signs=torch.tensor(config.signs or [1.0] * channels),
+        )
 
     def plain(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the next (B, N, C), without the mirror image: what is trained."""

@@ -183,9 +183,9 @@ class Decoder(nn.Module):
         self.units = tuple(units)
         self.twice = twice
         below = [token if twice else 0, *units]
-        self.layers = nn.ModuleList(
-            layer(size + context + token, n, 1, gates, dropout) for size, n in zip(below, units, strict=False)
-        )
+        self.layers = nn.ModuleList()
+        for size, n in zip(below, units, strict=False):
+            self.layers.append(layer(size + context + token, n, 1, gates, dropout))
 
     def forward(self, tokens: Tensor, context: Tensor) -> Tensor:
         """Tokens (B, T, E), all known, under contexts (B, C) to the outputs of every step (B, T, S)."""

@@ -1,6 +1,8 @@
 """The recipe of the net that recognises the action in a sentence, and its training on the sentences of a store."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +13,11 @@ from torch.nn import functional
 
 from motet.models.language import padded
 from motet.text.vocabulary import RULES, Vocabulary
-from motet_train.data.batches import Rows
+from motet_train.data.batches import Ids, Rows
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions, actions_of
 from motet_train.data.store import Store
-from motet_train.data.word_table import word_table
+from motet_train.data.word_table import WordTable, word_table
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.action_net import ActionNet, ActionsConfig, stems_of
 from motet_train.recipes.language import divided, manifest
@@ -51,7 +53,7 @@ class SentenceBatch(Rows):
     actions: Tensor
 
 
-def train_actions(store: Store, job: Job, data: str = "", by: str = "trial", vectors: WordVectors | None = None) -> Run:
+def train_actions(store: Store, job: Job, data: str, by: str, vectors: WordVectors | None) -> Run:
     """Train on the sentences of a store's training part, see :meth:`motet_train.recipes.recipe.Job.run`.
 
     vectors: of the words of sentences and of common words, which the net then knows by their vectors alone.
@@ -59,43 +61,50 @@ def train_actions(store: Store, job: Job, data: str = "", by: str = "trial", vec
     corpus = divided(store, mirror=True, by=by)
     actions = spoken(store, corpus.parts.train)
     words = corpus.vocabulary.words
-    table = vectors and word_table(vectors.file, words, job.recipe.config.vector)
+    table = word_table(vectors.file, words, job.recipe.config.vector) if vectors else None
     common = table.common if table else {}
-    sentences = ActionSentences(actions, replace(corpus.vocabulary, common=common))
 
-    # the net, with the vectors of words if there are any
     torch.manual_seed(job.about.seed)
-    config = job.recipe.sized(
-        words=len(words),
-        actions=len(actions),
-        common=len(common),
-        stems=stems_of(words, tuple(common)),
-    )
-    net = ActionNet(config if table else replace(config, vector=0))
+    net = _untrained(job.recipe, words, len(actions), table)
+    learner = _learner(net, job, ActionSentences(actions, replace(corpus.vocabulary, common=common)))
     about = manifest(job, corpus, asdict(net.config), data, by)
     about["actions"] = described(actions)
     if vectors and table:
-        net.start_from(torch.from_numpy(table.vectors).float())
         about["common"] = common
         about["training"]["word_vectors"] = {
             "file": vectors.file.name,
             "words": int(table.vectors.any(axis=1).sum()),
             "origin": vectors.origin,
         }
+    return job.run(net, learner, about)
+
+
+def _untrained(recipe: Recipe, words: Sequence[str], actions: int, table: WordTable | None) -> ActionNet:
+    """A new net, with the vectors of words if there are any."""
+    common = tuple(table.common) if table else ()
+    config = recipe.sized(words=len(words), actions=actions, common=len(common), stems=stems_of(words, common))
+    if table is None:
+        return ActionNet(replace(config, vector=0))
+    net = ActionNet(config)
+    net.start_from(torch.from_numpy(table.vectors).float())
+    return net
+
+
+def _learner(net: ActionNet, job: Job, sentences: "ActionSentences") -> GradientLearner:
+    """Learns the actions of sentences."""
 
     def loss(batch: SentenceBatch) -> Terms:
         log_probabilities = net(batch.words, batch.lengths).float()
         losses = functional.nll_loss(log_probabilities, batch.actions, reduction="none")
         return (Term(losses, len(batch)),)
 
-    learner = GradientLearner(
+    return GradientLearner(
         net.to(job.device),
         job.training,
         loss,
         lambda rng: (sentences.draw(job.training.batch, rng),),
         lambda: sentences.measured(net),
     )
-    return job.run(net, learner, about)
 
 
 def spoken(store: Store, records: tuple[int, ...]) -> Actions:
@@ -110,16 +119,21 @@ def described(actions: Actions) -> list[dict[str, Any]]:
     """A sentence of each action and the words of all its sentences, for manifests."""
     descriptions = []
     for sentences in actions.sentences:
-        words = {word for sentence in sentences for word in RULES.words(sentence)}
+        words = set(chain.from_iterable(map(RULES.words, sentences)))
         descriptions.append({"sentence": sentences[0], "words": sorted(words)})
     return descriptions
+
+
+def _encoded(vocabulary: Vocabulary, sentences: Iterable[str]) -> list[Ids]:
+    """The words of sentences as ids."""
+    return [vocabulary.encode(sentence)[0] for sentence in sentences]
 
 
 class ActionSentences:
     """The sentences of all actions, to draw from and to measure by."""
 
     def __init__(self, actions: Actions, vocabulary: Vocabulary) -> None:
-        self.known = [[vocabulary.encode(sentence)[0] for sentence in known] for known in actions.sentences]
+        self.known = [_encoded(vocabulary, sentences) for sentences in actions.sentences]
 
         # the sentences that are not in training, and the actions that each is about
         actions_by_sentence: dict[str, set[int]] = {}
@@ -127,7 +141,7 @@ class ActionSentences:
             for sentence in unseen:
                 if any(map(vocabulary.meant, RULES.words(sentence))):
                     actions_by_sentence.setdefault(sentence, set()).add(action)
-        ids = [vocabulary.encode(sentence)[0] for sentence in actions_by_sentence]
+        ids = _encoded(vocabulary, actions_by_sentence)
         self.unseen = padded(ids, "int64") if ids else None
         self.alike = torch.zeros(len(ids), len(actions), dtype=torch.bool)
         for row, sentence_actions in enumerate(actions_by_sentence.values()):

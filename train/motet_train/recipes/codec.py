@@ -9,6 +9,7 @@ from torch.nn import functional
 
 from motet.generate.codec import REACH, seen_from
 from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import SixdWindows, Window
@@ -53,47 +54,57 @@ WIDER = replace(
 RECIPES = {"default": DEFAULT, "decoder": DECODER, "sharp": SHARP, "wider": WIDER}
 
 
-def train_codec(store: Store, job: Job, data: str = "", by: str = "trial", start: Run | None = None) -> Run:
+def train_codec(store: Store, job: Job, data: str, by: str, start: Run | None = None) -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`.
 
     start: a codec to train further; if its codes are settled, only the decoder is trained.
     """
-    recipe = job.recipe
-    if store.representation != "root_sixd":
-        raise DataError(f"a codec is trained on root_sixd (motet prepare --for codes), not {store.representation}")
+    store.needs_sixd("a codec is trained on")
+    visits = job.recipe.visits
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
-    started = None if start is None else _started(start, recipe.visits.settled)
-    config = started.config if started else recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
+    started = None if start is None else _started(start, visits.settled)
+    config = started.config if started else job.recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
     mirror = frame_mirror(contract)
-    train = SixdWindows(store, parts.train, recipe.visits.frames, config.hop, mirror)
-    validation = SixdWindows(store, parts.validation, recipe.visits.frames, config.hop, mirror)
+    train = SixdWindows(store, parts.train, visits.frames, config.hop, mirror)
+    validation = SixdWindows(store, parts.validation, visits.frames, config.hop, mirror)
 
-    # a new codec has its book of moves first
+    # a new codec, or one that is trained further
     torch.manual_seed(job.about.seed)
-    net = started or MotionCodec(config)
-    if started is None:
-        net.measure_by(contract.mean, contract.std)
-        moves = fit_book(train.sequences(), config.hop, config.moves, job.about.seed)
-        net.book.copy_(torch.from_numpy(moves))
-        net.book_scale.copy_(torch.from_numpy(moves.std(axis=0)))
-    elif not recipe.visits.settled:
+    net = started or _untrained(config, contract, train, job.about.seed)
+    if started and not visits.settled:
         train.favour(badly_shown(net, train))
 
+    learner = _learner(net, job, contract, train, validation)
+    about = data_of(store, data, by, parts, start)
+    return job.run(net, learner, job.manifest(contract, asdict(config), {}, None, about))
+
+
+def _untrained(config: CodecConfig, contract: MotionContract, windows: SixdWindows, seed: int) -> MotionCodec:
+    """A new codec with its book of moves."""
+    net = MotionCodec(config)
+    net.measure_by(contract.mean, contract.std)
+    moves = fit_book(windows.sequences(), config.hop, config.moves, seed)
+    net.book.copy_(torch.from_numpy(moves))
+    net.book_scale.copy_(torch.from_numpy(moves.std(axis=0)))
+    return net
+
+
+def _learner(
+    net: MotionCodec, job: Job, contract: MotionContract, train: SixdWindows, validation: SixdWindows
+) -> GradientLearner:
+    """Learns to decode windows to the frames that they were encoded from."""
+    visits = job.recipe.visits
     book = net.book.numpy().astype(np.float64)
-    weights = joint_weights(contract, ("Foot", "Toes", "LowerArm", "Hand"), recipe.visits.ends).to(job.device)
+    weights = joint_weights(contract, ("Foot", "Toes", "LowerArm", "Hand"), visits.ends).to(job.device)
     validation_window = validation.draw(128, book, np.random.default_rng(0))
-    learner = GradientLearner(
+    return GradientLearner(
         net.to(job.device),
         job.training,
-        lambda window: _loss(net, window, weights, recipe.visits.sharp),
+        lambda window: _loss(net, window, weights, visits.sharp),
         lambda rng: (train.draw(job.training.batch, book, rng),),
         lambda: _measured(net, validation_window),
     )
-    about = data_of(store, data, by, parts)
-    if start is not None:
-        about["start"] = start.manifest["training"]
-    return job.run(net, learner, job.manifest(contract, asdict(config), {}, None, about))
 
 
 def _started(start: Run, settled: bool) -> MotionCodec:
@@ -144,18 +155,19 @@ def fit_book(poses: list[Array], hop: int, size: int, seed: int) -> Array:
 
 def _loss(net: MotionCodec, window: Window, weights: Tensor, sharp: float) -> Terms:
     """Errors of decoded frames in standard deviations, of positions (m), speeds (m/s) and the logarithm of the jerk."""
+    # decoded frames, channel by channel
     frames = net.decode(window.moves, net.encode(window.inputs)).float()
-    scale = torch.where(net.scale > 0, net.scale, torch.inf)
-    scale = torch.cat([net.path_scale, scale[3:]])
+    scale = torch.cat([net.path_scale, torch.where(net.scale > 0, net.scale, torch.inf)[3:]])
     frame_errors = functional.smooth_l1_loss(frames / scale, window.frames / scale, beta=0.2, reduction="none")
+
+    # the joints that they place, and how these move
     with torch.autocast(frames.device.type, enabled=False):
         places = places_in_world(net, frames, window.way)
         true_places = places_in_world(net, window.frames, window.way)
-        place_errors = (places - true_places).abs() * weights[:, None]
+        errors = (places - true_places).abs() * weights[:, None]
         speed_errors = (places.diff(dim=1) - true_places.diff(dim=1)).abs() * 30 * weights[:, None]
         jerk_errors = (_sharpness(places) / _sharpness(true_places)).log().abs()
-    position_terms = frame_errors.mean() + 5.0 * place_errors.mean()
-    total = position_terms + 0.5 * speed_errors.mean() + sharp * jerk_errors.mean()
+    total = frame_errors.mean() + 5.0 * errors.mean() + 0.5 * speed_errors.mean() + sharp * jerk_errors.mean()
     return (Term(total, len(window)),)
 
 

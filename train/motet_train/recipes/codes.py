@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from motet.generate.memory import Memory, MemorySettings, squared_distances
 from motet.representation.base import FrameMirror
@@ -69,38 +70,48 @@ RECIPES = {"default": DEFAULT}
 def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions: Run) -> Run:
     """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store
     and split. DataError if they were not."""
-    visits = job.recipe.visits
     corpus = divided(store, mirror=True, by=by)
-    actions_shown = spoken(store, corpus.parts.train)
-    sentences = {"vocabulary": list(corpus.vocabulary.words), "actions": described(actions_shown)}
+    shown = spoken(store, corpus.parts.train)
+    sentences = {"vocabulary": list(corpus.vocabulary.words), "actions": described(shown)}
     codec_net, action_net = _parts(codec, actions, sentences)
 
-    # the writer, and the memory of the training motions
+    # the training motions in the codec's codes, and a writer with a memory of them
     torch.manual_seed(job.about.seed)
-    mirror = frame_mirror(corpus.contract)
-    motions = coded(store, corpus.parts.train, codec_net.eval(), actions_shown, mirror)
-    memory = memory_of(motions)
-    config = job.recipe.sized(actions=len(actions_shown))
-    net = MotionCodes(MotionCodesConfig(codec_net.config, action_net.config, config, len(memory)))
-    net.take(codec_net, action_net)
+    motions = coded(store, corpus.parts.train, codec_net.eval(), shown, frame_mirror(corpus.contract))
+    net = _untrained(job.recipe.sized(actions=len(shown)), codec_net, action_net, memory_of(motions))
+
+    learner = _learner(net, job, motions)
+    about = manifest(job, corpus, asdict(net.config), data, by)
+    about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
+    for part, run in (("codec", codec), ("actions", actions)):
+        about["training"][part] = origin(run.manifest["training"])
+    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(shown)),))
+
+
+def _untrained(config: CodeModelConfig, codec: MotionCodec, actions: ActionNet, memory: Tensor) -> MotionCodes:
+    """A new writer beside two trained nets, with a memory of steps."""
+    net = MotionCodes(MotionCodesConfig(codec.config, actions.config, config, len(memory)))
+    net.take(codec, actions)
     net.memory.copy_(memory)
+    return net
+
+
+def _learner(net: MotionCodes, job: Job, motions: list[CodedMotion]) -> GradientLearner:
+    """Learns to write each step of coded motions by those before it and the action."""
+    visits = job.recipe.visits
     windows = CodeWindows(motions, visits.window, net.end, visits.first)
+    config = net.config.writer
 
     def loss(batch: CodeBatch) -> Terms:
         losses = net.losses(batch.codes, batch.before, batch.action, batch.age)
         return (Term(losses.mean(dim=-1) * batch.weights / batch.weights.mean(), len(batch)),)
 
-    learner = GradientLearner(
+    return GradientLearner(
         net.to(job.device),
         job.training,
         loss,
-        lambda rng: (windows.draw(job.training.batch, config.unsaid, len(actions_shown), rng),),
+        lambda rng: (windows.draw(job.training.batch, config.unsaid, config.actions, rng),),
     )
-    about = manifest(job, corpus, asdict(net.config), data, by)
-    about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
-    about["training"]["codec"] = origin(codec.manifest["training"])
-    about["training"]["actions"] = origin(actions.manifest["training"])
-    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(actions_shown)),))
 
 
 def memory_settings(tables: Mapping[str, NDArray[Any]], actions: int) -> MemorySettings:
@@ -157,14 +168,12 @@ def coded(
         cut = parts[0][1] < len(store.sequence(record))  # a long take that repeats an act
         for (begin, end), (start, stop) in product(entry.spans, parts):
             frames = np.array(store.frames[begin + start : min(begin + stop, end)], np.float64)
-            for mirrored in (False, True):
-                codes = codes_of(codec, mirror(frames) if mirrored else frames, store.fps)
-                if not len(codes):
-                    continue
-                if entry.ends or cut:
-                    codes = _ended(codes, codec.config.moves)
-                first = begin == entry.spans[0][0]
-                motions.append(CodedMotion(codes, actions.of[record, mirrored], entry.starts or cut, first))
+            first = begin == entry.spans[0][0]
+            for mirrored, seen in enumerate((frames, mirror(frames))):
+                codes = codes_of(codec, seen, store.fps)
+                if len(codes):
+                    whole = _ended(codes, codec.config.moves) if entry.ends or cut else codes
+                    motions.append(CodedMotion(whole, actions.of[record, bool(mirrored)], entry.starts or cut, first))
     return motions
 
 

@@ -17,7 +17,7 @@ from motet_train.data.sixd_windows import GapWindow, GapWindows
 from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.filler import Filler, FillerConfig
-from motet_train.models.kinematics import joint_weights, tree_of
+from motet_train.models.kinematics import joint_weights, smooth_length, tree_of
 from motet_train.recipes.recipe import MUON, Job, Recipe, data_of
 from motet_train.runs import Run
 
@@ -47,11 +47,10 @@ DEFAULT = Recipe(
 RECIPES = {"default": DEFAULT}
 
 
-def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> Run:
+def train_fill(store: Store, job: Job, data: str, by: str) -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`."""
     visits = job.recipe.visits
-    if store.representation != "root_sixd":
-        raise DataError(f"gaps are filled in root_sixd (motet prepare --for codes), not {store.representation}")
+    store.needs_sixd("gaps are filled in")
     if store.skeleton != HUMANOID:
         raise DataError(
             "gaps are filled on the humanoid (motet prepare --for codes --figure humanoid), not on another figure"
@@ -64,21 +63,34 @@ def train_fill(store: Store, job: Job, data: str = "", by: str = "subject") -> R
     validation = _validation_windows(GapWindows(store, parts.validation, longest, mirror), visits)
     torch.manual_seed(job.about.seed)
     net = _untrained(job.recipe, contract, train).to(job.device)
+    learner = _learner(net, job, contract, train, validation)
+    about = data_of(store, data, by, parts)
+    defaults = {"context": visits.context, "least": visits.least, "longest": visits.gaps[1]}
+    run_manifest = job.manifest(contract, asdict(net.config), defaults, None, about)
+    return job.run(_kept(learner), learner, run_manifest)
+
+
+def _learner(
+    net: Filler, job: Job, contract: MotionContract, train: GapWindows, validation: list[GapWindow]
+) -> GradientLearner:
+    """Learns to fill the gaps of windows."""
+    visits = job.recipe.visits
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
     on_device = [window.to(job.device) for window in validation]
-
     learner = GradientLearner(
         net,
         job.training,
-        lambda window: _loss(net, window, weights, store.fps),
+        lambda window: _loss(net, window, weights, contract.fps),
         partial(_batches, train, visits, job.training.batch),
-        lambda: _measured(kept, on_device),
+        lambda: _measured(_kept(learner), on_device),
     )
+    return learner
+
+
+def _kept(learner: GradientLearner) -> Filler:
+    """The net whose weights are kept."""
     assert isinstance(learner.kept, Filler)
-    kept: Filler = learner.kept
-    about = data_of(store, data, by, parts)
-    defaults = {"context": visits.context, "least": visits.least, "longest": visits.gaps[1]}
-    return job.run(kept, learner, job.manifest(contract, asdict(net.config), defaults, None, about))
+    return learner.kept
 
 
 def _validation_windows(windows: GapWindows, visits: FillVisits) -> list[GapWindow]:
@@ -117,15 +129,17 @@ def _loss(net: Filler, window: GapWindow, weights: Tensor, fps: float) -> Terms:
     frames = net.once(window.past, window.plain, window.after).float()
     frame_error = functional.smooth_l1_loss(frames / net.scale, window.truth / net.scale, beta=0.2)
     with torch.autocast(frames.device.type, enabled=False):
+        # where joints are
         places = _joints_with_seams(net, window, frames)
         true_places = _joints_with_seams(net, window, window.truth)
-        place_errors = ((places - true_places).square().sum(-1) + 1e-8).sqrt() * weights
+        place_errors = smooth_length(places - true_places, 1e-8) * weights
 
+        # how they move, and that feet that stand do not
         velocities = places.diff(dim=1) * fps
         true_velocities = true_places.diff(dim=1) * fps
-        velocity_errors = ((velocities - true_velocities).square().sum(-1) + 1e-4).sqrt() * weights
+        velocity_errors = smooth_length(velocities - true_velocities, 1e-4) * weights
         stands = (true_velocities.norm(dim=-1) < 0.2) & (weights > 1)
-        slide = (velocities.square().sum(-1) + 1e-4).sqrt() * stands
+        slide = smooth_length(velocities, 1e-4) * stands
     total = place_errors.mean() + 0.05 * frame_error + 0.1 * velocity_errors.mean() + 0.1 * slide.mean()
     return (Term(total, len(window)),)
 

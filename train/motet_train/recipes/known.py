@@ -5,14 +5,16 @@ fitted without them answer about their motions. The final space is then fitted w
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from itertools import compress, product
 from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from motet.bundle.graph import Floats
 from motet.models.nearest_neighbour import LEFT, RIGHT, STRAIGHT, AnswerSettings, Known, log_odds
@@ -20,7 +22,7 @@ from motet.text.vocabulary import RULES
 from motet_train.data.batches import Examples, Views
 from motet_train.data.errors import DataError
 from motet_train.data.kinds import KINDS, Shown, careful, named, shown_by
-from motet_train.data.sentences import actions_of
+from motet_train.data.sentences import Actions, actions_of
 from motet_train.data.store import Store
 from motet_train.models.discriminant import discriminate
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
@@ -28,7 +30,7 @@ from motet_train.models.known_motions import KnownMotions, KnownMotionsConfig
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.recipes import language, search
 from motet_train.recipes.language import Divided, divided, manifest
-from motet_train.recipes.recipe import Job, Recipe, origin
+from motet_train.recipes.recipe import Job, Recipe, by_feature, origin, parameter_count
 from motet_train.runs import Run, surroundings
 
 
@@ -72,75 +74,92 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
     """Gather the known motions of a store, for the run of a net that writes sentences; DataError unless it has the
     store's channels."""
     began = perf_counter()
-    visits = job.recipe.visits
     corpus = divided(store, mirror=True, by=by)
-    if not isinstance(writer.model, MotionToLanguage):
-        raise DataError("known motions need a run of describe (--writer)")
-    if writer.manifest["motion"]["channels"] != list(corpus.contract.channels):
-        raise DataError(f"{writer.manifest['name']} describes motions of other channels than those of {data}")
-
-    # the space, first without each group of people, then with all
-    config = replace(search.config_for(store, corpus, search.DEFAULT), words=0)  # it reads no sentences
-    space = JointEmbedding(config).eval()
-    space.measure_by(corpus.contract.mean, corpus.contract.std)
-    examples = corpus.examples(corpus.parts.train)
-    views = search.seen_by(space, examples, visits, job.about.seed, whole=True)
-    tried = _tried(corpus, examples, space, views, visits)
-    discriminate(space, _without_whole(views))
-    known = _gathered(corpus, examples, space, views, visits.kept)
+    writer_net = _writer_net(writer, corpus, data)
+    space, known, tried = _learned_space(store, corpus, job)
     np.savez(job.folder / TRIED, **tried._asdict())
-    settings = learned(tried, visits.sure)
+    net = KnownMotions.of(writer_net, space, known)
 
-    net = KnownMotions.of(writer.model, space, known)
+    # the manifest is the writer's where the model is
     about = manifest(job, corpus, asdict(net.config), data, by)
     about |= {key: writer.manifest[key] for key in ("motion", "text", "vocabulary")}
     about["training"] |= {
         "epochs": job.training.epochs,
         "kept_epoch": job.training.epochs,
         "seconds": round(perf_counter() - began, 1),
-        "parameters": sum(parameter.numel() for parameter in net.parameters()),
+        "parameters": parameter_count(net),
         "writer": origin(writer.manifest["training"]),
         **surroundings("cpu"),
     }
-    about["settings"] = {**writer.manifest["settings"], settings.FEATURE: asdict(settings)}
+    about["settings"] = {**writer.manifest["settings"], **by_feature([learned(tried, job.recipe.visits.sure)])}
     run = Run(about, net)
     run.save(job.folder)
     return run
 
 
-def _gathered(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, kept: int) -> Known:
-    """The known motions of some examples. views: of these, the last one whole."""
+def _writer_net(writer: Run, corpus: Divided, data: str) -> MotionToLanguage:
+    """The net of a run that writes sentences; DataError for another run, or one of other channels than the data's."""
+    if not isinstance(writer.model, MotionToLanguage):
+        raise DataError("known motions need a run of describe (--writer)")
+    if writer.manifest["motion"]["channels"] != list(corpus.contract.channels):
+        raise DataError(f"{writer.manifest['name']} describes motions of other channels than those of {data}")
+    return writer.model
+
+
+def _learned_space(store: Store, corpus: Divided, job: Job) -> tuple[JointEmbedding, Known, "Tried"]:
+    """The space fitted with everybody and what it knows, and answers of spaces without each group of people."""
+    visits = job.recipe.visits
+    config = replace(search.config_for(store, corpus, search.DEFAULT), words=0)  # it reads no sentences
+    space = JointEmbedding(config).eval()
+    space.measure_by(corpus.contract.mean, corpus.contract.std)
+    examples = corpus.examples(corpus.parts.train)
+    views = search.seen_by(space, examples, visits, job.about.seed, whole=True)
+    tried = _tried(corpus, examples, space, views, visits)
+    return space, _known(corpus, examples, space, views, visits.kept), tried
+
+
+def _known(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, kept: int) -> Known:
+    """Fit a space to some examples; what it then knows. views: of these examples, the last one whole."""
+    # disguised views show which differences do not matter, so the whole one is left out
+    discriminate(space, replace(views, seen=views.seen[:, :, :-1]))
+    kept_views = torch.cat([views.seen[:, :, :kept], views.seen[:, :, -1:]], dim=2)
+    vectors = _embedded(space, kept_views.flatten(0, 1))
+
+    # the action of each motion, then of each mirrored one; what it shows, and sentences about it
     actions = actions_of(corpus.store, examples.records)
-    titles = {}
-    motion_actions = []
-    for mirrored in (False, True):
-        for record in examples.records:
-            action = actions.of[record, mirrored]
-            titles[action] = corpus.store.records[record].action
-            motion_actions.append(action)
-
-    # what each action shows, and a few clear sentences about it
-    shown = [shown_by(wordings, titles[action]) for action, wordings in enumerate(actions.sentences)]
-    sentences: list[str] = []
-    sentence_actions: list[int] = []
-    for action, wordings in enumerate(actions.sentences):
-        clear = [sentence for sentence in wordings if not _names_both_sides(sentence)] or wordings
-        kept_sentences = careful(clear, shown[action].shown, 3) or list(clear[:1])
-        sentences += kept_sentences
-        sentence_actions += [action] * len(kept_sentences)
-
-    with torch.no_grad():
-        kept_views = torch.cat([views.seen[:, :, :kept], views.seen[:, :, -1:]], dim=2)
-        vectors = space.embed_statistics(kept_views).flatten(0, 1).numpy()
+    motion_actions = [actions.of[record, mirrored] for mirrored, record in product((False, True), examples.records)]
+    shown = _shown_by_actions(corpus.store, actions)
+    sentence_actions, sentences = zip(*_clear_sentences(actions, shown), strict=True)
     return Known(
         np.rint(vectors * 127).astype(np.int8),
         np.array(motion_actions, dtype=np.int16),
-        np.array([_kind_row(action_shown) for action_shown in shown], dtype=np.uint8),
-        tuple(sentences),
+        np.array(list(map(_kind_row, shown)), dtype=np.uint8),
+        sentences,
         np.array(sentence_actions, dtype=np.int16),
-        np.array([[kind in named(sentence) for kind in KINDS] for sentence in sentences], dtype=np.uint8),
-        np.array([way_of(sentence) for sentence in sentences], dtype=np.int16),
+        np.array(list(map(_named_row, sentences)), dtype=np.uint8),
+        np.array(list(map(way_of, sentences)), dtype=np.int16),
     )
+
+
+def _shown_by_actions(store: Store, actions: Actions) -> list[Shown]:
+    """What each action shows, by its sentences and its title."""
+    titles = {action: store.records[record].action for (record, _), action in actions.of.items()}
+    return [shown_by(wordings, titles[action]) for action, wordings in enumerate(actions.sentences)]
+
+
+@torch.no_grad()
+def _embedded(space: JointEmbedding, seen: Tensor) -> Floats:
+    """The vectors (..., E) of statistics (..., S) in a space."""
+    vectors: Floats = space.embed_statistics(seen).numpy()
+    return vectors
+
+
+def _clear_sentences(actions: Actions, shown: Sequence[Shown]) -> Iterator[tuple[int, str]]:
+    """A few clear sentences about each action, with the action."""
+    for action, wordings in enumerate(actions.sentences):
+        clear = [sentence for sentence in wordings if not _names_both_sides(sentence)] or wordings
+        for sentence in careful(clear, shown[action].shown, 3) or clear[:1]:
+            yield action, sentence
 
 
 def _names_both_sides(sentence: str) -> bool:
@@ -151,6 +170,11 @@ def _names_both_sides(sentence: str) -> bool:
 def _kind_row(shown: Shown) -> list[int]:
     """For each kind 2 if it is shown, 1 if it may be mentioned, else 0."""
     return [2 if kind in shown.shown else int(kind in shown.sayable) for kind in KINDS]
+
+
+def _named_row(sentence: str) -> list[bool]:
+    """For each kind whether a sentence names it."""
+    return [kind in named(sentence) for kind in KINDS]
 
 
 def way_of(sentence: str) -> tuple[int, int, int]:
@@ -201,23 +225,13 @@ def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Vi
         if not others or not held_out:
             continue
 
-        # a space of the others, and what it knows
-        other_views = views.only(others)
-        discriminate(space, _without_whole(other_views))
+        # what a space of the others knows, and how it answers about the held-out motions
         part = corpus.examples(tuple(examples.records[row] for row in others))
-        known = _gathered(corpus, part, space, other_views, visits.kept)
-
-        # its answers about the held-out motions: whole, and two views
+        known = _known(corpus, part, space, views.only(others), visits.kept)
         for view in (-1, 0, 1):
-            with torch.no_grad():
-                vectors = space.embed_statistics(views.seen[0, held_out, view]).numpy()
+            vectors = _embedded(space, views.seen[0, held_out, view])
             answers.append(_answered(known, vectors, fold, [shown[row] for row in held_out]))
     return Tried(*map(np.concatenate, zip(*answers, strict=True)))
-
-
-def _without_whole(views: Views) -> Views:
-    """Without the last view, of whole motions: disguised ones show which differences do not matter."""
-    return replace(views, seen=views.seen[:, :, :-1])
 
 
 def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown]) -> Tried:
@@ -227,8 +241,7 @@ def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown])
     best = shares.argmax(axis=1)
     right = []
     for shown, flags in zip(shows, known.sets[best], strict=True):
-        kinds = {kind for kind, in_answer in zip(KINDS, flags, strict=True) if in_answer}
-        right.append(shown.right_kinds(kinds))
+        right.append(shown.right_kinds(set(compress(KINDS, flags))))
     best_shares = shares[np.arange(len(best)), best]
     return Tried(best_shares, similarity, np.full(len(best), group), np.array(right, dtype=bool))
 
@@ -256,17 +269,18 @@ def learned(tried: Tried, sure: float) -> AnswerSettings:
 
     if len(tried.right) < 50 or tried.right.all() or not tried.right.any():
         return AnswerSettings()
+    # from the share of near motions to a probability
     odds = log_odds(tried.share)[:, None]
     sizes = np.bincount(tried.group)[tried.group]
     weights = np.sqrt(len(sizes) / sizes)
     regression = LogisticRegression(C=10.0, max_iter=1000).fit(odds, tried.right, sample_weight=weights)
     probabilities = regression.predict_proba(odds)[:, 1]
+
+    # the bound of each group that has one
     bounds = []
     for group in set(tried.group):
         rows = tried.group == group
-        bound = _lowest(probabilities[rows], tried.right[rows], sure)
-        if bound is not None:
-            bounds.append(bound)
+        bounds += _lowest(probabilities[rows], tried.right[rows], sure)
     return AnswerSettings(
         bias=round(float(regression.intercept_[0]), 4),
         share=round(float(regression.coef_[0, 0]), 4),
@@ -275,9 +289,10 @@ def learned(tried: Tried, sure: float) -> AnswerSettings:
     )
 
 
-def _lowest(probabilities: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> float | None:
-    """The lowest probability at and above which the wanted share of answers is right; None without one."""
+def _lowest(probabilities: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> list[float]:
+    """The lowest probability at and above which the wanted share of answers is right, if there is one."""
     order = np.argsort(-probabilities, kind="stable")
     precision = np.cumsum(right[order]) / np.arange(1, len(order) + 1)
     good = np.flatnonzero(precision[19:] >= wanted) + 19  # fewer than 20 answers prove nothing
-    return float(probabilities[order[good[-1]]]) if len(good) else None
+    lowest: list[float] = probabilities[order[good[-1:]]].tolist()
+    return lowest

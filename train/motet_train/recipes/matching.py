@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
 from motet.steering.foot_lock import FootLockSettings
 from motet.steering.matching import LEAST_PACE, is_faster, stride_velocities
 from motet.steering.model import FEATURE_STEPS
 from motet.steering.settings import SteeringSettings
-from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
@@ -48,81 +48,95 @@ DEFAULT = Recipe(
 RECIPES = {"default": DEFAULT}
 
 
-def train_matching(store: Store, job: Job, data: str = "") -> Run:
+def train_matching(store: Store, job: Job, data: str) -> Run:
     """Train on the recordings of gaits in a store in ``root_sixd``; DataError if a gait has none."""
-    visits = job.recipe.visits
-    if store.representation != "root_sixd":
-        raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
+    # the table of all rows of the recordings
+    store.needs_sixd("steering is trained on")
     gaits = gaits_of(store)
     names = tuple(gait.name for gait in gaits)
     gait_recordings = recordings(store, gaits)
-    contract = store.contract(tuple(range(len(store.records))))
     rows = rows_of(gait_recordings, names, STEERING)
+
+    # a net that begins with their principal components
+    contract = store.contract(tuple(range(len(store.records))))
     torch.manual_seed(job.about.seed)
-    config = job.recipe.sized(
+    net = _untrained(job.recipe, contract, rows, names).to(job.device)
+
+    learner = _learner(net, job, contract, rows)
+    about = {"data": {"name": data, "recordings": len(gait_recordings), "rows": len(rows)}}
+    return job.run(net, learner, job.manifest(contract, asdict(net.config), {}, None, about))
+
+
+def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, gaits: tuple[str, ...]) -> Matching:
+    """A new net filled with rows."""
+    config = recipe.sized(
         channels=len(contract.channels),
         tree=tree_of(contract),
         rows=len(rows),
         features=rows.features.shape[1],
-        gaits=names,
+        gaits=gaits,
         speeds=tuple(_speeds(rows, in_gait, STEERING) for in_gait in rows.gaits.T),
     )
     net = Matching(config)
     net.measure_by(contract.mean, contract.std)
     take(net, rows)
+    return net
 
-    # poses and the points of their joints, which codes have to reproduce
+
+def _learner(net: Matching, job: Job, contract: MotionContract, rows: MatchingRows) -> GradientLearner:
+    """Learns codes that reproduce the poses of rows and the points of their joints."""
+    visits = job.recipe.visits
     poses = torch.from_numpy(rows.poses).float().to(job.device)
     rotations = poses[:, :-1].reshape(len(poses), -1, 4)
-    true = poses, net.to(job.device).points(rotations, poses[:, -1:])
+    true = poses, net.points(rotations, poses[:, -1:])
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
     starts = torch.from_numpy(np.flatnonzero(rows.left >= visits.window))
 
     def batch(rng: np.random.Generator) -> tuple[Tensor]:
-        drawn = torch.from_numpy(rng.integers(len(starts), size=job.training.batch))
-        return (starts[drawn][:, None] + torch.arange(visits.window),)
+        drawn = rng.integers(len(starts), size=job.training.batch)
+        return (starts[torch.from_numpy(drawn)][:, None] + torch.arange(visits.window),)
 
-    learner = GradientLearner(
+    return GradientLearner(
         net,
         job.training,
-        lambda drawn: _loss(net, drawn, true, weights, contract.fps),
+        lambda windows: _loss(net, windows, true, weights, contract.fps),
         batch,
         lambda: _measured(net, true),
     )
-    about = {"data": {"name": data, "recordings": len(gait_recordings), "rows": len(rows)}}
-    return job.run(net, learner, job.manifest(contract, asdict(net.config), {}, None, about))
 
 
 @torch.no_grad()
 def take(net: Matching, rows: MatchingRows) -> None:
     """Fill a net with rows: their table, and as codes the principal components of poses and mirrored poses."""
     mean, scale = (part.round(6) for part in scaling(rows.features))
-    columns, signs = mirrored_poses()
-
-    # poses relative to the mean of all poses and their mirror images, weighted by reach
-    mean_pose = rows.poses.mean(axis=0)
-    pose_mean = (mean_pose + mean_pose[columns] * signs) / 2
-    offsets = rows.poses - pose_mean
-    weights = _reach(net.config.tree)
-    basis = np.concatenate(
-        [
-            _components((offsets + offsets[:, columns] * signs) / 2 * weights, net.config.even),
-            _components((offsets - offsets[:, columns] * signs) / 2 * weights, net.config.odd),
-        ]
-    )
     values = {
-        "codes": offsets * weights @ basis.T,
+        **_pose_codes(rows.poses, net.config),
         "moves": np.column_stack([rows.moves, rows.speed, rows.contacts]),
         "features": np.clip(np.round((rows.features - mean) * scale * FEATURE_STEPS), -127, 127),
         "shows": rows.gaits,
         "left": rows.left,
         "feature_mean": mean,
         "feature_scale": scale,
-        "pose_mean": pose_mean,
-        "pose_basis": basis / weights,
     }
     for name, value in values.items():
         getattr(net, name).copy_(torch.from_numpy(value))
+
+
+def _pose_codes(poses: Array, config: MatchingConfig) -> dict[str, Array]:
+    """Codes of poses (N, P), and the mean and the basis from which they are decoded."""
+    # relative to the mean of all poses and their mirror images, weighted by reach
+    columns, signs = mirrored_poses()
+    mean_pose = poses.mean(axis=0)
+    pose_mean = (mean_pose + mean_pose[columns] * signs) / 2
+    offsets = poses - pose_mean
+    weights = _reach(config.tree)
+
+    # components that a mirror image has alike, and with the other sign
+    mirrored = offsets[:, columns] * signs
+    even = _components((offsets + mirrored) / 2 * weights, config.even)
+    odd = _components((offsets - mirrored) / 2 * weights, config.odd)
+    basis = np.concatenate([even, odd])
+    return {"codes": offsets * weights @ basis.T, "pose_mean": pose_mean, "pose_basis": basis / weights}
 
 
 def _components(offsets: Array, count: int) -> Array:
@@ -161,26 +175,38 @@ def _speeds(rows: MatchingRows, in_gait: NDArray[np.bool_], settings: SteeringSe
     moving = speed > settings.idle
     if not moving.any():
         return (0.0,) * 5
-    slowest = round(float(np.percentile(speed[moving], 30.0)) * settings.slowest * settings.shortest, 2)
-    if slowest <= settings.creep and is_faster(speed, settings):
-        slowest = LEAST_PACE
 
-    # rows, and means over a stride, by their direction from the facing: ahead, aside or back
-    bounds = (settings.aside, settings.back)
-    angles = np.abs(np.arctan2(rows.moves[in_gait, 1], rows.moves[in_gait, 0]))
-    sectors = np.digitize(angles, bounds, right=True)
+    # rows, and means over a stride, by their direction: ahead, aside or back
+    sectors = _sectors(rows.moves[in_gait], settings, right=True)
     strides = stride_velocities(rows.moves[:, :2], rows.left)[in_gait]
     stride_speeds = np.hypot(*strides.T)
     stride_moving = stride_speeds > settings.idle
-    stride_sectors = np.digitize(np.abs(np.arctan2(strides[:, 1], strides[:, 0])), bounds)
+    stride_sectors = _sectors(strides, settings, right=False)
     fastest = []
     for sector in range(3):
         row_speeds = speed[moving & (sectors == sector)]
         long_speeds = stride_speeds[stride_moving & (stride_sectors == sector)]
         fastest.append(_fastest(row_speeds, long_speeds, settings))
-    median = round(float(np.median(speed[moving & (sectors == 0)])), 2)
     ahead, aside, back = fastest
-    return slowest, median, ahead, aside, back
+    return _slowest(speed, moving, settings), _median(speed[moving & (sectors == 0)]), ahead, aside, back
+
+
+def _median(speeds: Array) -> float:
+    """The median of speeds, m/s."""
+    return round(float(np.median(speeds)), 2)
+
+
+def _sectors(velocities: Array, settings: SteeringSettings, right: bool) -> NDArray[np.intp]:
+    """The direction (N,) of velocities (N, 2 or more), forward and left: 0 ahead, 1 aside, 2 back. right: whether an
+    angle on a bound counts as the smaller one."""
+    angles = np.abs(np.arctan2(velocities[:, 1], velocities[:, 0]))
+    return np.digitize(angles, (settings.aside, settings.back), right=right)
+
+
+def _slowest(speed: Array, moving: NDArray[np.bool_], settings: SteeringSettings) -> float:
+    """The lowest speed of a gait by the speeds of its rows, m/s."""
+    slowest = round(float(np.percentile(speed[moving], 30.0)) * settings.slowest * settings.shortest, 2)
+    return LEAST_PACE if slowest <= settings.creep and is_faster(speed, settings) else slowest
 
 
 def _fastest(row_speeds: Array, stride_speeds: Array, settings: SteeringSettings) -> float:

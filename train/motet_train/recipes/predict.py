@@ -8,7 +8,7 @@ from torch import Tensor
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import GradientLearner, Term, Terms
-from motet_train.models.kinematics import VectorPlaces
+from motet_train.models.kinematics import VectorPlaces, smooth_length
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import ADAMW, AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
@@ -43,31 +43,44 @@ def train_predict(material: Material, job: Job) -> Run:
     job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     net = _untrained(material, job.recipe)
-    frames = net.config.frames
+    defaults = {"horizon": net.config.frames}
     about = {"data": material.about}
-    manifest = job.manifest(material.contract, asdict(net.config), {"horizon": frames}, material.licence, about)
+    manifest = job.manifest(material.contract, asdict(net.config), defaults, material.licence, about)
+    learner = _learner(net.to(job.device), job, material)
+    return job.run(_kept(learner), learner, manifest)
 
-    # windows of input and output; text files are taken as they are
+
+def _learner(net: Predictor, job: Job, material: Material) -> GradientLearner:
+    """Learns the frames of windows after their seed, and from held-out ones its expected errors."""
+    # windows of input and output; text files, which have no bones, are taken as they are
+    config = net.config
     has_bones = material.contract.skeleton is not None
-    seed = net.config.seed_frames if has_bones else None
-    windows = Windows(material, net.config.seed_frames + frames, **asdict(visits), seed=seed)
-    held_out = windows.along(material.validation, 25).to(job.device) if net.config.doubts else None
+    seed = config.seed_frames if has_bones else None
+    windows = Windows(material, config.seed_frames + config.frames, **asdict(job.recipe.visits), seed=seed)
+    held_out = windows.along(material.validation, 25).to(job.device) if config.doubts else None
 
-    # frames have about the inverse of their expected error as weights, mean 1
-    weights = 1 / (0.3 + 0.12 * torch.arange(1.0, frames + 1) ** 0.8)
-    weights = (weights / weights.mean()).to(job.device)
+    weights = _frame_weights(config.frames).to(job.device)
     places = VectorPlaces(material.contract).to(job.device) if has_bones else None
-
     learner = GradientLearner(
-        net.to(job.device),
+        net,
         job.training,
         lambda drawn: _loss(net, drawn, weights, places),
         lambda rng: (windows.draw(job.training.batch, rng),),
-        lambda: {} if places is None or held_out is None else _error_head_fitted(trained, places, held_out),
+        lambda: {} if places is None or held_out is None else _error_head_fitted(_kept(learner), places, held_out),
     )
+    return learner
+
+
+def _kept(learner: GradientLearner) -> Predictor:
+    """The net whose weights are kept."""
     assert isinstance(learner.kept, Predictor)
-    trained: Predictor = learner.kept
-    return job.run(trained, learner, manifest)
+    return learner.kept
+
+
+def _frame_weights(frames: int) -> Tensor:
+    """The weights (N,) of predicted frames: about the inverse of their expected error, mean 1."""
+    weights = 1 / (0.3 + 0.12 * torch.arange(1.0, frames + 1) ** 0.8)
+    return weights / weights.mean()
 
 
 def possible(visits: Visits, material: Material) -> Visits:
@@ -104,15 +117,10 @@ def _loss(net: Predictor, windows: Tensor, weights: Tensor, places: VectorPlaces
     truth = windows[:, net.config.seed_frames :]
     predicted = net.plain(seed)
     moved = list(net.config.kept[net.config.held :])
-    errors = _length((predicted - truth)[..., moved])
+    errors = smooth_length((predicted - truth)[..., moved], 1e-6)
     if places is not None:  # the channels still count, or turns about bones' own axes would not
-        errors = 10.0 * _length(places(predicted) - places(truth)).mean(-1) + 0.1 * errors
+        errors = 10.0 * smooth_length(places(predicted) - places(truth), 1e-6).mean(-1) + 0.1 * errors
     return (Term((errors * weights).mean(), len(windows)),)
-
-
-def _length(vectors: Tensor) -> Tensor:
-    """Lengths (...) of vectors (..., K), with gradients at 0."""
-    return (vectors.square().sum(-1) + 1e-6).sqrt()
 
 
 @torch.no_grad()

@@ -116,7 +116,7 @@ class Job:
             "motion": contract.to_json(),
             **more,
             "defaults": dict(defaults),
-            "settings": _by_feature(recipe.settings),
+            "settings": by_feature(recipe.settings),
             "config": dict(config),
             "licence": {"weights": about.licence, "data": about.data_licence or data_licence},
             "training": {"command": about.command, "seed": about.seed, **trained, **(training or {})},
@@ -138,22 +138,29 @@ class Job:
         features that are tuned with the trained net.
         RunError if the folder holds a run that was started with other settings; more epochs or steps are allowed.
         """
-        if distributed.rank() == 0:
-            refuse_other(self.folder / MANIFEST, manifest)
-            write_whole(self.folder / MANIFEST, json.dumps(manifest, indent=1) + "\n")
-            if self.settings is not None:
-                write_whole(self.folder / SETTINGS, self.settings)
+        is_first = distributed.rank() == 0
+        if is_first:
+            self._begin(manifest)
         log = train(learner, self.about.seed, self.folder, self.progress)
 
-        # the run, with the figures of its training and the settings that are tuned with it
+        # the run with the figures of its training
         results = _results(log, learner, net)
         training = {**manifest["training"], **results, **more(log), **surroundings(self.device)}
         run = Run({**manifest, "training": training}, net.cpu())
-        if distributed.rank() == 0:
-            settings = {**manifest["settings"], **_by_feature(tuned(run))}
+
+        # and with the settings that are tuned by it
+        if is_first:
+            settings = {**manifest["settings"], **by_feature(tuned(run))}
             run = Run({**run.manifest, "settings": settings}, run.model)
             run.save(self.folder)
         return run
+
+    def _begin(self, manifest: Mapping[str, Any]) -> None:
+        """Write the manifest and the settings of a new run."""
+        refuse_other(self.folder / MANIFEST, manifest)
+        write_whole(self.folder / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+        if self.settings is not None:
+            write_whole(self.folder / SETTINGS, self.settings)
 
 
 def _results(log: Sequence[Line], learner: Learner, net: Net) -> dict[str, Any]:
@@ -167,16 +174,19 @@ def _results(log: Sequence[Line], learner: Learner, net: Net) -> dict[str, Any]:
         **{key: best[key] for key in ("loss", "validation") if key in best},
         "seconds": round(seconds, 1),
         "steps_per_second": round(steps / seconds, 3),
-        "parameters": sum(parameter.numel() for parameter in net.parameters()),
+        "parameters": parameter_count(net),
     }
 
 
-def data_of(store: Store, name: str, by: str, parts: Split) -> dict[str, Any]:
-    """The data of a training, for the manifest."""
-    return {
+def data_of(store: Store, name: str, by: str, parts: Split, start: Run | None = None) -> dict[str, Any]:
+    """The data of a training, for the manifest, and the training of the run from which it starts."""
+    about: dict[str, Any] = {
         "data": {"name": name, "motions": len(store.records)},
         "split": {"by": by, "train": len(parts.train)},
     }
+    if start is not None:
+        about["start"] = start.manifest["training"]
+    return about
 
 
 def origin(training: Mapping[str, Any]) -> dict[str, Any]:
@@ -188,5 +198,11 @@ def origin(training: Mapping[str, Any]) -> dict[str, Any]:
     return parts
 
 
-def _by_feature(settings: Sequence[Settings]) -> dict[str, dict[str, Any]]:
+def parameter_count(net: Net) -> int:
+    """The number of parameters of a net."""
+    return sum(parameter.numel() for parameter in net.parameters())
+
+
+def by_feature(settings: Sequence[Settings]) -> dict[str, dict[str, Any]]:
+    """Settings as in a manifest: the fields of each by the name of its feature."""
     return {feature.FEATURE: asdict(feature) for feature in settings}

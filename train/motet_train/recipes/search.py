@@ -49,7 +49,7 @@ DEFAULT = Recipe(
 RECIPES = {"default": DEFAULT}
 
 
-def train_search(store: Store, job: Job, data: str = "", by: str = "trial") -> Run:
+def train_search(store: Store, job: Job, data: str, by: str) -> Run:
     """Train on a store, see :func:`motet_train.recipes.language.train_language`."""
     visits = job.recipe.visits
     corpus = divided(store, visits.mirror, by)

@@ -82,9 +82,9 @@ def _reachable(model: DescribeModel, shown: list[Shown]) -> float:
 
 def _looked_up(references: Sequence[Sequence[str]], shown: list[Shown]) -> float:
     """The mean share of sentences about other motions, a list for each, that are right."""
-    shares = [
-        np.mean([actions.right(text) for text in texts]) for actions, texts in zip(shown, references, strict=True)
-    ]
+    shares = []
+    for actions, texts in zip(shown, references, strict=True):
+        shares.append(np.mean(list(map(actions.right, texts))))
     return float(np.mean(shares))
 
 

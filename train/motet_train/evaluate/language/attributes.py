@@ -1,7 +1,9 @@
 """Attributes of motions in sentences: walk, run or jump; left or right; turns. Small tables of English words."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -56,9 +58,8 @@ def turning(sentence: str) -> bool:
 def common(attributes: Sequence[frozenset[str]]) -> frozenset[str]:
     """The attributes that at least half of a motion's sentences mention, by those of each sentence."""
     # how many sentences mention each attribute
-    every: frozenset[str] = frozenset().union(*attributes)
-    counts = {name: sum(name in mentions for mentions in attributes) for name in every}
-    return frozenset(name for name in every if 2 * counts[name] >= len(attributes))
+    counts = Counter(chain.from_iterable(attributes))
+    return frozenset(name for name, count in counts.items() if 2 * count >= len(attributes))
 
 
 def common_verbs(sentences: Sequence[str]) -> frozenset[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +17,14 @@ from motet_train.evaluate.language.split_store import SplitStore
 ENOUGH = 20
 """Descriptions needed to choose a limit."""
 
+TIMELINES = 60
+"""Timelines that are measured."""
+
 CHAIN = 3
 """Motions of a timeline."""
 
-SHORTEST, LONGEST = 2.0, 12.0
+SHORTEST = 2.0
+LONGEST = 12.0
 """Seconds that a motion of a timeline lasts."""
 
 Truths = NDArray[np.bool_]
@@ -122,10 +127,8 @@ def timelines_of(model: DescribeModel, corpus: SplitStore, chains: Iterable[Sequ
     return Timelines(joins_found, cuts, moments)
 
 
-def timeline_figures(
-    model: DescribeModel, corpus: SplitStore, records: Sequence[int], seed: int = 0, count: int = 60
-) -> dict[str, float]:
-    """Figures of ``count`` timelines, three motions of 2 to 12 s joined at random, neighbours of different actions.
+def timeline_figures(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> dict[str, float]:
+    """Figures of :data:`TIMELINES`, three motions of 2 to 12 s joined at random, neighbours of different actions.
 
     "joins_found", "cuts_right": the shares of joins with a cut within a second, and of cuts with a join. "parts": how
     many a timeline has. "time_right": the share of time with a right description
@@ -137,15 +140,15 @@ def timeline_figures(
     if not others:
         return {}
     # described as timelines, and each motion alone
-    random = np.random.default_rng(seed)
-    chains = [_chain(others, random) for _ in range(count)]
+    random = np.random.default_rng(0)
+    chains = [_chain(others, random) for _ in range(TIMELINES)]
     timelines = timelines_of(model, corpus, chains, within=1.0)
     right = np.array([action_right(part.text, corpus.sentences(record)) for record, part in timelines.moments])
     sure = np.array([part.confident for _, part in timelines.moments])
     alone = np.concatenate([judged(model, corpus, chain)[1] for chain in chains])
     return {
-        **timelines.cut_shares(count),
-        "parts": timelines.cuts / count + 1,
+        **timelines.cut_shares(TIMELINES),
+        "parts": timelines.cuts / TIMELINES + 1,
         "time_right": share(right),
         "time_confident": share(sure),
         "time_right_if_confident": share(right[sure]),
@@ -202,7 +205,7 @@ def joined(motions: Sequence[Motion]) -> Motion:
 def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) -> int:
     """How many joins have a cut of their own within a time in seconds, matched nearest first."""
     # the nearest pairs first, each join and cut once
-    pairs = sorted((abs(join - cut), join, cut) for join in joins for cut in cuts)
+    pairs = sorted((abs(join - cut), join, cut) for join, cut in product(joins, cuts))
     free_joins = set(joins)
     free_cuts = set(cuts)
     for distance, join, cut in pairs:

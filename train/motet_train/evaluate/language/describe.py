@@ -4,7 +4,7 @@ figures of a describe model as one report."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from typing import TypeVar
 
 import numpy as np
@@ -43,9 +43,9 @@ def bleu(hypotheses: Sequence[str], references: References, marks: bool = False,
     """
     form = f"{SOS} {{}} {EOS}" if marks else "{}"
     texts = [form.format(plain(hypothesis)) for hypothesis in hypotheses]
-    marked = [[form.format(sentence) for sentence in sentences] for sentences in references]
     # sacrebleu takes the first references of all motions, then the second ones
-    streams = [list(stream) for stream in zip_longest(*marked)]
+    marked = (map(form.format, sentences) for sentences in references)
+    streams = list(map(list, zip_longest(*marked)))
     metric = BLEU(smooth_method="none", tokenize="none", force=True, max_ngram_order=longest)
     score: float = metric.corpus_score(texts, streams).score
     return min(score / 100, 1.0)  # rounding may exceed 1
@@ -159,32 +159,35 @@ def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
     # the same on references that are not in training
     copied = corpus.references(nearest_motions(corpus, corpus.motions(test)))
     trained = corpus.trained_sentences()
-    seen = 0
-    for sentences in references:
-        seen += sum(sentence in trained for sentence in sentences)
+    seen = sum(sentence in trained for sentence in chain.from_iterable(references))
     yield _unseen(hypotheses, copied, references, corpus.unseen(test), seen)
 
     # the best description of each motion against the floors
     best = [row[0] for row in hypotheses]
-    score = bleu(best, references)
-    floors = {
-        "nearest": copied_bleu(copied, references),
-        "frequent": bleu([frequent_sentence(corpus)] * len(references), references),
-    }
-    gains = {key: score - floor for key, floor in floors.items()}
-    yield {"floor": {**floors, "human": agreement(references)}, "gain": gains}
+    yield _floors(best, copied, references, frequent_sentence(corpus))
     yield {"words": words_right(best, references), "likelihood": {"test": _log_probability(model, corpus, test)}}
 
+    # what was chosen on validation motions
     validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
     if validation:
         yield {"confidence": confidence(model, corpus, validation)}
         yield {"timeline": timeline_figures(model, corpus, validation)}
 
 
+def _floors(best: Sequence[str], copied: References, references: References, frequent: str) -> Report:
+    """BLEU of copying, of the most frequent sentence and of people, and the gains over the first two."""
+    score = bleu(best, references)
+    floors = {"nearest": copied_bleu(copied, references), "frequent": bleu([frequent] * len(references), references)}
+    gains = {key: score - floor for key, floor in floors.items()}
+    return {"floor": {**floors, "human": agreement(references)}, "gain": gains}
+
+
 def _hypotheses(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> list[list[str]]:
     """The ranked descriptions of each record."""
-    rows = model.describe(corpus.motions(records), RANKS)
-    return [[description.text for description in row] for row in rows]
+    rows = []
+    for row in model.describe(corpus.motions(records), RANKS):
+        rows.append([description.text for description in row])
+    return rows
 
 
 def _table_2(part: str, hypotheses: list[list[str]], references: References) -> Report:

@@ -12,6 +12,7 @@ from motet.models.describe import DescribeModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.search.model import Hit, Index, IndexSettings, Member, SearchModel
+from motet_train.data.errors import DataError
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, description_groups, unknown_words_allowed
@@ -39,29 +40,36 @@ def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeMode
 
 def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None) -> Iterator[Report]:
     groups = np.array(description_groups(corpus.store.records))
-    train_groups = groups[list(corpus.parts.train)]
     queries = _TestQueries.of(corpus, groups)
-    yield {"asked": queries.figures(train_groups)}
+    yield {"asked": queries.figures(groups[list(corpus.parts.train)])}
 
     # motions by sentences: the model, the floor (by words to a training motion, from there by features), and likelihood
     test_motions = corpus.motions(corpus.parts.test)
     yield queries.ranks("", _orders(model, corpus, queries.sentences))
     looks = Looks(corpus)
     query_features = looks.features(corpus.motions(retrieved(corpus, queries.sentences)))
-    test_features = looks.features(test_motions)
-    yield queries.ranks("words_", cdist(query_features, test_features).argsort(axis=1, kind="stable"))
+    distances = cdist(query_features, looks.features(test_motions))
+    yield queries.ranks("words_", distances.argsort(axis=1, kind="stable"))
     if describe is not None:
         scores = _likelihoods(describe, test_motions, queries.sentences)
         yield queries.ranks("likelihood_", (-scores).argsort(axis=1, kind="stable"))
 
     # motions by motions
-    index = _index(model, corpus, corpus.parts.train)
-    by_model = [_places(index.search(motion, 1))[0] for motion in test_motions]
-    train_features = looks.features(corpus.motions(corpus.parts.train))
-    by_features = cdist(test_features, train_features).argmin(axis=1)
     yield {"like": _likeness(model, corpus, groups)}
-    nearest_groups = {"alike": train_groups[by_model], "features_alike": train_groups[by_features]}
-    yield {"motion": _shares(nearest_groups, queries.groups, train_groups)}
+    yield {"motion": _nearest(model, looks, groups, test_motions)}
+
+
+def _nearest(model: SearchModel, looks: Looks, groups: Numbers, test_motions: Sequence[Motion]) -> dict[str, float]:
+    """How often the training motion nearest to a test motion is described like it, by the model and by features."""
+    corpus = looks.corpus
+    train = corpus.parts.train
+    index = _index(model, corpus, train)
+    by_model = [_places(index.search(motion, 1))[0] for motion in test_motions]
+    distances = cdist(looks.features(test_motions), looks.features(corpus.motions(train)))
+
+    train_groups = groups[list(train)]
+    nearest_groups = {"alike": train_groups[by_model], "features_alike": train_groups[distances.argmin(axis=1)]}
+    return _shares(nearest_groups, groups[list(corpus.parts.test)], train_groups)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +86,14 @@ class _TestQueries:
 
     @staticmethod
     def of(corpus: SplitStore, groups: Numbers) -> "_TestQueries":
-        """Those of a corpus. groups: of all its records."""
+        """Those of a corpus; DataError without any. groups: of all its records."""
         test = corpus.parts.test
         rows, sentences = _queries(corpus, test)
+        if not rows:
+            raise DataError(
+                "no sentence to search by: the test motions have none that is not in training and has a word of it; "
+                "give the sentences to measure by the pool test in the table"
+            )
         entries = [corpus.store.records[record] for record in test]
         takes = np.array([entry.take or entry.name for entry in entries])
         return _TestQueries(sentences, rows, takes, groups[list(test)])
@@ -163,7 +176,7 @@ def _first_hits(
         if not matches.all():
             scores.append(hits[int(matches.argmin())].score)
             right.append(False)
-    return np.array(scores), np.array(right)
+    return np.array(scores), np.array(right, dtype=np.bool_)
 
 
 def _queries_of(corpus: SplitStore, part: Sequence[int], kind: str) -> list[tuple[int, str | Motion]]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class SplitStore:
 
     def trained_sentences(self) -> set[str]:
         """The sentences about training motions, normalised."""
-        return {sentence for sentences in self.references(self.parts.train) for sentence in sentences}
+        return set(chain.from_iterable(self.references(self.parts.train)))
 
     def unseen(self, records: Iterable[int]) -> list[tuple[str, ...]]:
         """The sentences of several records that are not in training: the reserved ones and new ones."""
@@ -76,9 +77,8 @@ class SplitStore:
     def words(self, records: Iterable[int]) -> set[str]:
         """The words of the sentences of some records."""
         words: set[str] = set()
-        for sentences in self.references(records):
-            for sentence in sentences:
-                words.update(sentence.split())
+        for sentence in chain.from_iterable(self.references(records)):
+            words.update(sentence.split())
         return words
 
     def people(self, records: Iterable[int]) -> set[str]:

@@ -21,7 +21,9 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import length
 
-ZERO, CONSTANT, DAMPED = "zero velocity", "constant velocity", "damped velocity"
+ZERO = "zero velocity"
+CONSTANT = "constant velocity"
+DAMPED = "damped velocity"
 OF_JOINTS = " of joints"
 """Suffix of a floor that extrapolates the joints' positions, not their rotations and the root."""
 
@@ -29,6 +31,9 @@ FLOORS = (ZERO, CONSTANT, DAMPED, CONSTANT + OF_JOINTS, DAMPED + OF_JOINTS)
 
 DECAYS = np.linspace(0.0, 1.0, 21)
 """The candidates for the damped floors."""
+
+MOST_WINDOWS = 512
+"""Windows on which decays are chosen."""
 
 REPORTED = (1, 3, 7, 9, 13, 24)
 """Output frames whose errors are reported, from 0, as in the protocol of Martinez et al. 2017."""
@@ -195,8 +200,9 @@ def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> di
     return decays
 
 
-def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: int, most: int = 512) -> list[Motion]:
-    """About ``most`` evenly spaced windows of training motions at ``fps``: two frames and the ``frames`` to predict."""
+def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: int) -> list[Motion]:
+    """About :data:`MOST_WINDOWS` evenly spaced windows of training motions at ``fps``: two frames and the ``frames`` to
+    predict."""
     # adjacent stretches of training motions that are long enough after resampling
     frames_needed = int(np.ceil((frames + 1) * store.fps / fps)) + 1
     stretches = []
@@ -209,7 +215,7 @@ def training_windows(store: Store, held_out: Sequence[str], fps: float, frames: 
 
     # evenly spaced ones of these, as playable motions at the wanted rate
     playable = named(store.representation).motion
-    every = max(1, len(stretches) // most)
+    every = max(1, len(stretches) // MOST_WINDOWS)
     windows = []
     for number, start in stretches[::every]:
         stretch = store.motion(number)[start : start + frames_needed]

@@ -12,7 +12,7 @@ slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evalua
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 from tqdm import tqdm
@@ -133,7 +133,9 @@ def _group(model: PredictModel, writer: CodesModel, motions: Sequence[Motion]) -
     report = {"recorded": {"recordings": float(len(motions)), "slide_cm": _slide(inputs)}}
     for system, trajectories in continuations.items():
         report[system] = figures(list(zip(inputs, trajectories, strict=True)))
-    report["samples"] = {key: float(np.mean([sample[key] for sample in samples])) for key in samples[0]}
+    report["samples"] = {}
+    for key in samples[0]:
+        report["samples"][key] = float(np.mean([sample[key] for sample in samples]))
     return report
 
 
@@ -202,7 +204,7 @@ def _mean_distance_cm(points: Sequence[Array]) -> float:
 
 def alive_table(figures: Mapping[str, Figures]) -> str:
     """The figures of several models, by name, as text; "" without any."""
-    kinds = dict.fromkeys(kind for groups in figures.values() for kind in groups)
+    kinds = dict.fromkeys(chain.from_iterable(figures.values()))
     rows: list[Sequence[str]] = []
     for kind in kinds:
         reports = {name: groups[kind] for name, groups in figures.items() if kind in groups}
@@ -229,10 +231,13 @@ def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
         for system in systems:
             rows.append([f"  {CONTINUED[system].format(name=name)}", *_span_cells(report[system])])
         systems = systems[-2:]
+    return rows + _future_rows(reports)
 
-    # how different several futures are
+
+def _future_rows(reports: Mapping[str, Report]) -> list[Sequence[str]]:
+    """How different several futures are."""
     stops = ", ".join(str(stop) for _, stop in SPANS[:2])
-    rows.append(["  joints of different futures apart, cm: in the world, seen from the root"])
+    rows: list[Sequence[str]] = [["  joints of different futures apart, cm: in the world, seen from the root"]]
     for name, report in reports.items():
         rows.append([f"  {name} after {stops} s", *_sample_cells(report["samples"])])
     return rows

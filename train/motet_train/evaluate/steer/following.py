@@ -349,7 +349,7 @@ def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
     """
     # each turn to the left and to the right, half a second longer than is measured
     calm = 0.5
-    angles = np.array([side * turn for turn in TURNS for side in (1, -1)], dtype=np.float64)
+    angles = np.array([side * turn for turn, side in product(TURNS, (1, -1))], dtype=np.float64)
     before = {**AHEAD, "gait": (gait,) * len(angles), "speed": pace}
     after = {**before, "direction": angles, "facing": angles}
     tracks = responses(model, before, after, 4.0 + calm, hold_feet=True)

@@ -6,7 +6,7 @@ joints in each tick is compared with that in the recordings that are played (:cl
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -146,15 +146,15 @@ class Watch:
     @staticmethod
     def joined(parts: list["Watch"]) -> "Watch":
         """Consecutive parts as one."""
-        arrays = {field.name: np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Watch)}
-        return Watch(**arrays)
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return Watch(*map(np.concatenate, columns))
 
 
 class _RandomPlayer:
     """Gives B figures random commands that last 0.2 to 3 s: 15 % of them to stand, half to face the way they go."""
 
-    def __init__(self, model: SteerModel, characters: int, seed: int) -> None:
-        self.rng = np.random.default_rng(seed)
+    def __init__(self, model: SteerModel, characters: int) -> None:
+        self.rng = np.random.default_rng(SEED)
         self.fps = model.fps
         self.names = np.array(model.gaits)
         self.ranges = np.array([model.speeds[name] for name in model.gaits])
@@ -204,11 +204,9 @@ class _RandomPlayer:
         return poses, np.stack(commands)
 
 
-def watched(
-    model: SteerModel, limits: Limits, seconds: float, characters: int, seed: int = SEED, chunk: int = 30
-) -> Watch:
+def watched(model: SteerModel, limits: Limits, seconds: float, characters: int, chunk: int = 30) -> Watch:
     """Watch figures that get random commands, with the foot lock. chunk: ticks that are measured together."""
-    player = _RandomPlayer(model, characters, seed)
+    player = _RandomPlayer(model, characters)
     ticks = round(seconds * model.fps)
     last = player.session.tick()
     parts = []
@@ -322,9 +320,7 @@ class Recorded:
     @staticmethod
     def of(store: Store) -> "Recorded":
         """The recordings of a store; DataError if it is not in ``root_sixd``, or a gait has none."""
-        if store.representation != "root_sixd":
-            wanted = f"in root_sixd (motet prepare --for codes), not {store.representation}"
-            raise DataError(f"figures that are steered are measured beside a store {wanted}")
+        store.needs_sixd("figures that are steered are measured beside a store in")
         return Recorded(held=_with_tracks(store, held=True), plain=_with_tracks(store, held=False))
 
     def standing(self, gait: str, held: bool) -> dict[str, float]:
@@ -405,10 +401,10 @@ def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
     return measures
 
 
-def seldom(model: SteerModel, every: int = 30) -> SteerModel:
-    """The simplest rival: the same model, which searches only every ``every`` ticks, a second, and when a command
-    changes; in between, the best recording is played on, or to its end."""
-    settings = {**asdict(model.settings(SteeringSettings)), "search_every": every}
+def seldom(model: SteerModel) -> SteerModel:
+    """The simplest rival: the same model, which searches only every 30 ticks, a second, and when a command changes; in
+    between, the best recording is played on, or to its end."""
+    settings = {**asdict(model.settings(SteeringSettings)), "search_every": 30}
     manifest = replace(model.manifest, settings={**model.manifest.settings, SteeringSettings.FEATURE: settings})
     return SteerModel(manifest, {}, model.tables)
 

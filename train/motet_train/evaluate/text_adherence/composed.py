@@ -39,7 +39,7 @@ def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
             "split": float(np.mean(split)),
             "whole": float(np.mean(whole)),
             "order": float(np.mean([all(parts) for parts in all_parts])),
-            "parts": float(np.mean([part for parts in all_parts for part in parts])),
+            "parts": float(np.mean(np.concatenate(all_parts))),
         },
         "composed_order": orders,
     }
@@ -56,7 +56,7 @@ def _shown(model: CodesModel, row: Mapping[str, Any], seed: int) -> list[bool]:
         end = generated.passages[-1].stop
         cuts = [[passage.stop / end for passage in generated.passages[:-1]]]
     else:
-        cuts = [[tenth / 10 for tenth in tenths] for tenths in combinations(range(1, 10), count - 1)]
+        cuts = (np.array(list(combinations(range(1, 10), count - 1))) / 10).tolist()
     return max((_shown_between(track, row["parts"], cut) for cut in cuts), key=sum)
 
 

@@ -2,7 +2,7 @@
 
 import inspect
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
@@ -20,12 +20,12 @@ from motet_train.data.store import INDEX, Store
 from motet_train.evaluate.text_adherence import rules
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
-RULES = {
-    name: rule
-    for name, rule in inspect.getmembers(rules, inspect.isfunction)
-    if rule.__module__ == rules.__name__ and not name.startswith("_")
-}
+RULES: dict[str, Callable[..., bool]] = {}
 """Name -> rule: a function of a track and keyword arguments."""
+
+for name, rule in inspect.getmembers(rules, inspect.isfunction):
+    if rule.__module__ == rules.__name__ and not name.startswith("_"):
+        RULES[name] = rule
 
 SHORTEST_MOTION = 0.3
 """Seconds: a shorter motion passes no prompt."""

@@ -16,7 +16,8 @@ WAYS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "right": (1, -1)
 CLEAR = 0.1
 """Metres above which a foot is clearly off the ground; in a run both feet are only for a moment."""
 
-SHORTEST_FLIGHT, LONGEST_FLIGHT = 0.12, 0.9
+SHORTEST_FLIGHT = 0.12
+LONGEST_FLIGHT = 0.9
 """Seconds of a jump: shorter flights are running steps, in longer ones the figure stands on something."""
 
 HANDS = pair("Hand")

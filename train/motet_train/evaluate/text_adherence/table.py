@@ -2,6 +2,7 @@
 space of a search model, R-precision and the distance of generated from recorded motions."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain, combinations
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -76,29 +77,38 @@ def says_table(
     if train_trials:
         sources["_lookup"] = (LookUp(train_trials).generate, 1)
 
-    # the motions of every source for every prompt
-    rows: dict[str, dict[str, Figures]] = {kind: {} for kind in sources}
-    vectors: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
-    for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
-        for kind, (source, count) in sources.items():
-            motions = _motions(source, prompt, count)
-            rows[kind][prompt.text] = _figures(prompt, [track_of(motion) for motion in motions])
-            if search is not None:
-                vectors[kind][prompt.text] = embedded(search, motions)
-
-    # next to recorded trials
+    # every source for every prompt, and what recorded trials show
+    rows, vectors = _measured(sources, search)
     if train_trials:
         rows["_real"] = {prompt.text: _real(prompt, trials) for prompt in prompts()}
-    known = [prompt.text for prompt in prompts() if any(trial.shows(prompt) for trial in train_trials)]
+    known = list(_trials_shown(prompts(), train_trials))
     report: Report = {}
     for kind, figures in rows.items():
         report |= _groups(kind, figures, known)
+
+    # what only trials and a space tell
     if train_trials:
         report["prompt_others"] = {prompt.text: _passed_by_others(prompt, trials) for prompt in prompts()}
         report["quality"] |= _ratios(rows[""], rows["_real"])
     if search is not None:
         report |= space_report(search, prompts(), vectors, trials)
     return report
+
+
+def _measured(
+    sources: Mapping[str, tuple[Generator, int]], search: SearchModel | None
+) -> tuple[dict[str, dict[str, Figures]], dict[str, dict[str, Floats]]]:
+    """For each source, with its number of seeds, and the text of each prompt: the figures of its motions, and their
+    vectors in the space of a search model."""
+    rows: dict[str, dict[str, Figures]] = {kind: {} for kind in sources}
+    vectors: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
+    for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
+        for kind, (source, count) in sources.items():
+            motions = _motions(source, prompt, count)
+            rows[kind][prompt.text] = _figures(prompt, list(map(track_of, motions)))
+            if search is not None:
+                vectors[kind][prompt.text] = embedded(search, motions)
+    return rows, vectors
 
 
 def _passed_by_others(prompt: Prompt, trials: Sequence[Trial]) -> float:
@@ -175,11 +185,8 @@ def poses(track: Track, count: int = 32) -> Array:
 def spread(tracks: Sequence[Track]) -> float:
     """The mean distance of joints, metres, between the :func:`poses` of two of several motions; NaN for fewer than
     two."""
-    track_poses = [poses(track) for track in tracks]
-    distances = []
-    for number, first in enumerate(track_poses):
-        for second in track_poses[:number]:
-            distances.append(length(first - second).mean())
+    pairs = combinations([poses(track) for track in tracks], 2)
+    distances = [length(first - second).mean() for first, second in pairs]
     return float(np.mean(distances)) if distances else np.nan
 
 
@@ -196,13 +203,13 @@ def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
             turns[prompt.text] = rows[prompt.text]["turn"]
     if known:
         groups["known"] = known
-    keys = ("slide", "jerk", "depth", "spread", "seconds")
-    return {
-        f"says{kind}": {name: _mean([shares[text] for text in texts]) for name, texts in groups.items()},
-        f"quality{kind}": {key: _mean([row[key] for row in rows.values()]) for key in keys},
-        f"turn{kind}": turns,
-        f"prompt{kind}": shares,
-    }
+    says = {}
+    for name, texts in groups.items():
+        says[name] = _mean([shares[text] for text in texts])
+    quality = {}
+    for key in ("slide", "jerk", "depth", "spread", "seconds"):
+        quality[key] = _mean([row[key] for row in rows.values()])
+    return {f"says{kind}": says, f"quality{kind}": quality, f"turn{kind}": turns, f"prompt{kind}": shares}
 
 
 def _ratios(generated: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Figures:
@@ -246,7 +253,7 @@ def space_report(
         sets["_real"] = {text: trial_vectors[rows] for text, rows in shown.items()}
     report = {f"r_precision{kind}": _precisions(vectors, candidates, texts) for kind, vectors in sets.items()}
     if shown:
-        all_rows = sorted({row for rows in shown.values() for row in rows})
+        all_rows = sorted(set(chain.from_iterable(shown.values())))
         report["frechet"] = _frechet_figures(made, list(shown), trial_vectors[all_rows])
     return report
 
@@ -297,20 +304,19 @@ def embedded(model: SearchModel, motions: Sequence[Motion]) -> Floats:
 def rivals(candidates: Sequence[Prompt]) -> list[list[int]]:
     """For each prompt the indices of those that ask for something else: no recorded action shows one of the two and
     may show the other."""
-    # which recorded actions show a prompt, and which may
-    names = set(actions().values())
-    shown = [{name for name in names if prompt.shows(name)} for prompt in candidates]
-    maybe_shown = [{name for name in names if prompt.shows(name) is not False} for prompt in candidates]
-    every = range(len(candidates))
-    rows = []
-    for first in every:
-        row = []
-        for second in every:
-            differ = shown[first].isdisjoint(maybe_shown[second]) and shown[second].isdisjoint(maybe_shown[first])
-            if differ and first != second:
-                row.append(second)
-        rows.append(row)
-    return rows
+    # which recorded actions show a prompt (1), and which may (0); others do not (-1)
+    answers = {True: 1, None: 0, False: -1}
+    table = []
+    for prompt in candidates:
+        table.append([answers[prompt.shows(action)] for action in set(actions().values())])
+    shown = np.array(table) == 1
+    maybe_shown = np.array(table) >= 0
+
+    # pairs of which no action shows the first and may show the second, nor the other way round
+    overlap = shown @ maybe_shown.T
+    apart = ~(overlap | overlap.T)
+    np.fill_diagonal(apart, False)
+    return [np.flatnonzero(row).tolist() for row in apart]
 
 
 def r_precision(similarity: Array, rival_similarity: Array) -> dict[str, float]:
@@ -356,7 +362,10 @@ def _precisions(vectors: Vectors, candidates: Sequence[Prompt], texts: Floats) -
         if prompt.text in vectors:
             similarity = (vectors[prompt.text] @ texts.T).astype(np.float64)
             rows.append(r_precision(similarity[:, column], similarity[:, others]))
-    return {top: float(np.mean([row[top] for row in rows])) for top in rows[0]}
+    means = {}
+    for top in rows[0]:
+        means[top] = float(np.mean([row[top] for row in rows]))
+    return means
 
 
 def said_to_be_outside(model: GenerateModel, sentences: Sequence[str]) -> float:

@@ -81,7 +81,8 @@ def train_system(material: Material, job: Job) -> Run:
     material: of text files, as the paper's, or of motion files on the humanoid, which a bundle can continue.
     The weights kept are those with the smallest :func:`validation_error`.
     """
-    visits, kept = possible(job.recipe.visits, material), list(material.kept)
+    visits = possible(job.recipe.visits, material)
+    kept = list(material.kept)
     job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     config = sized(job.recipe, material)
@@ -127,7 +128,8 @@ def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> Gradient
         if not isinstance(config, convseq2seq.Config):
             raise DataError("this system is not trained against an adversary")
         adversary = Adversary(net, convseq2seq.Discriminator(config, PROTOCOL_WINDOW).to(job.device), training)
-        loss, parts = adversary.loss, adversary.parts
+        loss = adversary.loss
+        parts = adversary.parts
     learner = GradientLearner(net, training, loss, batches, validated, net.system.progress, parts)
     return learner
 
@@ -136,20 +138,27 @@ class Adversary:
     """A discriminator of whole windows trained beside a system, as a part of its loss (Li et al. 2018)."""
 
     def __init__(self, net: Stepwise, judge: nn.Module, training: Training) -> None:
-        self.net, self.judge, self.weight = net, judge, training.adversary
+        self.net = net
+        self.judge = judge
+        self.weight = training.adversary
         self.descent = Descent(judge, self._judging, training)
         self.parts: dict[str, Part] = {"judge": judge, "judging": self.descent.optimiser}
 
     def loss(self, windows: Tensor) -> Terms:
         """The discriminator learns (eq. 8), then its loss for the system (eq. 9)."""
-        normal, given = self.net.normalised(windows), self.net.seed_frames
-        predicted = self.net.system.imagine(normal, given)
-        false = torch.cat([normal[:, :given], predicted], dim=1)
+        # the discriminator learns to tell true windows from those that end in predictions
+        normal = self.net.normalised(windows)
+        seed_frames = self.net.seed_frames
+        predicted = self.net.system.imagine(normal, seed_frames)
+        false = torch.cat([normal[:, :seed_frames], predicted], dim=1)
         self.descent.step([(torch.cat([false.detach(), normal]), True)])
+
+        # how clearly it tells them, and how far they are from the truth
         self.judge.requires_grad_(False)
         opinion = softplus(-self.judge(false).float()).mean()
         self.judge.requires_grad_(True)
-        return (Term(self.net.system.error(predicted, normal[:, given:]) + self.weight * opinion, len(windows)),)
+        error = self.net.system.error(predicted, normal[:, seed_frames:])
+        return (Term(error + self.weight * opinion, len(windows)),)
 
     def _judging(self, windows: Tensor) -> Terms:
         """Of false windows and as many true ones (2 B, L + N, D)."""
@@ -163,10 +172,15 @@ def validation_error(net: Stepwise, material: Material) -> float:
 
     Over eight evenly spaced windows of each of the held-out motions, or of all where none could be held out.
     """
-    last = material.stride * (PROTOCOL_WINDOW - 1)
+    # windows of all motions that are long enough
     steps = material.stride * np.arange(PROTOCOL_WINDOW)
-    long = [s for s in material.validation or material.sequences if len(s) > last]
-    cuts = [s[np.linspace(0, len(s) - last - 1, 8).astype(int)[:, None] + steps] for s in long]
+    cuts = []
+    for sequence in material.validation or material.sequences:
+        if len(sequence) > steps[-1]:
+            starts = np.linspace(0, len(sequence) - steps[-1] - 1, 8).astype(int)
+            cuts.append(sequence[starts[:, None] + steps])
+
+    # how far predictions are from them
     windows = torch.from_numpy(np.concatenate(cuts)).to(net.mean.device)
-    off = net(windows[:, :SEED_FRAMES], OUTPUT_FRAMES) - windows[:, SEED_FRAMES:]
-    return float(off[..., list(material.kept[material.held :])].norm(dim=-1).double().mean())
+    errors = net(windows[:, :SEED_FRAMES], OUTPUT_FRAMES) - windows[:, SEED_FRAMES:]
+    return float(errors[..., list(material.kept[material.held :])].norm(dim=-1).double().mean())

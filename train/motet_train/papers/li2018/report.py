@@ -190,20 +190,24 @@ def protocol_table(systems: Errors, corpus: ExpmapCorpus, spreads: Errors | None
     rows = _head(corpus, room)
     if spreads:
         rows.append(("in brackets: the largest seed's minus the smallest's",))
-    titles = {MEAN: f"mean of {', '.join(complete(corpus))}"}
-    titles[EVERY] = f"average of all {len(corpus.layout.test)} actions, 8 windows"
+    titles = {
+        MEAN: f"mean of {', '.join(complete(corpus))}",
+        EVERY: f"average of all {len(corpus.layout.test)} actions, 8 windows",
+    }
+
+    # each part, with all systems that have it
     every = [*systems.items(), *published(corpus).items()]
     first = next(iter(corpus.test))
-    for kind, action in dict.fromkeys(chain.from_iterable(parts for _, parts in every)):
+    for part in dict.fromkeys(chain.from_iterable(parts for _, parts in every)):
+        kind, action = part
         if action in (first, EVERY):
             rows.append(("",))
         if action == first:
             rows.append((KINDS[kind],))
         rows.append((titles.get(action, action),))
         for name, parts in every:
-            if (kind, action) in parts:
-                spread = spreads.get(name, {}).get((kind, action))
-                rows.append((f"  {name}", *_cells(parts[kind, action], spread, room)))
+            if part in parts:
+                rows.append((f"  {name}", *_cells(parts[part], spreads.get(name, {}).get(part), room)))
     return aligned(rows)
 
 
