@@ -152,14 +152,17 @@ class VectorPlaces(nn.Module):
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units to places (B, T, J, 3) in metres."""
-        # the joints around the root, by its rotation and those of all others
+        # the path of the root; gradients add up in another order, to other last bits, if it is computed later
         root = frames[..., self.root]
         facing = root[..., 2].cumsum(1) / self.fps
+        path = self._path(root, facing)
+
+        # the joints around it, by its rotation and those of all others
         turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
         vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(self.parents) - 1, 3)
         local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
         joints = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
-        return joints.reshape(*frames.shape[:-1], -1, 3) + self._path(root, facing)[..., None, :]
+        return joints.reshape(*frames.shape[:-1], -1, 3) + path[..., None, :]
 
     def _path(self, root: Tensor, facing: Tensor) -> Tensor:
         """Places (B, T, 3) of the root by its channels (B, T, 6): it goes where it faced in the frame before."""
