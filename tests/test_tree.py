@@ -104,13 +104,13 @@ CEILINGS = {
     "motet.steering": 37_800,
     "motet.text": 5_300,
     "motet_export": 10_300,
-    "motet_train": 9_400,
-    "motet_train.cli": 8_400,
+    "motet_train": 9_500,
+    "motet_train.cli": 8_500,
     "motet_train.data": 21_900,
-    "motet_train.evaluate": 44_900,
-    "motet_train.models": 20_300,
+    "motet_train.evaluate": 45_100,
+    "motet_train.models": 20_600,
     "motet_train.papers": 41_400,
-    "motet_train.recipes": 14_900,
+    "motet_train.recipes": 15_400,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""
