@@ -88,7 +88,7 @@ def test_while_a_figure_walks_its_upper_body_acts_and_its_legs_go_on(model: Stee
         assert np.array_equal(acted.ground, walked.ground)
         assert np.array_equal(acted.height, walked.height)
         assert np.array_equal(acted.rotations[0, ~UPPER], walked.rotations[0, ~UPPER])
-        playing = session._actions.playing[0]
+        playing = session._state.actions.playing[0]
         if playing and step > 25:
             frame = playing.frame
             arms = UPPER & (np.array(BONES) != "spine")
@@ -105,14 +105,14 @@ def test_legs_go_as_soon_as_they_are_told_to_unless_the_whole_body_was_asked_for
         session = model.start()
         session.act(act_of(model, frames=90, ahead=0.0), upper=upper)
         ticks(session, 20)
-        assert session._actions.whole.all()
+        assert session._state.actions.whole.all()
         session.control(gait="walk", speed=1.3)
         ticks(session, 2)
-        assert session._actions.whole.all() == stays
+        assert session._state.actions.whole.all() == stays
         assert session.acting[0] is not None
         if not stays:
             ticks(session, 30)
-            assert np.hypot(*session._playback.spring[0, :2]) > 1
+            assert np.hypot(*session._state.playback.spring[0, :2]) > 1
 
 
 def test_acts_ten_times_a_second_do_not_leap(model: SteerModel) -> None:

@@ -57,7 +57,7 @@ def test_who_comes_and_who_stays_moves_as_alone(model: SteerModel, hold_feet: bo
             assert crowd.add(places[number]) == [number]
             alone.append(begun(places[number]))
             if by == "advance":  # of the time that the crowd's display is at
-                alone[-1]._ahead = crowd._ahead
+                alone[-1]._state.ahead = crowd._state.ahead
                 alone[-1].advance(0)
             if step < 60:
                 told(crowd, number)
@@ -75,7 +75,7 @@ def test_who_comes_and_who_stays_moves_as_alone(model: SteerModel, hold_feet: bo
             assert crowd.add([places[3], places[4]]) == [1, 2]
             more = [begun(place) for place in places[3:]]
             for one in more if by == "advance" else []:
-                one._ahead = crowd._ahead
+                one._state.ahead = crowd._state.ahead
                 one.advance(0)
             alone += more
         same(moved(crowd), [moved(one) for one in alone])

@@ -5,7 +5,7 @@ import pytest
 
 from motet.figures.humanoid import BONES, sole_points
 from motet.motion.rotations import Array, quat_to_rotmat
-from motet.steering.foot_lock import FootLock
+from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.pose import Pose
 
 DT, HEIGHT = 1 / 30, 0.98
@@ -15,10 +15,11 @@ def soles_of(steps: Array, contact: float, characters: int) -> Array:
     """Points (T, 6, 3) of the soles of the last of some figures in the rest pose, that go through places (T, 3) over
     the ground, x, z and facing."""
     rest = np.tile(np.array([0, 0, 0, 1], np.float32), (characters, len(BONES), 1))
-    lock, found = FootLock(characters, DT), []
+    lock, found = FootLock.none(characters), []
     for step in steps:
         ground, high = np.tile(step, (characters, 1)), np.full(characters, HEIGHT, np.float32)
-        pose = lock.held(Pose(ground, rest, high, np.full((characters, 2), contact, np.float32)))
+        played = Pose(ground, rest, high, np.full((characters, 2), contact, np.float32))
+        lock, pose = lock.update(played, FootLockSettings(), DT)
         turned, places = pose.global_transforms()
         found.append(sole_points(quat_to_rotmat(turned.astype(np.float64)), places)[-1])
     return np.stack(found)

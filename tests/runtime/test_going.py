@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from motet import ControlError, SteerModel, load
-from motet.steering.arrival import Paths
+from motet.steering.paths import Paths
 
 
 @pytest.fixture(scope="module")
@@ -163,10 +163,10 @@ def test_what_is_matched_costs_what_features_differ_and_leads_where_is_asked(mod
 )
 def test_ways_that_make_no_sense_are_refused(model: SteerModel, told: dict[str, Any], said: str) -> None:
     session = model.start(characters=2)
-    before = session.snapshot().guidance
+    before = session.snapshot().going
     with pytest.raises(ControlError, match=said):
         session.go_to(**told)
-    assert session.snapshot().guidance is before
+    assert session.snapshot().going is before
 
 
 @pytest.mark.parametrize(

@@ -161,12 +161,13 @@ def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(m
 )
 def test_points_that_make_no_sense_are_refused(model: SteerModel, points: Any, who: Any, said: str) -> None:
     session = model.start(characters=3)
-    before = session.snapshot().guidance
+    before = session.snapshot()
     with pytest.raises(ControlError, match=said):
         session.look_at(points, who=who)
     with pytest.raises(ControlError, match=said):
         session.reach("left", points, who=who)
-    assert session.snapshot().guidance is before
+    assert session.snapshot().look is before.look
+    assert session.snapshot().left is before.left
     with pytest.raises(ControlError, match="unknown hand 'both'; expected left or right"):
         session.reach("both", (0, 1, 2))  # type: ignore[arg-type]
 

@@ -1,5 +1,6 @@
 """Figures that are steered: they go where they are told, alone as in a crowd, and refuse what makes no sense."""
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -56,8 +57,8 @@ def test_who_flies_lands_as_recorded_whatever_is_told_meanwhile(model: SteerMode
     session.control(gait="walk", speed=[0.2, 0.4, 0.55, 1.4])  # slow walks are played at rates of their own
     rows, rates = [], []
     while session.tick().contacts.max() < 0.1:
-        rows.append(session._playback.row.copy())
-        rates.append(session._playback.rate.copy())
+        rows.append(session._state.playback.row.copy())
+        rates.append(session._state.playback.rate.copy())
     assert len(rows) > 8
     assert (np.diff(rows, axis=0) == 1).all()
     assert np.all(np.array(rates) == 1)
@@ -329,6 +330,17 @@ def test_a_figure_that_is_set_down_goes_where_it_faces(model: SteerModel) -> Non
     session = model.start(places=(0, 0, 90))
     session.control(speed=1.0)
     np.testing.assert_allclose(session.target, [[1, 0, np.pi / 2]], atol=1e-9)
+
+
+def test_a_snapshot_is_the_state_alone(model: SteerModel) -> None:
+    session = model.start()
+    session.control(speed=1.4)
+    session.advance(0.5)
+    assert len(pickle.dumps(session.snapshot())) < 8_000  # the model's tables are 10 MB
+    again = pickle.loads(pickle.dumps(session.snapshot()))
+    other = model.start()
+    other.restore(again)
+    np.testing.assert_array_equal(other.advance(0.3).rotations, session.advance(0.3).rotations)
 
 
 def test_a_snapshot_holds_what_was_told(model: SteerModel) -> None:

@@ -119,7 +119,7 @@ def test_the_rival_searches_seldom(model: SteerModel) -> None:
     assert rival.matcher.reserve > 30
     session = rival.start("walk")
     session.control(speed=1.3)
-    rows = [session.tick() and int(session._playback.row[0]) for _ in range(90)]
+    rows = [session.tick() and int(session._state.playback.row[0]) for _ in range(90)]
     assert np.count_nonzero(np.abs(np.diff(rows)) > 2) <= 3
 
 

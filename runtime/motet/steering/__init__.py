@@ -1,8 +1,7 @@
 """Steered figures: a stick, words or a script become a pose a tick, for one figure or thousands.
 
     command (gait, velocity, facing; a point to go to)
-      -> session.py: within what the gaits allow (gaits.py), towards points (targets.py, path_following.py, arrival.py),
-         around others (avoidance.py)
+      -> session.py: within what the gaits allow (gaits.py), along paths (paths.py), around others (avoidance.py)
       -> matching.py: the recorded row that fits is searched
       -> step.py: the row is played, warped (warping.py) and smoothed, and the root moved
       -> layers over that pose: action_layer.py, idle.py, foot_lock.py, look_layer.py, reach_layer.py

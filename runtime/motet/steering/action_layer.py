@@ -20,7 +20,7 @@ from motet.motion.rotations import Array, conjugate, continuous_rotvec, quat_pro
 from motet.motion.springs import Inertializer
 from motet.steering.acts import Act, ActSettings
 from motet.steering.events import Done
-from motet.steering.matching import TRAJECTORY, Flags, Matcher, Playback, Rows
+from motet.steering.matching import TRAJECTORY, Flags, Matcher, Playback, Rows, Table
 from motet.steering.pose import Pose
 from motet.steering.step import PoseCodes, body
 
@@ -40,7 +40,8 @@ FADED = 1e-4
 """Offsets below this, in radians, metres or metres a second, are invisible and dropped."""
 
 
-class Body(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Body:
     """Bodies of B figures, without their places."""
 
     rotations: NDArray[Any]
@@ -92,18 +93,23 @@ class Playing(NamedTuple):
     """Whether the legs stop playing it as soon as the figure is steered elsewhere."""
 
 
+class ActOrder(NamedTuple):
+    """What a figure is to begin."""
+
+    act: Act | None
+    """None to end the present one."""
+    upper: bool | None
+    """Whether by the upper body alone; None for the whole body where it stands or where the act is one of the legs."""
+
+
 @dataclass(eq=False)
 class ActionLayer:
     """The acts of B figures; arrays are replaced, never written into."""
 
-    matcher: Matcher
-    codes: PoseCodes
-    settings: ActSettings
     playing: list[Playing | None]
     """What each figure plays."""
-    orders: dict[int, tuple[Act | None, bool | None]]
-    """The act that a figure begins in the next tick, None to end the present one; and whether by the upper body alone,
-    None for the whole body where it stands or where the act is one of the legs."""
+    orders: list[ActOrder | None]
+    """What each figure is to begin in the next tick, None to go on."""
     base: Body
     """Bodies of the last tick without acts."""
     shown: Body
@@ -124,18 +130,15 @@ class ActionLayer:
     """(B, 3) the part of the velocity that fades."""
 
     @staticmethod
-    def of(playback: Playback, matcher: Matcher, codes: PoseCodes, settings: ActSettings) -> "ActionLayer":
+    def none(matcher: Matcher, codes: PoseCodes, playback: Playback) -> "ActionLayer":
         """Figures that play no act."""
         played, _ = matcher.table.at(playback)
         figures = len(played)
         shown = Body(*body(codes, playback, played))
         no_offset = np.zeros((figures, 3 * len(BONES) + 1))
         return ActionLayer(
-            matcher,
-            codes,
-            settings,
             playing=[None] * figures,
-            orders={},
+            orders=[None] * figures,
             base=shown,
             shown=shown,
             shown_before=shown,
@@ -149,7 +152,7 @@ class ActionLayer:
 
     def copy(self) -> "ActionLayer":
         """A copy that changes independently."""
-        return replace(self, playing=list(self.playing), orders=dict(self.orders))
+        return replace(self, playing=list(self.playing), orders=list(self.orders))
 
     @property
     def acts(self) -> bool:
@@ -157,141 +160,117 @@ class ActionLayer:
         return self.playing.count(None) < len(self.playing)
 
     @property
-    def done(self) -> tuple[Done | None, ...]:
+    def done(self) -> list[Done | None]:
         """What each figure does."""
-        if not self.acts:
-            return (None,) * len(self.playing)
-        return tuple(playing and Done(playing.act.name, playing.age) for playing in self.playing)
+        return [playing and Done(playing.act.name, playing.age) for playing in self.playing]
 
     @property
     def whole(self) -> Flags:
         """Which figures (B,) play an act with the whole body."""
         return np.array([playing is not None and playing.whole for playing in self.playing])
 
-    def begin(self, playback: Playback, target: Array, gait: Rows) -> Rows:
+    def begin(
+        self,
+        matcher: Matcher,
+        codes: PoseCodes,
+        settings: ActSettings,
+        playback: Playback,
+        target: Array,
+        gait: Rows,
+    ) -> Rows:
         """Before a tick: go on by a frame, begin acts that are ordered, end those that are over. The figures (n,) that
         are shown something else from now on. Legs that no act moves any more continue from the row that fits best.
 
         target: (B, 3) velocity along x and z, and facing. gait: (B,).
         """
-        if not self.orders and not self.acts:
+        if not self.acts and self.orders.count(None) == len(self.orders):
             return np.empty(0, dtype=np.int64)
         changed = list[int]()
         freed = list[int]()
-        freed_features = list[Array]()
         goes = np.hypot(*target[:, :2].T) > 0
-        for figure, before in enumerate(list(self.playing)):
-            ordered = figure in self.orders
-            if before is None and not ordered:
+        before = list(self.playing)
+        for figure, (playing, order) in enumerate(zip(before, self.orders, strict=True)):
+            if playing is None and order is None:
                 continue
-            after = self._next(figure, playback, bool(goes[figure]))
+            if order is None:
+                after = _continued(playing, bool(goes[figure]))
+            else:
+                after = _entered(order, playing, figure, bool(goes[figure]), playback, matcher, settings)
             self.playing[figure] = after
-            if ordered or _jumps(before, after):
+            # a pose jumps where an act begins or ends, or goes on by another part of the body
+            if order is not None or after is None or after.whole != _is_whole(playing):
                 changed.append(figure)
-            if before and _frees_legs(before, after):
+            # legs that an act has led so far are free
+            if _is_whole(playing) and not _is_whole(after):
                 freed.append(figure)
-                freed_features.append(before.act.features[before.frame])
-        self.orders = {}
+        self.orders = [None] * len(before)
         if freed:
-            self._free(np.stack(freed_features), playback, target, gait, np.array(freed))
+            last = [cast(Playing, before[figure]) for figure in freed]
+            features = np.stack([playing.act.features[playing.frame] for playing in last])
+            self._free(features, matcher, codes, playback, target, gait, np.array(freed))
         return np.array(changed, dtype=np.int64)
 
-    def _next(self, figure: int, playback: Playback, goes: bool) -> Playing | None:
-        """What a figure plays in the next tick."""
-        if figure in self.orders:
-            act, upper = self.orders[figure]
-            return None if act is None else self._entered(figure, act, upper, playback, goes)
-        playing = self.playing[figure]
-        if playing is None or playing.frame + 1 >= len(playing.act):
-            return None
-        whole = playing.whole and not (goes and playing.yields)
-        return playing._replace(frame=playing.frame + 1, age=playing.age + 1, whole=whole)
-
-    def _entered(self, figure: int, act: Act, upper: bool | None, playback: Playback, goes: bool) -> Playing:
-        """An act, at the frame after the one that is most like the figure."""
-        moves = goes or np.hypot(*playback.spring[figure, :2]) > self.matcher.settings.idle
-        keeps_moving = moves and act.legs  # its legs go on as it ends
-        whole = (keeps_moving or not moves) if upper is None else not upper
-        # the first frames, compared with the figure as it is now
-        most_skipped = min(round(self.settings.entry * self.matcher.fps), (len(act) - 1) // 3)
-        entries = self._scaled(act.features[: most_skipped + 1])
-        compared = slice(None) if whole else HANDS
-        difference = (entries - self._pose_features(figure, playback))[:, compared]
-        cost = (difference**2).sum(axis=1)
-        return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not keeps_moving)
-
-    def _pose_features(self, figure: int, playback: Playback) -> Array:
-        """The scaled features (F - TRAJECTORY,) of a figure as it is shown."""
-        row = playback.mirror[figure], playback.row[figure]
-        features: Array = self.matcher.table.features[row][TRAJECTORY:].astype(np.float64)
-        playing = self.playing[figure]
-        if playing is not None:
-            acted = slice(None) if playing.whole else HANDS
-            features[acted] = self._scaled(playing.act.features[playing.frame])[acted]
-        return features
-
-    def _scaled(self, features: Array) -> Array:
-        """Features of poses (..., F - TRAJECTORY) as the table has them."""
-        table = self.matcher.table
-        scaled: Array = (features - table.mean[TRAJECTORY:]) * table.scale[TRAJECTORY:]
-        return scaled
-
-    def _free(self, features: Array, playback: Playback, target: Array, gait: Rows, figures: Rows) -> None:
+    def _free(
+        self,
+        features: Array,
+        matcher: Matcher,
+        codes: PoseCodes,
+        playback: Playback,
+        target: Array,
+        gait: Rows,
+        figures: Rows,
+    ) -> None:
         """Let the legs of figures (n,) go on from the rows that fit best after shown poses with features (n, F -
         TRAJECTORY)."""
-        matcher = self.matcher
-        table = matcher.table
         # search from the pose of the act
+        table = matcher.table
         slow_walk = matcher.is_slow_walk(target[figures], gait[figures])
         trajectory = matcher.desired_trajectory(playback, target, slow_walk, figures)
-        trajectory = (trajectory - table.mean[:TRAJECTORY]) * table.scale[:TRAJECTORY]
-        desired = np.concatenate([trajectory, self._scaled(features)], axis=1).astype(np.float32)
-        row, mirror, _ = matcher.best(matcher.query(desired), gait[figures])
+        desired = (np.concatenate([trajectory, features], axis=1) - table.mean) * table.scale
+        row, mirror, _ = matcher.best(matcher.query(desired.astype(np.float32)), gait[figures])
+        # and play the row, as if it had been played in the last tick, too
         playback.restart(figures, row, mirror)
         played, _ = table.at(playback, figures)
-        self.base = self.base.put(figures, Body(*self.codes.decode(played[:, : table.codes])))
+        self.base = self.base.put(figures, Body(*codes.decode(played[:, : table.codes])))
 
-    def update(self, pose: Pose, playback: Playback, root: Array, changed: Rows) -> Pose:
+    def update(
+        self, pose: Pose, playback: Playback, root_before: Array, changed: Rows, settings: ActSettings, fps: float
+    ) -> Pose:
         """After a tick: its pose with acts laid over it, and the playback where they lead.
 
-        root: (B, 3) before the tick. changed: (n,) of :meth:`begin`.
+        root_before: (B, 3) before the tick. changed: (n,) of :meth:`begin`.
         """
-        dt = 1 / self.matcher.fps
+        seconds = 1 / fps
         base_before = self.base
         self.base = Body(pose.rotations, pose.height)
-        step = playback.root - root
+        step = playback.root - root_before
         step[:, 2] = wrapped(step[:, 2])
-        if not len(changed) and self._rests:
-            self._show(self.base, step / dt)
+        # without an act, an order or an offset, poses stay as they are
+        if not (len(changed) or self.acts or self.led.any() or self.offset.any()):
+            self._show(self.base, step / seconds)
             return pose
-        # acts of the whole body lead it over the ground
-        contacts = self._step(playback, root, step, pose.contacts)
-        # the jumps of poses and velocities go into the offsets
+
+        # root motion: acts of the whole body lead it over the ground
+        whole = self.whole
+        contacts = self._step(playback, root_before, step, pose.contacts, whole)
+
+        # transition: jumps of poses and velocities go into the inertialization offsets, which then fade
         if len(changed):
-            self._transition(base_before, step / dt, changed)
-        self.led = self.whole
-        # acts and offsets are laid over the pose
-        figures = self._active()
+            self._transition(base_before, step / seconds, changed, whole, settings, fps)
+        self.led = whole
+        plays = np.array([playing is not None for playing in self.playing])
+        figures = np.flatnonzero(plays | (np.abs(self.offset).max(axis=1) > 0))
         if not len(figures):
-            self._show(self.base, step / dt)
+            self._show(self.base, step / seconds)
             return pose
-        self._fade(dt)
+        self._fade(settings, seconds)
+
+        # overlay: acts and offsets are laid over the pose, and the offset of the velocity over the root's
         acted = self._played(self.base, figures, 0).plus(self.offset[figures])
-        self._show(self.base.put(figures, acted), step / dt + self.velocity_offset)
-        self._drift(playback, dt)
+        self._show(self.base.put(figures, acted), step / seconds + self.velocity_offset)
+        self._drift(playback, seconds)
         rotations = self.shown.rotations.astype(np.float32)
-        height = self.shown.height.astype(np.float32)
-        return replace(pose, ground=playback.root, rotations=rotations, height=height, contacts=contacts)
-
-    @property
-    def _rests(self) -> bool:
-        """Whether there is no act or offset, and poses stay as they are."""
-        return not (self.acts or self.led.any() or self.offset.any())
-
-    def _active(self) -> Rows:
-        """The figures (n,) with an act or an offset."""
-        acts = np.array([playing is not None for playing in self.playing])
-        return np.flatnonzero(acts | (np.abs(self.offset).max(axis=1) > 0))
+        return Pose(playback.root, rotations, self.shown.height.astype(np.float32), contacts)
 
     def _show(self, shown: Body, velocity: Array) -> None:
         """Remember what is shown in this tick."""
@@ -299,36 +278,40 @@ class ActionLayer:
         self.shown = shown
         self.velocity = velocity
 
-    def _step(self, playback: Playback, root: Array, step: Array, contacts: NDArray[Any]) -> NDArray[Any]:
+    def _step(
+        self, playback: Playback, root_before: Array, step: Array, contacts: NDArray[Any], whole: Flags
+    ) -> NDArray[Any]:
         """Let whole bodies go where their acts do, in ``step`` and in the playback, and give the contacts of all."""
         contacts = contacts.copy()
-        for figure in np.flatnonzero(self.whole).tolist():
+        for figure in np.flatnonzero(whole).tolist():
             playing = cast(Playing, self.playing[figure])
-            step[figure] = playing.act.step(playing.frame, root[figure, 2])
+            step[figure] = playing.act.step(playing.frame, root_before[figure, 2])
             contacts[figure] = playing.act.contacts[playing.frame]
-            playback.root[figure] = root[figure] + step[figure]
+            playback.root[figure] = root_before[figure] + step[figure]
         return contacts
 
-    def _transition(self, base_before: Body, velocity: Array, figures: Rows) -> None:
+    def _transition(
+        self, base_before: Body, velocity: Array, figures: Rows, whole: Flags, settings: ActSettings, fps: float
+    ) -> None:
         """Turn the jump in pose of figures (n,) into an inertialization offset: of the upper body, and where an act
         leads the whole body, or led it, of all of it and of the velocities (B, 3).
 
         base_before: bodies of the last tick without acts.
         """
-        offset, offset_rate = self._jump(base_before, figures)
-        # legs that play no act keep their offset
-        leads = (self.led | self.whole)[figures]
+        # the offset of the pose is its jump; legs that play no act keep theirs
+        jump, jump_rate = self._jump(base_before, figures, fps)
+        leads = (self.led | whole)[figures]
         keeps = ~leads[:, None] & BELOW
-        offset = np.where(keeps, self.offset[figures], offset)
-        offset_rate = np.where(keeps, self.offset_rate[figures], offset_rate)
+        offset = np.where(keeps, self.offset[figures], jump)
+        offset_rate = np.where(keeps, self.offset_rate[figures], jump_rate)
         self.offset = _with(self.offset, figures, offset)
         self.offset_rate = _with(self.offset_rate, figures, offset_rate)
-        self.stretch = _with(self.stretch, figures, self._stretch(offset)[:, None])
-        # the jump in velocity
+        self.stretch = _with(self.stretch, figures, _stretch(offset, settings))
+        # that of the velocity is its jump as well
         led = figures[leads]
         self.velocity_offset = _with(self.velocity_offset, led, self.velocity[led] - velocity[led])
 
-    def _jump(self, base_before: Body, figures: Rows) -> tuple[Array, Array]:
+    def _jump(self, base_before: Body, figures: Rows, fps: float) -> tuple[Array, Array]:
         """The jump (n, 3 J + 1) from what figures (n,) now play to what was shown, and how fast it changes."""
         # in the last tick; and in this one, if what was shown had gone on
         shown = self.shown.at(figures)
@@ -338,35 +321,29 @@ class ActionLayer:
         jumps = np.stack([jump_before, jump_now])
         vectors = jumps[..., :-1].reshape(2, -1, 3)
         jumps[..., :-1] = continuous_rotvec(vectors).reshape(2, len(figures), -1)
-        return jumps[0], (jumps[1] - jumps[0]) * self.matcher.fps
+        return jumps[0], (jumps[1] - jumps[0]) * fps
 
-    def _stretch(self, offset: Array) -> Array:
-        """How many times as long as usual offsets (n, 3 J + 1) take to fade (n,): large jumps fade more slowly."""
-        angles = np.linalg.norm(offset[:, :-1].reshape(len(offset), -1, 3), axis=2).max(axis=1)
-        distance = np.maximum(angles, self.settings.height_weight * np.abs(offset[:, -1]))
-        stretch: Array = (distance / self.settings.far).clip(1, self.settings.longest)
-        return stretch
-
-    def _fade(self, dt: float) -> None:
+    def _fade(self, settings: ActSettings, seconds: float) -> None:
         """The offsets a tick later, dropped once they are invisible."""
-        inertializer = Inertializer(self.settings.blend)
-        offset, offset_rate = inertializer.update(self.offset, self.offset_rate, dt, self.stretch)
+        inertializer = Inertializer(settings.blend)
+        offset, offset_rate = inertializer.update(self.offset, self.offset_rate, seconds, self.stretch)
         visible = (np.abs(offset).max(axis=1) > FADED)[:, None]
         self.offset = offset * visible
         self.offset_rate = offset_rate * visible
-        self.velocity_offset = self.velocity_offset * visible * 0.5 ** (dt / self.settings.blend)
+        self.velocity_offset = self.velocity_offset * visible * 0.5 ** (seconds / settings.blend)
 
-    def _drift(self, playback: Playback, dt: float) -> None:
+    def _drift(self, playback: Playback, seconds: float) -> None:
         """Move figures on by the offset of their velocity; the springs of whole bodies that act go as they do."""
         drifts = (self.velocity_offset != 0).any(axis=1)
-        playback.root[drifts] += self.velocity_offset[drifts] * dt
+        playback.root[drifts] += self.velocity_offset[drifts] * seconds
         playback.root[:, 2] = wrapped(playback.root[:, 2])
         playback.spring[self.led] = np.column_stack([self.velocity[self.led, :2], playback.root[self.led, 2]])
         playback.spring_rate[self.led] = 0
 
     def _played(self, base: Body, figures: Rows, back: int) -> Body:
         """What figures (n,) play, over bases of all, ``back`` frames ago."""
-        rotations, height = base.at(figures)
+        bodies = base.at(figures)
+        rotations = bodies.rotations
         for n, figure in enumerate(figures):
             playing = self.playing[figure]
             if playing is None:
@@ -374,23 +351,77 @@ class ActionLayer:
             acted = playing.act.rotations[playing.frame - back]
             if playing.whole:
                 rotations[n] = acted
-                height[n] = playing.act.height[playing.frame - back]
+                bodies.height[n] = playing.act.height[playing.frame - back]
             else:
                 rotations[n, UPPER] = acted[UPPER]
                 # the spine as it is seen from the facing, whatever the hips do
                 spine_from_facing = quat_product(acted[0], acted[SPINE])
                 rotations[n, SPINE] = quat_product(conjugate(rotations[n, 0]), spine_from_facing)
-        return Body(rotations, height)
+        return bodies
 
 
-def _jumps(before: Playing | None, after: Playing | None) -> bool:
-    """Whether a pose jumps, as an act ends or goes on by another part of the body."""
-    return not after or not before or after.whole != before.whole
+def _is_whole(playing: Playing | None) -> bool:
+    return playing is not None and playing.whole
 
 
-def _frees_legs(before: Playing, after: Playing | None) -> bool:
-    """Whether legs that an act has led so far are free."""
-    return before.whole and not (after and after.whole)
+def _continued(playing: Playing | None, goes: bool) -> Playing | None:
+    """The next frame of an act, None after the last. goes: whether the figure is steered."""
+    if playing is None or playing.frame + 1 >= len(playing.act):
+        return None
+    whole = playing.whole and not (goes and playing.yields)
+    return playing._replace(frame=playing.frame + 1, age=playing.age + 1, whole=whole)
+
+
+def _entered(
+    order: ActOrder,
+    before: Playing | None,
+    figure: int,
+    goes: bool,
+    playback: Playback,
+    matcher: Matcher,
+    settings: ActSettings,
+) -> Playing | None:
+    """The act of an order, at the frame after the one that is most like the figure; None for none.
+
+    before: what the figure plays. goes: whether it is steered.
+    """
+    act, upper = order
+    if act is None:
+        return None
+    moves = goes or np.hypot(*playback.spring[figure, :2]) > matcher.settings.idle
+    keeps_moving = moves and act.legs  # its legs go on as it ends
+    whole = bool(keeps_moving or not moves) if upper is None else not upper
+    # the first frames, compared with the figure as it is now
+    most_skipped = min(round(settings.entry * matcher.fps), (len(act) - 1) // 3)
+    entries = _scaled(matcher.table, act.features[: most_skipped + 1])
+    compared = slice(None) if whole else HANDS
+    features = _pose_features(matcher.table, playback, figure, before)
+    cost = ((entries - features)[:, compared] ** 2).sum(axis=1)
+    return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not keeps_moving)
+
+
+def _stretch(offset: Array, settings: ActSettings) -> Array:
+    """How many times as long as usual offsets (n, 3 J + 1) take to fade (n, 1): large jumps fade more slowly."""
+    angles = np.linalg.norm(offset[:, :-1].reshape(len(offset), -1, 3), axis=2).max(axis=1)
+    distance = np.maximum(angles, settings.height_weight * np.abs(offset[:, -1]))
+    stretch: Array = (distance / settings.far).clip(1, settings.longest)[:, None]
+    return stretch
+
+
+def _pose_features(table: Table, playback: Playback, figure: int, playing: Playing | None) -> Array:
+    """The scaled features (F - TRAJECTORY,) of a figure as it is shown."""
+    row = playback.mirror[figure], playback.row[figure]
+    features: Array = table.features[row][TRAJECTORY:].astype(np.float64)
+    if playing is not None:
+        acted = slice(None) if playing.whole else HANDS
+        features[acted] = _scaled(table, playing.act.features[playing.frame])[acted]
+    return features
+
+
+def _scaled(table: Table, features: Array) -> Array:
+    """Features of poses (..., F - TRAJECTORY) as the table has them."""
+    scaled: Array = (features - table.mean[TRAJECTORY:]) * table.scale[TRAJECTORY:]
+    return scaled
 
 
 def _with(values: Array, figures: Rows, changed: Array) -> Array:

@@ -14,7 +14,7 @@ from motet.figures.feet.contacts import SOLES, ContactSettings, contacts_of
 from motet.figures.humanoid import BONES, HUMANOID, ground_under, sole_points
 from motet.motion.rotations import Array, quat_to_rotmat
 from motet.settings import Range, Settings
-from motet.steering.pose import Pose
+from motet.steering.pose import Pose, seen
 from motet.steering.settings import HalfLife, Metres, Radians
 
 
@@ -82,17 +82,13 @@ class Act:
         """The act of frames (T, :data:`WIDTH`), without the rest at both ends. ControlError for fewer than
         :data:`SHORTEST` frames, and for numbers that are not finite or too large."""
         values = _checked(numbers)
-        quats = _unit_quats(values[:, :-4].reshape(len(values), -1, 4))
+        quats = values[:, :-4].reshape(len(values), -1, 4)
+        quats = quats / np.maximum(np.linalg.norm(quats, axis=2, keepdims=True), 1e-6)
         ground = values[:, -4:-1]
         height = values[:, -1]
         # where joints are, and what follows from that
-        both_stand = np.ones((len(values), 2), np.float32)
-        pose = Pose(ground, quats.astype(np.float32), height.astype(np.float32), both_stand)
-        turned, places = pose.global_transforms()
-        contacts = foot_contacts(quat_to_rotmat(turned.astype(np.float64)), places, fps)
-        features = pose_features(places, ground, fps)
+        features, contacts, kept = _measured(quats, height, ground, fps, settings)
         # without the rest at both ends
-        kept = _moving_part(places, fps, settings)
         legs = _uses_legs(height[kept], ground[kept], features[kept], settings)
         return Act(name, quats[kept], height[kept], ground[kept], contacts[kept], features[kept], legs)
 
@@ -133,10 +129,15 @@ def _checked(numbers: Floats) -> Array:
     return numbers.astype(np.float64)
 
 
-def _unit_quats(quats: Array) -> Array:
-    """Quaternions (T, J, 4) of length 1."""
-    units: Array = quats / np.maximum(np.linalg.norm(quats, axis=2, keepdims=True), 1e-6)
-    return units
+def _measured(
+    quats: Array, height: Array, ground: Array, fps: float, settings: ActSettings
+) -> tuple[Array, Array, slice]:
+    """The features and contacts of all frames, and the frames without the rest at both ends."""
+    both_stand = np.ones((len(height), 2), np.float32)
+    pose = Pose(ground, quats.astype(np.float32), height.astype(np.float32), both_stand)
+    turned, places = pose.global_transforms()
+    contacts = foot_contacts(quat_to_rotmat(turned.astype(np.float64)), places, fps)
+    return pose_features(places, ground, fps), contacts, _moving_part(places, fps, settings)
 
 
 def _moving_part(places: Array, fps: float, settings: ActSettings) -> slice:
@@ -171,14 +172,6 @@ def pose_features(places: Array, way: Array, fps: float) -> Array:
     for joint in range(now.shape[1]):
         now[:, joint, [0, 2]] = seen(now[:, joint][:, [0, 2]], way[:, 2])
     return now.reshape(len(now), -1)
-
-
-def seen(vectors: Array, facing: Array) -> Array:
-    """Vectors (T, 2) over the ground, x and z, as left and forward (T, 2) of a facing (T,)."""
-    x, z = vectors.T
-    cos = np.cos(facing)
-    sin = np.sin(facing)
-    return np.stack([cos * x - sin * z, sin * x + cos * z], axis=1)
 
 
 def foot_contacts(turned: Array, places: Array, fps: float, settings: ContactSettings = SOLES) -> Array:

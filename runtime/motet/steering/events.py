@@ -49,7 +49,7 @@ class Happenings:
     """(B,) numbers."""
     arrived: NDArray[np.bool_]
     """(B,) whether they are where they were sent."""
-    done: tuple[Done | None, ...]
+    done: list[Done | None]
     """B acts."""
 
     @staticmethod
@@ -60,7 +60,7 @@ class Happenings:
             air=np.full(figures, -1, dtype=np.int64),
             gait=np.zeros(figures, dtype=np.int64),
             arrived=np.zeros(figures, dtype=bool),
-            done=(None,) * figures,
+            done=[None] * figures,
         )
 
     def after(
@@ -69,20 +69,19 @@ class Happenings:
         gait: NDArray[np.int64],
         shows: NDArray[np.bool_],
         arrived: NDArray[np.bool_],
-        done: tuple[Done | None, ...],
+        done: list[Done | None],
     ) -> "Happenings":
         """A tick later, with contacts (B, 2), ordered gaits (B,), and whether these are played (B,)."""
+        # a foot that is down stays down until it is clearly up
         down = contacts > DOWN
         down |= self.down & (contacts >= UP)
+        # without a foot on the ground in its first tick, a figure flies already
         begins = self.air < 0
         air = np.where(down[:, 0] | down[:, 1], 0, np.where(begins, FLIES, self.air + 1))
         return Happenings(down, air, np.where(shows | begins, gait, self.gait), arrived, done)
 
     def events(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
         """The events since the tick before. gaits: the names of all."""
-        unseen = before.air < 0
-        if unseen.any():
-            before = before._as(self, unseen)
         yield from self._moved(before, gaits)
         if before.done.count(None) + self.done.count(None) == 2 * len(self.done):
             return
@@ -93,18 +92,8 @@ class Happenings:
             if new and begins:
                 yield Event("act begun", character, new.name)
 
-    def _as(self, other: "Happenings", which: NDArray[np.bool_]) -> "Happenings":
-        """With another state of feet, gaits and ways for some figures (B,)."""
-        return Happenings(
-            np.where(which[:, None], other.down, self.down),
-            np.where(which, other.air, self.air),
-            np.where(which, other.gait, self.gait),
-            np.where(which, other.arrived, self.arrived),
-            self.done,
-        )
-
     def _moved(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
-        """Of steps, flights, gaits and ways."""
+        """Steps, flights, gaits and ways, of figures that had a tick before."""
         flies = self.air >= FLIES
         flew = before.air >= FLIES
         flags: dict[Happening, NDArray[np.bool_]] = {
@@ -116,7 +105,7 @@ class Happenings:
             "arrived": self.arrived > before.arrived,
         }
         kinds = list(flags)
-        numbers, characters = np.array(list(flags.values())).nonzero()
+        numbers, characters = (np.array(list(flags.values())) & (before.air >= 0)).nonzero()
         for number, character in zip(numbers.tolist(), characters.tolist(), strict=True):
             kind = kinds[number]
             yield Event(kind, character, gaits[self.gait[character]] if kind == "gait" else "")

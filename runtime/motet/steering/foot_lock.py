@@ -6,14 +6,17 @@ correction fades. Hip, knee and ankle follow (:class:`motet.figures.two_bones.Tw
 how long a foot will stand, is :mod:`motet.figures.feet.hold`.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from motet.figures.humanoid import LEG, SOLE
 from motet.figures.legs import Limb, joints_of, limbs, reached_by, with_legs
+from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import (
     Part,
     Quaternion,
@@ -23,14 +26,14 @@ from motet.motion.scalar_or_batch import (
     plus,
     root,
     rotated,
+    single,
     smaller,
     where,
     yawed,
 )
 from motet.motion.springs import Inertializer
 from motet.settings import Range, Settings
-from motet.steering.matching import Flags
-from motet.steering.pose import Pose
+from motet.steering.pose import Pose, hips_of
 
 
 @dataclass(frozen=True)
@@ -60,147 +63,131 @@ HEEL, BALL = SOLE[LEG[2]]
 POINTS = [(2, HEEL), (2, BALL), (3, TIP)]
 """Points of a sole, heel, ball and tip, and which joint of a leg carries each."""
 
-Pair = tuple[Part, Part]
 
-
-class Foot(NamedTuple):
-    """The correction of a foot."""
-
-    shift: Pair = (0.0, 0.0)
-    """Offset over the ground along x and z, metres."""
-    drift: Pair = (0.0, 0.0)
-    """How fast the shift changes, m/s."""
-    height: Pair = (0.0, 0.0)
-    """How high it steps, and how fast that changes."""
-    soles: tuple[Vector, ...] | None = None
-    """Where the points of its sole were in the last tick, None before the first."""
-
-
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class FootLock:
-    """The lock of B characters."""
+    """The lock of B characters; replaced, never written into."""
 
-    characters: int
-    dt: float
-    """Seconds of a tick."""
-    settings: FootLockSettings = FootLockSettings()
-    feet: tuple[Foot, ...] = (Foot(), Foot())
-    """Those of a single character, left and right, in floats; those of several as one, in float64 arrays (2, B).
-    Replaced, never written into."""
-    new: Flags | None = None
-    """(B,) which of several have not been held yet, None for none."""
+    feet: Array
+    """(B, 2, 15) of the left and the right foot: its offset over the ground, x and z in metres, and how fast that
+    changes; how high it steps, and how fast that changes; and where heel, ball and tip of its sole were in the last
+    tick, x, y and z each, infinite before the first."""
 
-    def held(self, pose: Pose) -> Pose:
-        """The next pose, one tick later, with standing feet held in place and above ground."""
-        hips = _hips(pose)
-        x, z, _ = parts(pose.ground)
-        (height,) = parts(pose.height[:, None])
-        feet = list[Foot]()
-        turns = list[list[Quaternion]]()
-        for foot, limb in zip(self.feet, limbs(pose.rotations, pose.contacts), strict=False):
-            foot_after, leg_turns = self._stood(foot, limb, hips, (x, height, z))
-            feet.append(foot_after)
-            turns.append(leg_turns)
-        self.feet = tuple(feet)
-        self.new = None
-        return Pose(pose.ground, with_legs(pose.rotations, turns), pose.height, pose.contacts)
+    @staticmethod
+    def none(characters: int) -> "FootLock":
+        """Feet that have not been held yet."""
+        feet = np.zeros((characters, 2, 15))
+        feet[:, :, 6:] = math.inf
+        return FootLock(feet)
 
-    def _stood(self, foot: Foot, limb: Limb, hips: Quaternion, place: Vector) -> tuple[Foot, list[Quaternion]]:
-        """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
-        turned, places = joints_of(limb, hips, place)
-        soles = _soles(turned, places)
-        foot_after, lift = self._shifted(foot, soles, limb.contact)
-        played = limb.local[:3]
-        shift_x, shift_z = foot_after.shift
-        moves = (shift_x != 0) | (shift_z != 0) | (lift > 0)
-        if moves is False:
-            return foot_after, played
-        # the leg reaches for the corrected ankle
-        x, y, z = places[2]
-        reached = reached_by(hips, turned, places, (x + shift_x, y + lift, z + shift_z))
-        if moves is True or moves.all():
-            return foot_after, reached
-        return foot_after, [_chosen(moves, *pair) for pair in zip(reached, played, strict=True)]
+    def update(self, pose: Pose, settings: FootLockSettings, seconds: float) -> tuple["FootLock", Pose]:
+        """A tick later, and the pose of that tick with standing feet held in place and above ground."""
+        half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
+        sine = single(np.sin(half_facing))
+        cosine = single(np.cos(half_facing))
+        hips = yawed(parts(pose.rotations[:, 0]), sine, cosine)
+        place = hips_of(pose)
+        feet = list[list[Part]]()
+        legs = list[list[Quaternion]]()
+        for foot_before, limb in zip(self._feet, limbs(pose.rotations, pose.contacts), strict=True):
+            foot, leg = _held(foot_before, limb, hips, place, settings, seconds)
+            feet.append(foot)
+            legs.append(leg)
+        numbers: Array = np.array(feet)
+        lock = FootLock(numbers[None] if len(pose) == 1 else numbers[0].transpose(2, 1, 0))
+        return lock, replace(pose, rotations=with_legs(pose.rotations, legs))
 
-    def _shifted(self, foot: Foot, soles: tuple[Vector, ...], contact: Part) -> tuple[Foot, Part]:
-        """A foot a tick later, and by how much it is lifted above where it is played."""
-        settings = self.settings
-        swing_step = settings.swings * self.dt
-        move_x, move_z, lowest = self._sole_move(foot, soles)
-
-        # a foot that stands stays where it was: its move since the last tick is taken from its offset
-        held_x = foot.shift[0] - move_x
-        held_z = foot.shift[1] - move_z
-        near = _length(held_x, held_z) < settings.farthest
-        slow = _length(move_x, move_z) < swing_step
-        stands = (contact > settings.stands) & near & slow
-
-        # one that does not stand returns to where it is played
-        fade = Inertializer(settings.fade)
-        faded_x, fade_rate_x = fade.update(foot.shift[0], foot.drift[0], self.dt)
-        faded_z, fade_rate_z = fade.update(foot.shift[1], foot.drift[1], self.dt)
-        shift_x = where(stands, held_x, faded_x)
-        shift_z = where(stands, held_z, faded_z)
-        drift_x = where(stands, 0.0, fade_rate_x)
-        drift_z = where(stands, 0.0, fade_rate_z)
-
-        # a foot that moves over the ground while it is marked as a contact steps
-        moved = _length(shift_x - held_x, shift_z - held_z)
-        height = self._step_height(foot, moved, contact)
-        foot_after = Foot((shift_x, shift_z), (drift_x, drift_z), height, soles)
-        # no point of the sole is below the ground
-        return foot_after, larger(height[0] - lowest, 0.0)
-
-    def _step_height(self, foot: Foot, moved: Part, contact: Part) -> Pair:
-        """How high a foot steps that has moved over the ground, higher the faster, and how fast that changes."""
-        settings = self.settings
-        goal = contact * smaller(moved * (settings.steps / (settings.swings * self.dt)), settings.steps)
-        error, rate = Inertializer(settings.lifts).update(foot.height[0] - goal, foot.height[1], self.dt)
-        return goal + error, rate
-
-    def _sole_move(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Part, Part, Part]:
-        """How far the point that bears a foot has moved over the ground since the last tick, along x and z; and the
-        height of the lowest point."""
-        heel, ball, tip = soles
-        heel_before, ball_before, tip_before = self._soles_before(foot, soles)
-        # the ball bears the foot, unless the heel or the tip is clearly lower
-        move_x = ball[0] - ball_before[0]
-        move_z = ball[2] - ball_before[2]
-        lowest = ball[1]
-        bearing_height = ball[1] - self.settings.bears
-        for point, point_before in ((heel, heel_before), (tip, tip_before)):
-            bears = point[1] < bearing_height
-            lowest = smaller(lowest, point[1])
-            bearing_height = where(bears, point[1], bearing_height)
-            move_x = where(bears, point[0] - point_before[0], move_x)
-            move_z = where(bears, point[2] - point_before[2], move_z)
-        return move_x, move_z, lowest
-
-    def _soles_before(self, foot: Foot, soles: tuple[Vector, ...]) -> tuple[Vector, ...]:
-        """Where the points of a sole were; those of new characters where they are now."""
-        if foot.soles is None:
-            return soles
-        if self.new is None:
-            return foot.soles
-        return tuple(_chosen(self.new, *pair) for pair in zip(soles, foot.soles, strict=True))
+    @property
+    def _feet(self) -> Any:
+        """The two feet of one character in floats; those of several as one foot, in arrays (2, B)."""
+        return self.feet[0].tolist() if len(self.feet) == 1 else [self.feet.transpose(2, 1, 0)]
 
 
-def _hips(pose: Pose) -> Quaternion:
-    """Rotation of the hips in the world."""
-    half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
-    sine, cosine = parts(np.array([np.sin(half_facing), np.cos(half_facing)]).T)
-    return yawed(parts(pose.rotations[:, 0]), sine, cosine)
+def _held(
+    foot_before: Sequence[Part],
+    limb: Limb,
+    hips: Quaternion,
+    place: Vector,
+    settings: FootLockSettings,
+    seconds: float,
+) -> tuple[list[Part], list[Quaternion]]:
+    """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
+    # the foot as it is played, and how it is corrected
+    turned, places = joints_of(limb, hips, place)
+    sole = [plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS]
+    foot = _corrected(foot_before, sole, limb.contact, settings, seconds)
+    shift_x, shift_z, _, _, height, *_ = foot
+    # no point of the sole is below the ground
+    heel, ball, tip = sole
+    lift = larger(height - smaller(smaller(ball[1], heel[1]), tip[1]), 0.0)
+    moves = (shift_x != 0) | (shift_z != 0) | (lift > 0)
+    if moves is False:
+        return foot, limb.local[:3]
+    # the leg reaches for the corrected ankle
+    reached = reached_by(hips, turned, places, plus(places[2], (shift_x, lift, shift_z)))
+    if moves is True or moves.all():
+        return foot, reached
+    # of several, the legs of those that are not corrected stay as they are, to the bit
+    return foot, list(np.where(moves, reached, limb.local[:3]))
 
 
-def _soles(turned: Sequence[Quaternion], places: Sequence[Vector]) -> tuple[Vector, ...]:
-    """Where the points of a sole are, of rotations and places of a leg's joints."""
-    return tuple(plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS)
+def _corrected(
+    foot_before: Sequence[Part], sole: Sequence[Vector], contact: Part, settings: FootLockSettings, seconds: float
+) -> list[Part]:
+    """The correction of a foot a tick later, as :attr:`FootLock.feet` has it."""
+    shift_x, shift_z, drift_x, drift_z, height, rise, *sole_before = foot_before
+    move_x, move_z = _sole_move(sole, sole_before, settings.bears)
+
+    # hold: a foot that stands stays where it was, so its move since the last tick is taken from its offset; fade: the
+    # offset of one that swings returns to 0
+    held_x = shift_x - move_x
+    held_z = shift_z - move_z
+    near = _length(held_x, held_z) < settings.farthest
+    slow = _length(move_x, move_z) < settings.swings * seconds
+    stands = (contact > settings.stands) & near & slow
+    fade = Inertializer(settings.fade)
+    shift_x, drift_x = _held_or_faded(stands, held_x, shift_x, drift_x, fade, seconds)
+    shift_z, drift_z = _held_or_faded(stands, held_z, shift_z, drift_z, fade, seconds)
+
+    # step: a foot that moves over the ground while it is marked as a contact is lifted
+    moved = _length(shift_x - held_x, shift_z - held_z)
+    height, rise = _stepped(height, rise, contact, moved, settings, seconds)
+    return [shift_x, shift_z, drift_x, drift_z, height, rise, *chain.from_iterable(sole)]
+
+
+def _held_or_faded(
+    stands: Part, held: Part, shift: Part, drift: Part, fade: Inertializer, seconds: float
+) -> tuple[Part, Part]:
+    """A foot's offset along an axis, and its rate: where it is held, or on its way back to where it is played."""
+    faded, fade_rate = fade.update(shift, drift, seconds)
+    return where(stands, held, faded), where(stands, 0.0, fade_rate)
+
+
+def _stepped(
+    height: Part, rise: Part, contact: Part, moved: Part, settings: FootLockSettings, seconds: float
+) -> tuple[Part, Part]:
+    """How high a foot steps that has moved over the ground, higher the faster, and how fast that changes."""
+    goal = contact * smaller(moved * (settings.steps / (settings.swings * seconds)), settings.steps)
+    error, rise = Inertializer(settings.lifts).update(height - goal, rise, seconds)
+    return goal + error, rise
+
+
+def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float) -> tuple[Part, Part]:
+    """How far the point that bears a foot has moved over the ground since the last tick, along x and z."""
+    heel, ball, tip = sole
+    # the ball bears the foot, unless the heel or the tip is lower by ``bears``
+    move_x = ball[0] - sole_before[3]
+    move_z = ball[2] - sole_before[5]
+    bearing_height = ball[1] - bears
+    for point, point_before in ((heel, sole_before[:3]), (tip, sole_before[6:])):
+        is_bearing = point[1] < bearing_height
+        bearing_height = where(is_bearing, point[1], bearing_height)
+        move_x = where(is_bearing, point[0] - point_before[0], move_x)
+        move_z = where(is_bearing, point[2] - point_before[2], move_z)
+    # before the first tick a foot has not moved
+    is_new = sole_before[0] == math.inf
+    return where(is_new, 0.0, move_x), where(is_new, 0.0, move_z)
 
 
 def _length(x: Part, z: Part) -> Part:
     return root(x * x + z * z)
-
-
-def _chosen(condition: Part, yes: tuple[Part, ...], no: tuple[Part, ...]) -> tuple[Part, ...]:
-    """A vector or quaternion, or another, by a condition."""
-    return tuple(where(condition, this, other) for this, other in zip(yes, no, strict=True))

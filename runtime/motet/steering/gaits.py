@@ -48,6 +48,13 @@ class Gaits:
             raise ControlError(f"unknown gait {name!r}; expected one of {', '.join(self.names)}")
         return self.names.index(name)
 
+    def usual(self, numbers: Rows) -> Array:
+        """The usual speeds (n,) of gaits (n,); ControlError for a gait that goes nowhere."""
+        for number in numbers[self.speeds[numbers, 2] == 0].tolist():
+            raise ControlError(f"{self.names[number]!r} goes nowhere: give a gait such as {self.names[0]!r}")
+        usual: Array = self.speeds[numbers, 1]
+        return usual
+
     def target(self, command: "Command") -> tuple[Array, list[tuple[str, str]]]:
         """A command's velocity along x and z, m/s, and its facing, radians, (B, 3), within limits; and gait and message
         for each figure whose command exceeds them."""
@@ -58,13 +65,16 @@ class Gaits:
         speed = np.where(moving, np.clip(command.speed, lowest, highest), 0.0)
         x = speed * np.sin(command.direction)
         z = speed * np.cos(command.direction)
-        # what is out of range
+        return np.stack([x, z, wrapped(facing)], axis=1), self._exceeding(command, speed, lowest, highest)
+
+    def _exceeding(self, command: "Command", speed: Array, lowest: Array, highest: Array) -> list[tuple[str, str]]:
+        """Gait and message for each figure whose command exceeds the limits (B,) of speeds (B,)."""
         exceeding = list[tuple[str, str]]()
         for figure in np.flatnonzero(np.abs(speed - command.speed) > 1e-6).tolist():
             name = self.names[command.gait[figure]]
-            limits = lowest[figure], highest[figure]
-            exceeding.append((name, _exceeds(name, limits, command.speed[figure])))
-        return np.stack([x, z, wrapped(facing)], axis=1), exceeding
+            limits = f"{lowest[figure]:g}-{highest[figure]:g} m/s in this direction"
+            exceeding.append((name, f"{name!r} allows 0 or {limits}, not {command.speed[figure]:g}"))
+        return exceeding
 
     def _facing(self, command: "Command") -> Array:
         """The facings (B,) of a command: gaits that only go forward face the way they go, or nearly."""
@@ -100,12 +110,6 @@ class Gaits:
         return near
 
 
-def _exceeds(name: str, limits: tuple[float, float], speed: float) -> str:
-    """The message about a gait's speed that is out of its limits."""
-    lowest, highest = limits
-    return f"{name!r} allows 0 or {lowest:g}-{highest:g} m/s in this direction, not {speed:g}"
-
-
 @dataclass(frozen=True, eq=False)
 class Command:
     """The last command to B figures; its arrays are never modified."""
@@ -121,11 +125,7 @@ class Command:
     faces_way: Flags
     """(B,) whether they are to face the way they move."""
 
-    def changed(self, gait: Rows | None = None, **values: Array) -> "Command":
-        """With new speeds, directions and facings. Given a direction but no facing, they face it once they move."""
-        faces_way = self.faces_way
-        if values.keys() & {"direction", "facing"}:
-            faces_way = np.full_like(faces_way, "facing" not in values)
-        command = replace(self, gait=self.gait if gait is None else gait, faces_way=faces_way, **values)
-        turns = faces_way & (command.speed > 0)
-        return replace(command, facing=np.where(turns, command.direction, command.facing))
+    def turned(self) -> "Command":
+        """With the facings of those that move and are to face the way they do."""
+        turns = self.faces_way & (self.speed > 0)
+        return replace(self, facing=np.where(turns, self.direction, self.facing))

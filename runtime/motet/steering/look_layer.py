@@ -19,7 +19,7 @@ from motet.motion.scalar_or_batch import Quaternion, Vector, inverse, minus, par
 from motet.settings import Settings
 from motet.steering.follower import Follower
 from motet.steering.matching import Flags
-from motet.steering.pose import Pose
+from motet.steering.pose import Pose, frame_of
 from motet.steering.settings import HalfLife, Metres, Radians
 
 
@@ -45,7 +45,6 @@ class LookSettings(Settings):
     """Half-life in which the gaze catches up with more: at most 300 degrees a second, in a turn by 100."""
 
 
-TRUNK = ("hips", "spine")
 SHARES = {"chest": 0.1, "upperChest": 0.25, "neck": 0.55, "head": 1.0}
 """Bones that turn -> the share of the turn that each and those below it make together."""
 
@@ -70,7 +69,7 @@ class LookLayer:
     """(B, 2) angles by which their heads are turned to the left and up, beyond what is played."""
 
     @staticmethod
-    def ahead(figures: int) -> "LookLayer":
+    def none(figures: int) -> "LookLayer":
         """Figures that look at nothing."""
         return LookLayer(np.full((figures, 3), np.nan), Follower.at(np.zeros((figures, 2))))
 
@@ -122,14 +121,7 @@ class LookLayer:
 
 def _in_spine(pose: Pose, points: Array) -> tuple[list[Quaternion], Vector]:
     """In the frame of the lower spine: rotations of the bones of :data:`SHARES`, and points (B, 3)."""
-    x, z, _ = parts(pose.ground)
-    (height,) = parts(pose.height[:, None])
-    place: Vector = (x, height, z)
-    above: Quaternion = parts(pose.heading)
-    for bone in TRUNK:
-        offset = (0.0, 0.0, 0.0) if bone == "hips" else OFFSETS[bone]
-        place = plus(place, rotated(above, offset))
-        above = product(above, _local(pose, bone))
+    place, above = frame_of(pose, ("spine",))
     turned = STILL
     bones = list[Quaternion]()
     for bone in SHARES:

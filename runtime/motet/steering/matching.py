@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Floats
 from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import Inertializer, damped, damped_path, damping_of
+from motet.steering.pose import seen
 from motet.steering.settings import SteeringSettings
 
 Rows = NDArray[np.int64]
@@ -343,17 +344,13 @@ class Matcher:
         trajectory = self.desired_trajectory(playback, target, slow_walk, due)
         query = self.query(self.desired_features(trajectory, row, mirror))
         best, best_mirror, best_cost = self.best(query, gait)
-        # the present row is kept if the best one is near it or hardly better
+        # the present row is kept if the best one is hardly better, or so near that playback would loop on the spot
         cheap = self.cost_at(query, row, mirror) <= best_cost + np.where(slow_walk, 0, self.settings.continuing)
-        fits = self.table.shows[row, gait] & (self._is_near(best, row) | cheap)
+        near = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)
+        fits = self.table.shows[row, gait] & (near | cheap)
         # never leave a row in mid-air; always leave one whose recording is about to end
         stays = (self.flies[row] | fits) & (self.table.left[row] >= self.reserve)
         self.jump(playback, due[~stays], best[~stays], best_mirror[~stays])
-
-    def _is_near(self, best: Rows, row: Rows) -> Flags:
-        """Whether rows (n,) are too near to the present ones (n,) to be jumped to, mirrored or not."""
-        near: Flags = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)
-        return near
 
     def is_slow_walk(self, target: Array, gait: Rows) -> Flags:
         """Which figures with targets (n, 3) in gaits (n,) are to go more slowly than recordings do."""
@@ -372,42 +369,33 @@ class Matcher:
         velocity_damping = damping_of(settings.velocity)
         facing_damping = damping_of(settings.facing)
         facing = playback.root[figures, 2]
-        cos = np.cos(facing)
-        sin = np.sin(facing)
 
         # springs and targets, those of slow walks at the pace of recordings
         spring = playback.spring[figures]
         spring_factor = pace_factors(spring, slow_walk, settings.creep)
         target = target[figures]
         target = target * pace_factors(target, slow_walk, settings.creep)
-        target_velocity = target[:, :2]
 
         # how far the springs are from the targets, and how fast that changes
         error = spring * spring_factor - target
-        velocity_error = error[:, :2]
-        facing_error = wrapped(error[:, 2])
+        error[:, 2] = wrapped(error[:, 2])
         error_rate = playback.spring_rate[figures] * spring_factor
-        velocity_error_rate = error_rate[:, :2]
-        facing_error_rate = error_rate[:, 2]
 
         # places and facings at each horizon, as seen from the figure
         places = list[Array]()
         facings = list[Array]()
         times = horizons(settings)
         for time in times:
-            catching_up = damped_path(velocity_error, velocity_error_rate, velocity_damping, time)
-            x, z = (target_velocity * time + catching_up).T
-            left = cos * x - sin * z
-            forward = sin * x + cos * z
-            places += [left, forward]
-            facing_left, _ = damped(facing_error, facing_error_rate, facing_damping, time)
+            catching_up = damped_path(error[:, :2], error_rate[:, :2], velocity_damping, time)
+            places.append(seen(target[:, :2] * time + catching_up, facing))
+            facing_left, _ = damped(error[:, 2], error_rate[:, 2], facing_damping, time)
             turn = target[:, 2] + facing_left - facing
             facings += [np.sin(turn), np.cos(turn)]
 
         # the speed at the second horizon
-        velocity_left, _ = damped(velocity_error, velocity_error_rate, velocity_damping, times[1])
-        speed = np.hypot(*(target_velocity + velocity_left).T)
-        return np.stack([*places, *facings, speed_feature(speed, settings)], axis=1)
+        velocity_left, _ = damped(error[:, :2], error_rate[:, :2], velocity_damping, times[1])
+        speed = np.hypot(*(target[:, :2] + velocity_left).T)
+        return np.column_stack([*places, *facings, speed_feature(speed, settings)])
 
     def desired_features(self, trajectory: Array, row: Rows, mirror: Rows) -> Floats:
         """Features (n, F) of trajectories (n, TRAJECTORY) that are not yet scaled, from the poses of rows (n,)."""

@@ -22,13 +22,13 @@ from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
 from motet.settings import checked_int
 from motet.steering.acts import Act, ActSettings
-from motet.steering.arrival import ArrivalSettings
 from motet.steering.avoidance import AvoidanceSettings
 from motet.steering.foot_lock import FootLockSettings
 from motet.steering.gaits import Gaits
 from motet.steering.idle import IdleSettings
 from motet.steering.look_layer import LookSettings
 from motet.steering.matching import FEATURES, Matcher, Playback, Rows, Table
+from motet.steering.paths import ArrivalSettings
 from motet.steering.pose import Pose
 from motet.steering.reach_layer import ReachSettings
 from motet.steering.scripts import parse_orders
@@ -79,19 +79,22 @@ class SteerModel(ControlModel):
         if self.contract.channels != CHANNELS:
             raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
-        self.matcher = Matcher(self._table(config), settings, self.fps)
-        self.pose_codes = PoseCodes(
-            self.table("pose_mean", "P", "float32").astype(np.float64),
-            self.table("pose_basis", "K P", "float16").astype(np.float64),
-        )
-        self._check_goals()
+        self.matcher = self._matcher(config, settings)
+        self.pose_codes = self._pose_codes()
 
-    def _check_goals(self) -> None:
-        """BundleError for a gait without a row to jump to."""
-        for gait, goals in zip(self.gaits, self.matcher.goals, strict=True):
+    def _pose_codes(self) -> PoseCodes:
+        mean = self.table("pose_mean", "P", "float32")
+        basis = self.table("pose_basis", "K P", "float16")
+        return PoseCodes(mean.astype(np.float64), basis.astype(np.float64))
+
+    def _matcher(self, config: Fields, settings: SteeringSettings) -> Matcher:
+        """The search of the table; BundleError for a gait without a row to jump to."""
+        matcher = Matcher(self._table(config), settings, self.fps)
+        for gait, goals in zip(self.gaits, matcher.goals, strict=True):
             if not len(goals.rows):
-                need = self.matcher.least_left
+                need = matcher.least_left
                 raise BundleError(f"table left: no row of {gait!r} is followed by {need} more of its recording")
+        return matcher
 
     def _table(self, config: Fields) -> Table:
         codes = self.table("codes", "N K", "float16")

@@ -1,5 +1,6 @@
 """Live figures: the pose of characters at one moment, for engines."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array, quat_product, quat_rotated, wrapped
+from motet.motion.scalar_or_batch import Quaternion, Vector, parts, plus, product, rotated
 from motet.steering.events import Event
 
 Floats = NDArray[np.float32]
@@ -67,10 +69,7 @@ class Pose:
         """Root motion (B, 3) since an earlier pose: forward and to the left in metres, seen from the facing then, and
         the turn to the left in radians."""
         step = self.ground - before.ground
-        sin = np.sin(before.ground[:, 2])
-        cos = np.cos(before.ground[:, 2])
-        forward = sin * step[:, 0] + cos * step[:, 1]
-        left = cos * step[:, 0] - sin * step[:, 1]
+        left, forward = seen(step[:, :2], before.ground[:, 2]).T
         return np.stack([forward, left, wrapped(step[:, 2])], axis=1)
 
     def positions(self) -> Array:
@@ -110,3 +109,28 @@ class Pose:
             contacts=self.contacts + share * (other.contacts - self.contacts),
             events=(),
         )
+
+
+def seen(vectors: Array, facing: Array) -> Array:
+    """Vectors (n, 2) over the ground, x and z, as left and forward (n, 2) of a facing (n,)."""
+    x, z = vectors.T
+    cos = np.cos(facing)
+    sin = np.sin(facing)
+    return np.stack([cos * x - sin * z, sin * x + cos * z], axis=1)
+
+
+def hips_of(pose: Pose) -> Vector:
+    """Where the hips are in the world."""
+    x, z, _ = parts(pose.ground)
+    (height,) = parts(pose.height[:, None])
+    return x, height, z
+
+
+def frame_of(pose: Pose, bones: Sequence[str]) -> tuple[Vector, Quaternion]:
+    """Place and rotation in the world of the last of bones, each of which carries the next, and the hips the first."""
+    place = hips_of(pose)
+    rotation = product(parts(pose.heading), parts(pose.rotations[:, 0]))
+    for bone in bones:
+        place = plus(place, rotated(rotation, HUMANOID.joints[HUMANOID.index(bone)].offset))
+        rotation = product(rotation, parts(pose.rotations[:, BONES.index(bone)]))
+    return place, rotation

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT, sided
+from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT, SPINE, sided
 from motet.figures.two_bones import TwoBones
 from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import (
@@ -37,7 +37,7 @@ from motet.motion.scalar_or_batch import (
 from motet.settings import Range, Settings
 from motet.steering.follower import Follower
 from motet.steering.matching import Flags
-from motet.steering.pose import Floats, Pose
+from motet.steering.pose import Floats, Pose, frame_of
 from motet.steering.settings import HalfLife, Metres, Radians, Share
 
 
@@ -63,7 +63,6 @@ class ReachSettings(Settings):
     """Half-life in which a hand gets to a new point, and back."""
 
 
-SPINE = ("spine", "chest", "upperChest")
 PARTS = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 
 PALM = 0.09
@@ -89,7 +88,7 @@ class ReachLayer:
     """(B,) whether the point was out of reach in the last tick."""
 
     @staticmethod
-    def idle(side: int, figures: int) -> "ReachLayer":
+    def none(side: int, figures: int) -> "ReachLayer":
         """Hands that reach for nothing."""
         return ReachLayer(
             side,
@@ -144,20 +143,18 @@ def _reached(
 ) -> tuple[tuple[Quaternion, Quaternion], Flags]:
     """Rotations of upper arms and forearms in their parents' frames, with the hands on the way to points (B, 3) as far
     as weights (B,) say; and whether these are out of reach (B,)."""
-    bones = [BONES.index(sided(LEFT_RIGHT[side], part)) for part in PARTS]
-    offsets = [HUMANOID.joints[HUMANOID.index(BONES[bone])].offset for bone in bones]
-    shoulder, upper, lower, hand = (parts(pose.rotations[:, bone]) for bone in bones)
+    bones = [sided(LEFT_RIGHT[side], part) for part in PARTS]
+    offsets = [HUMANOID.joints[HUMANOID.index(bone)].offset for bone in bones]
+    shoulder, upper, lower, hand = (parts(pose.rotations[:, BONES.index(bone)]) for bone in bones)
     # from the shoulder to the point, in the frame of the upper chest
-    arm_start = plus(offsets[0], rotated(shoulder, offsets[1]))
-    to_point = minus(_in_chest(pose, points), arm_start)
+    chest_place, chest = frame_of(pose, SPINE)
+    point = rotated(inverse(chest), minus(parts(points), chest_place))
+    to_point = minus(point, plus(offsets[0], rotated(shoulder, offsets[1])))
     # the arm that is forward and half bent, brought as near as it can
     palm = plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0)))
     arm = _ready_arm(side, offsets[2], palm)
     reachable = _within(to_point, side, arm.longest, settings)
-    turn_upper, turn_lower = arm.turns(reachable)
-    ready_upper, ready_lower = READY[side]
-    reaching_upper = product(turn_upper, ready_upper)
-    reaching_lower = product(turn_lower, ready_lower)
+    reaching_upper, reaching_lower = map(product, arm.turns(reachable), READY[side])
     # mixed with the recorded arm, in the frames of the parents
     (share,) = parts(weight[:, None])
     mixed_upper = _mixed(upper, product(inverse(shoulder), reaching_upper), share)
@@ -170,24 +167,6 @@ def _reached(
 def _out(side: int) -> float:
     """1 for the left side, which is at positive x, -1 for the right."""
     return 1.0 - 2.0 * side
-
-
-def _in_chest(pose: Pose, points: Array) -> Vector:
-    """Points (B, 3) of the world in the frame of the upper chest."""
-    place, chest = _chest(pose)
-    return rotated(inverse(chest), minus(parts(points), place))
-
-
-def _chest(pose: Pose) -> tuple[Vector, Quaternion]:
-    """Place and rotation of the upper chest in the world."""
-    x, z, _ = parts(pose.ground)
-    (height,) = parts(pose.height[:, None])
-    place: Vector = (x, height, z)
-    above = product(parts(pose.heading), parts(pose.rotations[:, 0]))
-    for bone in SPINE:
-        place = plus(place, rotated(above, HUMANOID.joints[HUMANOID.index(bone)].offset))
-        above = product(above, parts(pose.rotations[:, BONES.index(bone)]))
-    return place, above
 
 
 def _ready_arm(side: int, upper_arm: Vector, forearm: Vector) -> TwoBones:

@@ -2,35 +2,34 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import ControlError, ControlWarning, needs, warn
-from motet.figures.humanoid import BONES
+from motet.figures.humanoid import BONES, LEFT_RIGHT
 from motet.models.control import LARGEST_CROWD
 from motet.motion.motion import Motion, is_many
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
 from motet.settings import is_number
-from motet.steering import crowd
-from motet.steering.action_layer import ActionLayer
+from motet.steering.action_layer import ActionLayer, ActOrder
 from motet.steering.acts import Act, ActSettings
-from motet.steering.arrival import ArrivalSettings
 from motet.steering.avoidance import AvoidanceSettings
+from motet.steering.crowd import picked
 from motet.steering.events import Event, Happenings
 from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.gaits import Command
 from motet.steering.idle import IdleLayer, IdleSettings
-from motet.steering.look_layer import LookSettings
+from motet.steering.look_layer import LookLayer, LookSettings
 from motet.steering.matched import Matched, matched
-from motet.steering.matching import Playback, Rows
-from motet.steering.path_following import Ways, speed_of
+from motet.steering.matching import Flags, Playback, Rows
+from motet.steering.paths import ArrivalSettings, Going, Ways
 from motet.steering.pose import Pose
-from motet.steering.reach_layer import ReachSettings
+from motet.steering.reach_layer import ReachLayer, ReachSettings
 from motet.steering.scripts import Order, parse_orders
 from motet.steering.step import tick
-from motet.steering.targets import CharacterIds, Guidance, Guided
+from motet.steering.targets import CharacterIds, checked_path, chosen_ids, numbers_of
 from motet.text.clauses import Shown
 
 if TYPE_CHECKING:
@@ -41,31 +40,43 @@ Action = Motion | Act | str | None
 """What can be acted."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class SteerSnapshot:
-    """The whole state of a session."""
+    """The whole state of a session; of its parts only playback and actions are written into."""
 
     playback: Playback
     actions: ActionLayer
     idle: IdleLayer
     command: Command
     lock: FootLock | None
-    poses: tuple[Pose, Pose] | None
-    """The last two ticks, of a display with another frame rate."""
-    ahead: float
-    """How far the display is from the first to the second, in ticks."""
-    guidance: Guidance
+    look: LookLayer
+    left: ReachLayer
+    """The left hands."""
+    right: ReachLayer
+    """The right hands."""
+    going: Going
     happenings: Happenings
-    late: tuple[Event, ...]
+    room: float = 0.0
+    """Metres that characters keep apart, 0 for none."""
+    poses: tuple[Pose, Pose] | None = None
+    """The last two ticks, of a display with another frame rate."""
+    ahead: float = 0.0
+    """How far the display is from the first to the second, in ticks."""
+    late: tuple[Event, ...] = ()
     """Events of a tick that was to be shown next when characters were put elsewhere."""
+
+    def copy(self) -> "SteerSnapshot":
+        """A copy that changes independently."""
+        return replace(self, playback=self.playback.copy(), actions=self.actions.copy())
 
     def __repr__(self) -> str:
         return f"SteerSnapshot({len(self.command.gait)} characters)"
 
 
-class SteerSession(Guided):
+class SteerSession:
     """Characters that move in one batch, each steered separately; holds their whole state. A tick is 1 / ``model.fps``
-    seconds. Angles are degrees about the vertical: 0 along z, positive to the left."""
+    seconds. Angles are degrees about the vertical: 0 along z, positive to the left. ``who``: the numbers of the
+    characters that are meant, from 0; by default all."""
 
     def __init__(
         self,
@@ -76,32 +87,30 @@ class SteerSession(Guided):
         strict: bool,
         words: "SaidActs | None",
     ) -> None:
-        super().__init__(len(playback.row))
-        zero = np.zeros(self.characters)
+        characters = len(playback.row)
+        zero = np.zeros(characters)
         self.model = model
         self.strict = strict
         self._words = words
         self._warned: set[str] = set()  # gaits whose limits a warning has named
-        self._playback = playback
-        self._command = Command(np.full(self.characters, gait), zero, zero, zero, zero > 0)
-        self._target = np.zeros((self.characters, 3))
-        self._actions = self._no_acts()
-        self._idle = IdleLayer.none(self.characters)
-        self._lock = self._new_lock() if hold_feet else None
-        self._happenings = Happenings.none(self.characters)
-        self._poses: tuple[Pose, Pose] | None = None
-        self._ahead = 0.0
-        self._late: tuple[Event, ...] = ()
+        self._target = np.zeros((characters, 3))
+        self._state = SteerSnapshot(
+            playback=playback,
+            actions=ActionLayer.none(model.matcher, model.pose_codes, playback),
+            idle=IdleLayer.none(characters),
+            command=Command(np.full(characters, gait), zero, zero, zero, zero > 0),
+            lock=FootLock.none(characters) if hold_feet else None,
+            look=LookLayer.none(characters),
+            left=ReachLayer.none(0, characters),
+            right=ReachLayer.none(1, characters),
+            going=Going.none(characters),
+            happenings=Happenings.none(characters),
+        )
 
-    def _no_acts(self) -> ActionLayer:
-        model = self.model
-        return ActionLayer.of(self._playback, model.matcher, model.pose_codes, model.settings(ActSettings))
-
-    def _new_lock(self) -> FootLock:
-        return FootLock(self.characters, 1 / self.model.fps, self.model.settings(FootLockSettings))
-
-    def __repr__(self) -> str:
-        return f"SteerSession({self.characters} characters, {self.model!r})"
+    @property
+    def characters(self) -> int:
+        """Number of characters."""
+        return len(self._target)
 
     def control(
         self,
@@ -121,22 +130,23 @@ class SteerSession(Guided):
         strict; a gait that only goes forward faces the way it goes. ControlError for values that are not numbers or do
         not fit; the control is unchanged then.
         """
+        before = self._state.command
         numbers = self._command_numbers(speed, direction, facing)
-        before = self._command
-        gaits = None if gait is None else self._gaits(gait)
-        if velocity is None:
-            self._set(before.changed(gaits, **numbers))
-            return
-        if speed is not None or direction is not None:
-            raise ControlError("give a velocity, or speed and direction, not both")
-        x, z = self._numbers("a velocity needs x and z", velocity, 2).T
-        numbers["speed"] = np.hypot(x, z)
-        goes = numbers["speed"] > 0
-        numbers["direction"] = np.where(goes, np.arctan2(x, z), before.direction)
-        command = before.changed(gaits, **numbers)
-        if facing is None:
-            command = replace(command, faces_way=before.faces_way | goes)
-        self._set(command)
+        gaits = self._gaits(gait)
+        faces_way = before.faces_way
+        if direction is not None:
+            faces_way = np.ones_like(faces_way)
+        if velocity is not None:
+            if speed is not None or direction is not None:
+                raise ControlError("give a velocity, or speed and direction, not both")
+            x, z = self._numbers("a velocity needs x and z", velocity, 2).T
+            numbers["speed"] = np.hypot(x, z)
+            goes = numbers["speed"] > 0
+            numbers["direction"] = np.where(goes, np.arctan2(x, z), before.direction)
+            faces_way = before.faces_way | goes
+        if facing is not None:
+            faces_way = np.zeros_like(faces_way)
+        self._set(replace(before, gait=gaits, faces_way=faces_way, **numbers).turned())
 
     @property
     def target(self) -> Array:
@@ -150,9 +160,8 @@ class SteerSession(Guided):
         numbers = dict[str, Array]()
         for name, value in (("speed", speed), ("direction", direction), ("facing", facing)):
             if value is not None:
-                numbers[name] = self._numbers(f"{name} needs a number", value)
-        for name in numbers.keys() & {"direction", "facing"}:
-            numbers[name] = np.radians(numbers[name])
+                values = self._numbers(f"{name} needs a number", value)
+                numbers[name] = values if name == "speed" else np.radians(values)
         return numbers
 
     def _set(self, command: Command) -> None:
@@ -164,12 +173,17 @@ class SteerSession(Guided):
             if gait not in self._warned:
                 self._warned.add(gait)
                 warn(message, ControlWarning)
-        changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != self._command.gait)
-        self._playback.hasten(changed)
-        self._target, self._command = target, command
-        self._guidance = self._guidance.ended()
+        state = self._state
+        changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != state.command.gait)
+        state.playback.hasten(changed)
+        self._target = target
+        state.command = command
+        state.going = state.going.ended()
 
-    def _gaits(self, names: str | Sequence[str]) -> Rows:
+    def _gaits(self, names: str | Sequence[str] | None) -> Rows:
+        """The numbers of gaits (characters,), None for the present ones."""
+        if names is None:
+            return self._state.command.gait
         each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
         if len(each) != self.characters:
             raise ControlError(f"{len(each)} gaits do not fit {self.characters} characters")
@@ -177,95 +191,209 @@ class SteerSession(Guided):
 
     def tick(self) -> Pose:
         """The next pose of all characters, 1 / ``model.fps`` seconds later."""
-        self._lead()
+        state = self._state
+        # those that are on a path go on, and those that move keep apart
+        if state.going.goes.any() or state.room:
+            model = self.model
+            ways = Ways(model.abilities, model.settings(ArrivalSettings), model.settings(AvoidanceSettings))
+            state.going, state.command, self._target = ways.lead(
+                state.going, state.room, state.playback, state.command, self._target, 1 / model.fps
+            )
         return self.tick_to(self._way)
 
     @property
     def _way(self) -> Array:
         """The target as gaits approach it."""
-        return self.model.abilities.curved(self._target, self._command.gait, self._playback.root[:, 2])
-
-    def _lead(self) -> None:
-        """Let those that are on a path go on, and those that move keep apart."""
-        if not (self._guidance.going.goes.any() or self._guidance.room):
-            return
-        model = self.model
-        ways = Ways(model.abilities, model.settings(ArrivalSettings), model.settings(AvoidanceSettings))
-        self._guidance, self._command, self._target = ways.lead(
-            self._guidance, self._playback, self._command, self._target, 1 / model.fps
-        )
-
-    def _start_of(self, gait: str | None, speed: Array | None, characters: Rows) -> tuple[Array, Rows, Array]:
-        if gait is None:
-            gaits = self._command.gait[characters]
-        else:
-            gaits = np.full(len(characters), self.model.abilities.number(gait))
-        return self._playback.root[characters, :2], gaits, speed_of(self.model.abilities, gaits, speed)
+        state = self._state
+        return self.model.abilities.curved(self._target, state.command.gait, state.playback.root[:, 2])
 
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
         model = self.model
-        playback = self._playback
-        gait = self._command.gait
-        root_before = playback.root
+        matcher = model.matcher
+        codes = model.pose_codes
+        settings = model.settings
         seconds = 1 / model.fps
+        state = self._state
+        playback = state.playback
+        gait = state.command.gait
+        root_before = playback.root
         # acts go on, begin and end; legs that an act has led so far get a row to continue from
-        changed = self._actions.begin(playback, target, gait)
+        changed = state.actions.begin(matcher, codes, settings(ActSettings), playback, target, gait)
         # search, playback, springs, warping: the pose of the recordings, and the root
-        pose = tick(model.matcher, model.pose_codes, playback, target, gait)
+        pose = tick(matcher, codes, playback, target, gait)
         # idle: figures that stand keep their place
-        if self._lock is not None:
-            settings = model.settings(IdleSettings)
-            acts = self._actions.whole
-            self._idle = self._idle.update(pose, playback, root_before, target, acts, settings, seconds)
+        if state.lock is not None:
+            acts = state.actions.whole
+            state.idle = state.idle.update(pose, playback, root_before, target, acts, settings(IdleSettings), seconds)
         # actions: acts are laid over the pose, and lead whole bodies
-        pose = self._actions.update(pose, playback, root_before, changed)
+        pose = state.actions.update(pose, playback, root_before, changed, settings(ActSettings), model.fps)
         self._face_as_acted()
         # idle, again: breath; foot lock: standing feet stay in place
-        if self._lock is not None:
-            pose = self._idle.breathe(pose, model.settings(IdleSettings), seconds)
-            pose = self._lock.held(pose)
+        if state.lock is not None:
+            pose = state.idle.breathe(pose, settings(IdleSettings), seconds)
+            state.lock, pose = state.lock.update(pose, settings(FootLockSettings), seconds)
         # look and reach: heads and arms
-        pose = self._point(pose, seconds)
+        state.look, pose = state.look.update(pose, settings(LookSettings), seconds)
+        state.left, pose = state.left.update(pose, settings(ReachSettings), seconds)
+        state.right, pose = state.right.update(pose, settings(ReachSettings), seconds)
         # what has happened since the last tick
-        return replace(pose, events=self._happened(pose)).read_only()
+        return replace(pose, events=self._events(pose)).read_only()
 
-    def _point(self, pose: Pose, seconds: float) -> Pose:
-        """A pose with heads and arms turned to their targets."""
-        before = self._guidance
-        look, pose = before.look.update(pose, self.model.settings(LookSettings), seconds)
-        reach_settings = self.model.settings(ReachSettings)
-        left, pose = before.hands[0].update(pose, reach_settings, seconds)
-        right, pose = before.hands[1].update(pose, reach_settings, seconds)
-        if look is not before.look or (left, right) != before.hands:
-            self._guidance = replace(before, look=look, hands=(left, right))
-        return pose
+    def _face_as_acted(self) -> None:
+        """After a full-body act an idle character keeps the act's final facing."""
+        state = self._state
+        if not state.actions.acts:
+            return
+        stands = state.actions.whole & (state.command.speed == 0)
+        facing = np.where(stands, state.playback.root[:, 2], state.command.facing)
+        direction = np.where(stands, facing, state.command.direction)
+        state.command = replace(state.command, direction=direction, facing=facing)
+        standing_target = np.insert(np.zeros((len(facing), 2)), 2, facing, axis=1)
+        self._target = np.where(stands[:, None], standing_target, self._target)
 
-    def _happened(self, pose: Pose) -> tuple[Event, ...]:
-        gait = self._command.gait
-        before = self._happenings
-        shows = self.model.matcher.table.shows[self._playback.row, gait]
-        self._happenings = before.after(pose.contacts, gait, shows, self.arrived, self._actions.done)
-        return tuple(self._happenings.events(before, self.model.gaits))
+    def _events(self, pose: Pose) -> tuple[Event, ...]:
+        state = self._state
+        gait = state.command.gait
+        shows = self.model.matcher.table.shows[state.playback.row, gait]
+        before = state.happenings
+        state.happenings = before.after(pose.contacts, gait, shows, state.going.arrived, state.actions.done)
+        return tuple(state.happenings.events(before, self.model.gaits))
 
     @property
     def matched(self) -> Matched:
         """The rows that are played, what they cost, and the desired path."""
-        return matched(self.model.matcher, self._playback, self._way, self._command.gait)
+        state = self._state
+        return matched(self.model.matcher, state.playback, self._way, state.command.gait)
 
-    def _face_as_acted(self) -> None:
-        """After a full-body act an idle character keeps the act's final facing."""
-        if not self._actions.acts:
+    def go_to(
+        self,
+        points: ArrayLike | None,
+        facing: ArrayLike | None = None,
+        *,
+        gait: str | None = None,
+        speed: ArrayLike | None = None,
+        who: CharacterIds = None,
+    ) -> None:
+        """Let characters go to points on the ground and stand there, or None: stand where they are.
+
+        points: (2,) or one for each (n, 2), x and z in metres. facing: in degrees, how they are to face there, one or
+        one for each; by default as they come. gait: by default the one that they have. speed: m/s, by default the
+        gait's usual one. They slow down to the end, and :attr:`arrived` tells when they are there; :meth:`control` ends
+        it. ControlError for values that are not numbers or do not fit, and for a gait that goes nowhere; nothing has
+        changed then.
+        """
+        characters = self._chosen(who)
+        if points is None:
+            standing = self._state.playback.root[characters, None, :2]
+            self._send(characters, standing, None, None, None)
             return
-        command = self._command
-        stands = self._actions.whole & (command.speed == 0)
-        if not stands.any():
-            return
-        facing = np.where(stands, self._playback.root[:, 2], command.facing)
-        direction = np.where(stands, facing, command.direction)
-        self._command = replace(command, direction=direction, facing=facing)
-        standing_target = np.insert(np.zeros((len(facing), 2)), 2, facing, axis=1)
-        self._target = np.where(stands[:, None], standing_target, self._target)
+        ends = self._numbers("points need x and z", points, 2, count=len(characters))
+        self._send(characters, ends[:, None], facing, gait, speed)
+
+    def go_along(
+        self,
+        points: ArrayLike,
+        facing: ArrayLike | None = None,
+        *,
+        gait: str | None = None,
+        speed: ArrayLike | None = None,
+        who: CharacterIds = None,
+    ) -> None:
+        """Let characters go along a path on the ground, from where they are to its first point, and so on to its last,
+        where they stand. Everything else is like :meth:`go_to`.
+
+        points: a path (P, 2) for all, or one for each (n, P, 2), x and z in metres, of up to 10,000 points.
+        """
+        characters = self._chosen(who)
+        self._send(characters, checked_path(points, len(characters)), facing, gait, speed)
+
+    def _send(
+        self,
+        characters: Rows,
+        paths: Array,
+        facing: ArrayLike | None,
+        gait: str | None,
+        speed: ArrayLike | None,
+    ) -> None:
+        """Let characters (n,) go along paths (n, P, 2) from where they are."""
+        state = self._state
+        abilities = self.model.abilities
+        count = len(characters)
+        facings = np.full(count, np.nan)
+        if facing is not None:
+            facings = np.radians(self._numbers("facing needs a number", facing, count=count))
+        speeds = None
+        if speed is not None:
+            speeds = self._numbers("speed needs a number", speed, count=count)
+            if not (speeds > 0).all():
+                raise ControlError("speed must be above 0 m/s; points of None let characters stand")
+        gaits = self._gaits(gait)[characters]
+        usual = abilities.usual(gaits)
+        starts = state.playback.root[characters, None, :2]
+        state.going = state.going.sent(
+            characters,
+            list(np.concatenate([starts, paths], axis=1)),
+            facing=wrapped(facings),
+            gait=gaits,
+            speed=usual if speeds is None else speeds,
+        )
+
+    @property
+    def arrived(self) -> Flags:
+        """Which characters (characters,) stand, within 8 cm and 8 degrees, where they were last sent."""
+        return self._state.going.arrived.copy()
+
+    def keep_apart(self, room: float | None = 0.8) -> None:
+        """Let the characters of the session that move keep ``room`` metres from all others, 0.1 to 5, by going around
+        them, as far as there is room; None lets them go through each other. ControlError for another number."""
+        if room is not None and not (isinstance(room, int | float) and 0.1 <= room <= 5):
+            raise ControlError(f"characters keep 0.1 to 5 m apart, or None, not {room!r}")
+        self._state.room = room or 0.0
+
+    def look_at(self, points: ArrayLike | None, *, who: CharacterIds = None) -> None:
+        """Let characters look at points in the world from now on, or None: ahead again, as they are recorded.
+
+        points: (3,) or one for each (n, 3), x, y and z in metres. Head, neck and upper spine share the turn, up to 85
+        degrees aside and 50 up or down; a point nearer to the eyes than 20 cm is not looked at. It may move: steps of
+        the gaze of up to 10 degrees a tick are followed at once, others within half a second. ControlError for values
+        that are not numbers or do not fit; nothing has changed then.
+        """
+        state = self._state
+        state.look = replace(state.look, points=self._with_points(state.look.points, points, who))
+
+    def reach(self, hand: Literal["left", "right"], points: ArrayLike | None, *, who: CharacterIds = None) -> None:
+        """Let a hand of characters be at points in the world from now on, or None: as it is recorded.
+
+        points: (3,) or one for each (n, 3), x, y and z in metres, for the middle of the hand. Only the arm moves. A
+        point that is too far, or behind the back, is out of reach: the hand goes as near as it can, and
+        :attr:`out_of_reach` tells. ControlError like :meth:`look_at`.
+        """
+        if hand not in LEFT_RIGHT:
+            raise ControlError(f"unknown hand {hand!r}; expected left or right")
+        layer: ReachLayer = getattr(self._state, hand)
+        setattr(self._state, hand, replace(layer, points=self._with_points(layer.points, points, who)))
+
+    @property
+    def out_of_reach(self) -> Flags:
+        """Whether what the left and the right hand reach for was out of reach in the last tick (characters, 2)."""
+        return np.stack([self._state.left.beyond, self._state.right.beyond], axis=1)
+
+    def _with_points(self, before: Array, points: ArrayLike | None, who: CharacterIds) -> Array:
+        """Points (B, 3) with new ones for some characters, NaN for None."""
+        characters = self._chosen(who)
+        after = before.copy()
+        after[characters] = np.nan
+        if points is not None:
+            after[characters] = self._numbers("points need x, y and z", points, 3, count=len(characters))
+        return after
+
+    def _chosen(self, who: CharacterIds) -> Rows:
+        return chosen_ids(who, self.characters)
+
+    def _numbers(self, needed: str, values: Any, *columns: int, count: int | None = None) -> Array:
+        """Numbers for all characters or for each; by default for all of the session (:func:`numbers_of`)."""
+        return numbers_of(needed, values, self.characters if count is None else count, *columns)
 
     def act(
         self, what: Action | Sequence[Action], *, who: CharacterIds = None, upper: bool | None = None
@@ -296,7 +424,8 @@ class SteerSession(Guided):
             if id(action) not in made:
                 made[id(action)] = self._acts_of(action, shown)
         for character, action in zip(characters, each, strict=True):
-            self._actions.orders[character] = (self._take(character, made[id(action)]), upper)
+            chosen = self._take(character, made[id(action)])
+            self._state.actions.orders[character] = ActOrder(chosen, upper)
         return shown
 
     def _take(self, character: int, acts: tuple[Act, ...]) -> Act | None:
@@ -336,14 +465,15 @@ class SteerSession(Guided):
     @property
     def acting(self) -> list[tuple[str, float] | None]:
         """The act of each character: its name and the seconds that are left; None for characters without an act."""
+        actions = self._state.actions
         acting = list[tuple[str, float] | None]()
-        for playing in self._actions.playing:
-            if playing is None:
-                acting.append(None)
-            else:
-                acting.append((playing.act.name, (len(playing.act) - 1 - playing.frame) / self.model.fps))
-        for character, (act, _) in self._actions.orders.items():
-            acting[character] = None if act is None else (act.name, (len(act) - 1) / self.model.fps)
+        for playing, order in zip(actions.playing, actions.orders, strict=True):
+            act = None if playing is None else playing.act
+            frame = 0 if playing is None else playing.frame
+            if order is not None:
+                act = order.act
+                frame = 0
+            acting.append(None if act is None else (act.name, (len(act) - 1 - frame) / self.model.fps))
         return acting
 
     def advance(self, seconds: float) -> Pose:
@@ -351,42 +481,55 @@ class SteerSession(Guided):
         events are those since the pose before. A command shows within a tick. ControlError unless 0 <= seconds <= 1."""
         if not is_number(seconds) or not 0 <= seconds <= 1:
             raise ControlError(f"a session advances by 0 to 1 s, not {seconds}")
-        events = self._late
-        self._late = ()
-        if self._poses is None:
-            first = self.tick()
-            events += first.events
-            self._poses = (first, self.tick())
-        self._ahead += seconds * self.model.fps
-        while self._ahead >= 1:
-            events += self._poses[1].events
-            self._poses = self._poses[1], self.tick()
-            self._ahead -= 1
-        return replace(self._poses[0].towards(self._poses[1], self._ahead), events=events)
+        state = self._state
+        events = state.late
+        state.late = ()
+        if state.poses is None:
+            state.poses = (self.tick(), self.tick())
+            events += state.poses[0].events
+        state.ahead += seconds * self.model.fps
+        while state.ahead >= 1:
+            events += state.poses[1].events
+            state.poses = (state.poses[1], self.tick())
+            state.ahead -= 1
+        first, second = state.poses
+        return replace(first.towards(second, state.ahead), events=events)
 
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
-        self._playback.spring[:, :2] += self._numbers("a velocity needs x and z", velocity, 2)
-        self._playback.hasten(np.ones(self.characters, dtype=bool))
+        playback = self._state.playback
+        playback.spring[:, :2] += self._numbers("a velocity needs x and z", velocity, 2)
+        playback.hasten(np.ones(self.characters, dtype=bool))
 
     def put(self, places: ArrayLike) -> None:
         """Place the characters elsewhere: (3,) or (characters, 3) x and z in metres, facing in degrees."""
+        state = self._state
         numbers = self._numbers("places need x, z and facing", places, 3)
         facing = wrapped(np.radians(numbers[:, 2]))
-        self._playback.root = np.column_stack([numbers[:, :2], facing])
-        self._playback.spring[:, 2] = facing
-        before = self._command
-        direction = np.where(before.speed > 0, before.direction, facing)  # standing ones move the way they face
+        state.playback.root = np.column_stack([numbers[:, :2], facing])
+        state.playback.spring[:, 2] = facing
+        # standing ones move the way they face
+        before = state.command
+        direction = np.where(before.speed > 0, before.direction, facing)
         no_way = np.zeros_like(before.faces_way)
-        self._command = replace(before, direction=direction, facing=facing, faces_way=no_way)
-        self._target, _ = self.model.abilities.target(self._command)
-        self._actions = self._no_acts()
-        self._guidance = self._guidance.ended()
-        if self._poses is not None:
-            self._late += self._poses[1].events
-        self._poses = None  # nothing lies between there and here
-        if self._lock is not None:
-            self._lock = self._new_lock()
+        state.command = replace(before, direction=direction, facing=facing, faces_way=no_way)
+        self._target, _ = self.model.abilities.target(state.command)
+        state.actions = self._no_acts()
+        state.going = state.going.ended()
+        if state.lock is not None:
+            state.lock = FootLock.none(self.characters)
+        # nothing lies between there and here
+        if state.poses is not None:
+            state.late += state.poses[1].events
+        state.poses = None
+
+    def _no_acts(self) -> ActionLayer:
+        return ActionLayer.none(self.model.matcher, self.model.pose_codes, self._state.playback)
+
+    def _become(self, state: SteerSnapshot) -> None:
+        """Go on from a state."""
+        self._state = state
+        self._target, _ = self.model.abilities.target(state.command)
 
     def add(self, places: ArrayLike, *, gait: str | None = None, phases: ArrayLike | None = None) -> list[int]:
         """Add characters that stand at places: (3,) for one or (n, 3), x and z in metres, facing in degrees. Returns
@@ -402,12 +545,13 @@ class SteerSession(Guided):
             raise ControlError(f"a session has 1 to {LARGEST_CROWD} characters; places of {count} make it {total}")
         turns = self.model.phases(total) if phases is None else None
         phases = phases if turns is None else turns[self.characters :]
-        held = self._lock is not None
-        more = self.model.start(gait, characters=count, places=new_places, hold_feet=held, phases=phases)
-        if self._poses is not None:
+        state = self._state
+        hold_feet = state.lock is not None
+        more = self.model.start(gait, characters=count, places=new_places, hold_feet=hold_feet, phases=phases)
+        if state.poses is not None:
             more.advance(0)
         numbers = list(range(self.characters, total))
-        self.restore(crowd.picked([self.snapshot(), more.snapshot()], np.arange(total)))
+        self._become(picked([state, more._state], [self.characters, count], np.arange(total)))
         return numbers
 
     def remove(self, who: int | Sequence[int]) -> None:
@@ -418,7 +562,7 @@ class SteerSession(Guided):
         stay = np.delete(np.arange(self.characters), self._chosen(who))
         if not len(stay):
             raise ControlError("a session keeps one character at least")
-        self.restore(crowd.picked([self.snapshot()], stay))
+        self._become(picked([self._state], [self.characters], stay))
 
     def take(self, pose: Pose) -> None:
         """Continue from a changed pose: its rotations and height, one for all characters or one for each. Their
@@ -428,13 +572,15 @@ class SteerSession(Guided):
         if not (np.isfinite(pose.rotations).all() and np.isfinite(pose.height).all()):
             raise ControlError("a pose must be finite numbers")
         codes = self.model.pose_codes.encode(pose.rotations, pose.height)
-        self.model.matcher.pose(self._playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
-        self._actions = self._no_acts()
+        self.model.matcher.pose(self._state.playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
+        self._state.actions = self._no_acts()
 
     def run(self, script: str) -> list[Motion]:
         """Run a script (:mod:`motet.steering.scripts`) for all characters; one motion for each."""
         poses = list(self.follow(parse_orders(script, self.model.gaits)))
-        return [self.model.contract.motion(frames, plant=self._lock is not None) for frames in self.frames_of(poses)]
+        return [
+            self.model.contract.motion(frames, plant=self._state.lock is not None) for frames in self.frames_of(poses)
+        ]
 
     def follow(self, orders: Sequence[Order]) -> Iterator[Pose]:
         """The poses of all characters that follow orders, tick by tick."""
@@ -450,7 +596,7 @@ class SteerSession(Guided):
         if order.goal is not None:
             self.go_to(order.goal, order.facing, speed=order.speed)
             return
-        before = self._command
+        before = self._state.command
         facing = np.where(before.faces_way, before.direction, before.facing)
         aside = wrapped(before.direction - facing) if order.way is None else np.radians(order.way)
         if order.speed is None:
@@ -475,39 +621,18 @@ class SteerSession(Guided):
 
     def snapshot(self) -> SteerSnapshot:
         """The whole state, to be restored later."""
-        return SteerSnapshot(
-            playback=self._playback.copy(),
-            actions=self._actions.copy(),
-            idle=self._idle,
-            command=self._command,
-            lock=None if self._lock is None else replace(self._lock),  # its arrays are replaced, never written into
-            poses=self._poses,
-            ahead=self._ahead,
-            guidance=self._guidance,
-            happenings=self._happenings,
-            late=self._late,
-        )
+        return self._state.copy()
 
     def restore(self, snapshot: SteerSnapshot) -> None:
         """Go back to a snapshot of this session or of one like it, of the same model and the same ``hold_feet``, else
         ControlError. The session has as many characters then as the snapshot."""
         needs(snapshot, SteerSnapshot, "a snapshot of a session")
-        if snapshot.lock is None and self._lock is not None:
+        holds_feet = self._state.lock is not None
+        if snapshot.lock is None and holds_feet:
             raise ControlError("a snapshot without held feet does not fit a session with them (hold_feet)")
-        if snapshot.lock is not None and self._lock is None:
+        if snapshot.lock is not None and not holds_feet:
             raise ControlError("a snapshot with held feet does not fit a session without them (hold_feet)")
-        self.characters = len(snapshot.command.gait)
-        self._playback = snapshot.playback.copy()
-        self._actions = snapshot.actions.copy()
-        self._idle = snapshot.idle
-        self._command = snapshot.command
-        self._target, _ = self.model.abilities.target(snapshot.command)
-        self._poses = snapshot.poses
-        self._ahead = snapshot.ahead
-        self._guidance = snapshot.guidance
-        self._happenings = snapshot.happenings
-        self._late = snapshot.late
-        self._lock = None if snapshot.lock is None else replace(snapshot.lock)
+        self._become(snapshot.copy())
 
 
 def _places(values: ArrayLike) -> Array:

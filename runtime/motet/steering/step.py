@@ -212,31 +212,34 @@ def _moved(
     root: Vector, warp: Part, rate: Part, recorded: Recorded, spring: Springs, settings: SteeringSettings, dt: float
 ) -> Moved:
     """The root a tick later, the next playback rate and the strides to be made. rate: the present playback rate."""
-    x, z, facing = root
     slow_walk = recorded.slow_walk
     moving = slow_walk | (smaller(recorded.speed, spring.pace) > settings.idle)
     speed_ratio = spring.pace / larger(recorded.speed, where(slow_walk, LEAST_PACE, settings.idle))
-    # how far the recording goes in this tick
-    played_seconds = rate * dt
-    forward = recorded.forward * played_seconds
-    left = recorded.left * played_seconds
     # turn as recorded, and a little more towards the facing of the springs
-    next_facing = wrapped(
-        facing + recorded.turn * played_seconds + _facing_correction(root, rate, recorded, spring, settings, dt)
-    )
+    x, z, facing = root
+    turned = facing + recorded.turn * (rate * dt)
+    next_facing = wrapped(turned + _facing_correction(root, rate, recorded, spring, settings, dt))
     # stride: what the playback rate does not make up for of the speed
     shortest = where(slow_walk, 0.0, settings.shortest)
     stride = where(moving, clipped(speed_ratio / rate, shortest, settings.longest), 1.0)
-    # the step over the ground, turned as the legs are
-    sin = computed(np.sin, facing + warp) * stride
-    cos = computed(np.cos, facing + warp) * stride
-    step_x = sin * forward + cos * left
-    step_z = cos * forward - sin * left
-    # heading correction: the step turned towards the velocity of the springs, by a small angle
+    # the step over the ground as recorded, turned as the legs are, and then towards the velocity of the springs
+    step_x, step_z = _step(recorded, facing + warp, stride, rate * dt)
     correction = where(moving, _heading_correction(step_x, step_z, spring, settings), 0.0)
-    next_root = x + (step_x + correction * step_z), z + (step_z - correction * step_x), next_facing
+    next_x = x + (step_x + correction * step_z)
+    next_z = z + (step_z - correction * step_x)
+    # the next playback rate is as fast as the springs; the legs' strides of a slow walk are shorter
     playback_rate = where(moving, _playback_rate(speed_ratio, slow_walk, settings), 1.0)
-    return Moved(next_root, playback_rate, where(slow_walk, smaller(stride, 1.0), 1.0))
+    stride_goal = where(slow_walk, smaller(stride, 1.0), 1.0)
+    return Moved((next_x, next_z, next_facing), playback_rate, stride_goal)
+
+
+def _step(recorded: Recorded, direction: Part, stride: Part, played_seconds: Part) -> tuple[Part, Part]:
+    """The step along x and z as recorded in some seconds, times a stride, of a figure that goes to a direction."""
+    forward = recorded.forward * played_seconds
+    left = recorded.left * played_seconds
+    sin = computed(np.sin, direction) * stride
+    cos = computed(np.cos, direction) * stride
+    return sin * forward + cos * left, cos * forward - sin * left
 
 
 def _playback_rate(speed_ratio: Part, slow_walk: Part, settings: SteeringSettings) -> Part:

@@ -312,7 +312,7 @@ export const actSettings = {
   turned: { default: 2.6179938779914944, low: 0, high: 3.15, whole: false },
 } as const;
 
-// motet.steering.arrival.ArrivalSettings
+// motet.steering.paths.ArrivalSettings
 export const arrivalSettings = {
   ahead: { default: 0.3, low: 0, high: 100, whole: false },
   ahead_moving: { default: 0.25, low: 0, high: 10, whole: false },

@@ -16,8 +16,9 @@ from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
-from motet.steering.acts import foot_contacts, pose_features, seen
+from motet.steering.acts import foot_contacts, pose_features
 from motet.steering.matching import HORIZONS, horizons, mirrored_features, speed_feature
+from motet.steering.pose import seen
 from motet.steering.settings import SteeringSettings
 from motet_train.data.recorded import Recording
 from motet_train.data.sixd_windows import poses_of

@@ -20,7 +20,7 @@ from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat, wrappe
 from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
 from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
-from motet.steering.foot_lock import FootLock
+from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.pose import Pose
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import Recording, gaits_of, recordings
@@ -167,7 +167,7 @@ class DrivenSession:
         self.speed = np.zeros(characters)
         self.direction = np.zeros(characters)
         self.facing = np.zeros(characters)
-        self.lock = FootLock(characters, 1 / self.fps) if hold_feet else None
+        self.lock = FootLock.none(characters) if hold_feet else None
 
     def control(
         self,
@@ -205,7 +205,9 @@ class DrivenSession:
         velocities = np.stack([forward, left, turn], axis=-1)
         self.session.set_control(controls_of(velocities))
         pose = self.pose(self.session.step())
-        return pose if self.lock is None else self.lock.held(pose)
+        if self.lock is not None:
+            self.lock, pose = self.lock.update(pose, FootLockSettings(), 1 / self.fps)
+        return pose
 
     def pose(self, frames: Floats) -> Pose:
         """The pose of frames (B, D), one tick after the last pose."""

@@ -1,4 +1,4 @@
-"""Steered figures that go along paths and arrive at their ends.
+"""Steered figures that go along paths, arrive at their ends, and keep apart on the way.
 
 A figure goes towards the point of its path that is a little ahead of where it is (pure pursuit). It slows down to the
 end as if it braked evenly, and its target becomes standing where the springs of :mod:`motet.steering.step` then take it
@@ -9,7 +9,7 @@ Letters in shapes: B figures, n of them, P points of all paths. Metres, seconds,
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damping_of
 from motet.settings import Range, Settings
+from motet.steering.avoidance import AvoidanceSettings, kept_apart
+from motet.steering.gaits import Command, Gaits
 from motet.steering.matching import Flags, Playback, Rows
 from motet.steering.settings import Metres, Radians, Seconds, Speed, SteeringSettings
 
@@ -75,6 +77,11 @@ class Paths:
         return Paths(points, np.concatenate(along), first)
 
     @property
+    def each(self) -> list[Array]:
+        """The points of each path."""
+        return np.split(self.points, self.first[1:-1])
+
+    @property
     def lengths(self) -> Array:
         """Metres of each path (B,)."""
         lengths: Array = self.along[self.first[1:] - 1]
@@ -125,7 +132,7 @@ class Going:
     """(B,) whether they stand at the end."""
 
     @staticmethod
-    def nowhere(figures: int) -> "Going":
+    def none(figures: int) -> "Going":
         """Figures that are on no path."""
         none = np.zeros(figures, dtype=bool)
         zero = np.zeros(figures)
@@ -140,9 +147,13 @@ class Going:
             arrived=none,
         )
 
+    def ended(self) -> "Going":
+        """Without any path."""
+        return Going.none(len(self.goes)) if self.goes.any() else self
+
     def sent(self, figures: Rows, paths: Sequence[Array], **new_values: NDArray[Any]) -> "Going":
         """With new paths and other values for some figures (n,)."""
-        all_paths = np.split(self.paths.points, self.paths.first[1:-1])
+        all_paths = self.paths.each
         for figure, path in zip(figures.tolist(), paths, strict=True):
             all_paths[figure] = path
         changed = {"goes": True, "stops": False, "arrived": False, "gone": 0.0} | new_values
@@ -155,28 +166,22 @@ class Going:
         """A tick later, and the velocities (B, 2) at which figures on paths are to go, 0 for standing."""
         root = playback.root[:, :2]
         speed_now = np.hypot(*playback.spring[:, :2].T)
+        stands = speed_now < settings.stands
+        # pure pursuit: how far they have come along their paths, and the point ahead that they aim at
         lengths = self.paths.lengths
-        # how far they have come along their paths, and the point that they aim at
         gone = self._progress(root)
         aim = gone + settings.ahead + settings.ahead_moving * speed_now
-        # how far it is to the end
+        on_last_stretch = aim >= lengths
+        # stop at the end; arrived: standing there, facing as wanted
         to_end = self.paths.ends - root
         distance = np.hypot(*to_end.T)
-        on_last_stretch = aim >= lengths
-        left = np.where(on_last_stretch, distance, np.maximum(lengths - gone, distance))
-        # stop where the springs roll on to the end; go again if that was too far from it
         passes_end = (_rolling_distance(playback, steering) * to_end).sum(axis=1) >= distance**2
-        near = distance < settings.near
-        stands = speed_now < settings.stands
-        too_far = stands & (distance > settings.glides_from)
-        stops = np.where(self.stops & ~too_far, True, on_last_stretch & (passes_end | near))
-        # arrived: standing there, facing as wanted
-        turned = self._is_turned(playback.root[:, 2], settings)
-        arrived = self.goes & stops & (self.arrived | (stands & near & turned))
+        stops, arrived = self._arrival(on_last_stretch, passes_end, distance, stands, playback.root[:, 2], settings)
         # towards the aim, braking evenly
+        left = np.where(on_last_stretch, distance, np.maximum(lengths - gone, distance))
         speed = np.where(stops, 0.0, np.minimum(self.speed, np.sqrt(2 * settings.brakes * left)))
         velocity = _unit(self.paths.at(aim) - root) * speed[:, None]
-        going = replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=arrived)
+        going = replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=self.goes & arrived)
         return going, velocity
 
     def _progress(self, root: Array) -> Array:
@@ -186,10 +191,24 @@ class Going:
         progress: Array = self.gone + ((root - here) * way).sum(axis=1).clip(0, 0.5)
         return progress
 
-    def _is_turned(self, facing: Array, settings: ArrivalSettings) -> Flags:
-        """Whether facings (B,) are those that figures are to have at the end."""
-        turned: Flags = np.isnan(self.facing) | (np.abs(wrapped(facing - self.facing)) < settings.faces)
-        return turned
+    def _arrival(
+        self,
+        on_last_stretch: Flags,
+        passes_end: Flags,
+        distance: Array,
+        stands: Flags,
+        facing: Array,
+        settings: ArrivalSettings,
+    ) -> tuple[Flags, Flags]:
+        """Whether the target of figures is standing, and whether they have arrived, both (B,).
+
+        passes_end: whether the springs roll on to the end. distance: to it. stands: whether they stand now.
+        """
+        near = distance < settings.near
+        goes_again = stands & (distance > settings.glides_from)
+        stops = (self.stops & ~goes_again) | (on_last_stretch & (passes_end | near))
+        turned = np.isnan(self.facing) | (np.abs(wrapped(facing - self.facing)) < settings.faces)
+        return stops, stops & (self.arrived | (stands & near & turned))
 
     def faces(self, playback: Playback, velocity: Array, settings: ArrivalSettings) -> Array:
         """The facings (B,), in radians, of figures that go at velocities (B, 2): where they go; near the end as they
@@ -210,6 +229,81 @@ class Going:
         share = np.minimum(seconds / settings.settles, most / np.maximum(distance, 1e-9))
         glides = self.stops & (distance < settings.glides_from)
         return np.where(glides[:, None], missing * share[:, None], 0.0)
+
+
+class Ways(NamedTuple):
+    """How characters go on their ways."""
+
+    gaits: Gaits
+    arrival: ArrivalSettings
+    avoidance: AvoidanceSettings
+
+    def lead(
+        self,
+        going: Going,
+        room: float,
+        playback: Playback,
+        command: Command,
+        target_before: Array,
+        seconds: float,
+    ) -> tuple[Going, Command, Array]:
+        """A tick later, the command to those that are on their way, and the targets (B, 3) of all, as
+        :meth:`Gaits.target` has them. Those that come to rest are moved by what their steps leave.
+
+        room: metres that figures keep apart, 0 for none. target_before: (B, 3).
+        """
+        gait_before = command.gait
+        # figures on paths
+        going, velocity = going.after(playback, self.arrival, self.gaits.settings)
+        if going.goes.any():
+            step = going.settled(playback, self.arrival, self.gaits.settings, seconds)
+            playback.root = playback.root + np.insert(step, 2, 0.0, axis=1)  # poses share the array
+            command = self._on_path(going, playback, command, velocity)
+        target, _ = self.gaits.target(command)
+        # figures that keep apart
+        if room:
+            target, _ = self.gaits.target(self._aside(room, playback, command, target))
+        # search at once for targets that change much
+        sudden = np.abs(target - target_before).max(axis=1) > self.arrival.sudden
+        playback.hasten(sudden | (command.gait != gait_before))
+        return going, command, target
+
+    def _on_path(self, going: Going, playback: Playback, command: Command, velocity: Array) -> Command:
+        """The command by which figures on paths go at velocities (B, 2)."""
+        goes = going.goes
+        speed = np.hypot(*velocity.T)
+        gait = _slowed(self.gaits, going.gait, command.gait, speed)
+        return replace(
+            command,
+            gait=np.where(goes, gait, command.gait),
+            speed=np.where(goes, speed, command.speed),
+            direction=np.where(goes & (speed > 0), np.arctan2(*velocity.T), command.direction),
+            facing=np.where(goes, going.faces(playback, velocity, self.arrival), command.facing),
+            faces_way=command.faces_way & ~goes,
+        )
+
+    def _aside(self, room: float, playback: Playback, command: Command, target: Array) -> Command:
+        """The command by which those that move keep apart; they go no faster for it."""
+        change = kept_apart(playback.root[:, :2], playback.spring[:, :2], room, self.avoidance)
+        moves = command.speed > 0
+        velocity = target[:, :2] + np.where(moves[:, None], change, 0.0)
+        speed = np.hypot(*velocity.T)
+        speed_before = np.hypot(*target[:, :2].T)
+        goes = speed > self.avoidance.waits
+        direction = np.where(goes, np.arctan2(*velocity.T), command.direction)
+        faces_way = moves & (command.facing == command.direction)
+        facing = np.where(faces_way, direction, target[:, 2])
+        pace = np.where(goes, np.minimum(speed, speed_before), 0.0)
+        return replace(command, speed=pace, direction=direction, facing=facing)
+
+
+def _slowed(gaits: Gaits, gait: Rows, gait_now: Rows, speed: Array) -> Rows:
+    """The gaits (B,) of figures that are to go at speeds (B,) in gaits (B,): the slowest that goes any way, where
+    theirs is too fast for the speed; and the present ones, where they stand."""
+    slowest = gaits.speeds[:, 0]
+    slow_gait = np.where(gaits.ahead, np.inf, slowest).argmin()
+    too_fast = (speed < slowest[gait]) & (slowest[slow_gait] < slowest[gait])
+    return np.where(speed > 0, np.where(too_fast, slow_gait, gait), gait_now)
 
 
 def _rolling_distance(playback: Playback, steering: SteeringSettings) -> Array:
