@@ -14,7 +14,7 @@ MOST_LARGE_FUNCTIONS = 194
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 MOST_BANNED_NAMES = 50
-MOST_TUPLE_ASSIGNMENTS = 16
+MOST_TUPLE_ASSIGNMENTS = 15
 MOST_NESTED_COMPREHENSIONS = 43
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
@@ -101,7 +101,7 @@ CEILINGS = {
     "motet.representation": 9_600,
     "motet.search": 3_500,
     "motet.serve": 17_000,
-    "motet.steering": 37_800,
+    "motet.steering": 35_200,
     "motet.text": 5_300,
     "motet_export": 10_300,
     "motet_train": 9_500,
