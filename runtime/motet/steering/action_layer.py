@@ -390,13 +390,12 @@ def _entered(
         return None
     moves = goes or np.hypot(*playback.spring[figure, :2]) > matcher.settings.idle
     keeps_moving = moves and act.legs  # its legs go on as it ends
-    whole = bool(keeps_moving or not moves) if upper is None else not upper
+    whole = not upper if upper is not None else bool(keeps_moving or not moves)
     # the first frames, compared with the figure as it is now
     most_skipped = min(round(settings.entry * matcher.fps), (len(act) - 1) // 3)
     entries = _scaled(matcher.table, act.features[: most_skipped + 1])
-    compared = slice(None) if whole else HANDS
-    features = _pose_features(matcher.table, playback, figure, before)
-    cost = ((entries - features)[:, compared] ** 2).sum(axis=1)
+    difference = entries - _pose_features(matcher.table, playback, figure, before)
+    cost = (difference[:, slice(None) if whole else HANDS] ** 2).sum(axis=1)
     return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not keeps_moving)
 
 

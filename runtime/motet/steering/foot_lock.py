@@ -82,10 +82,7 @@ class FootLock:
 
     def update(self, pose: Pose, settings: FootLockSettings, seconds: float) -> tuple["FootLock", Pose]:
         """A tick later, and the pose of that tick with standing feet held in place and above ground."""
-        half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
-        sine = single(np.sin(half_facing))
-        cosine = single(np.cos(half_facing))
-        hips = yawed(parts(pose.rotations[:, 0]), sine, cosine)
+        hips = _hips(pose)
         place = hips_of(pose)
         feet = list[list[Part]]()
         legs = list[list[Quaternion]]()
@@ -103,6 +100,14 @@ class FootLock:
         return self.feet[0].tolist() if len(self.feet) == 1 else [self.feet.transpose(2, 1, 0)]
 
 
+def _hips(pose: Pose) -> Quaternion:
+    """Rotation of the hips in the world."""
+    half_facing = (pose.ground[:, 2] / 2).astype(np.float32)
+    sine = single(np.sin(half_facing))
+    cosine = single(np.cos(half_facing))
+    return yawed(parts(pose.rotations[:, 0]), sine, cosine)
+
+
 def _held(
     foot_before: Sequence[Part],
     limb: Limb,
@@ -114,12 +119,11 @@ def _held(
     """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
     # the foot as it is played, and how it is corrected
     turned, places = joints_of(limb, hips, place)
-    sole = [plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS]
+    sole = _sole(turned, places)
     foot = _corrected(foot_before, sole, limb.contact, settings, seconds)
     shift_x, shift_z, _, _, height, *_ = foot
     # no point of the sole is below the ground
-    heel, ball, tip = sole
-    lift = larger(height - smaller(smaller(ball[1], heel[1]), tip[1]), 0.0)
+    lift = larger(height - _lowest(sole), 0.0)
     moves = (shift_x != 0) | (shift_z != 0) | (lift > 0)
     if moves is False:
         return foot, limb.local[:3]
@@ -142,17 +146,16 @@ def _corrected(
     # offset of one that swings returns to 0
     held_x = shift_x - move_x
     held_z = shift_z - move_z
-    near = _length(held_x, held_z) < settings.farthest
     slow = _length(move_x, move_z) < settings.swings * seconds
-    stands = (contact > settings.stands) & near & slow
+    stands = (contact > settings.stands) & (_length(held_x, held_z) < settings.farthest) & slow
     fade = Inertializer(settings.fade)
     shift_x, drift_x = _held_or_faded(stands, held_x, shift_x, drift_x, fade, seconds)
     shift_z, drift_z = _held_or_faded(stands, held_z, shift_z, drift_z, fade, seconds)
 
     # step: a foot that moves over the ground while it is marked as a contact is lifted
     moved = _length(shift_x - held_x, shift_z - held_z)
-    height, rise = _stepped(height, rise, contact, moved, settings, seconds)
-    return [shift_x, shift_z, drift_x, drift_z, height, rise, *chain.from_iterable(sole)]
+    height_and_rise = _stepped(height, rise, contact, moved, settings, seconds)
+    return [shift_x, shift_z, drift_x, drift_z, *height_and_rise, *chain.from_iterable(sole)]
 
 
 def _held_or_faded(
@@ -187,6 +190,17 @@ def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float
     # before the first tick a foot has not moved
     is_new = sole_before[0] == math.inf
     return where(is_new, 0.0, move_x), where(is_new, 0.0, move_z)
+
+
+def _sole(turned: Sequence[Quaternion], places: Sequence[Vector]) -> list[Vector]:
+    """Where the points of a sole are, of rotations and places of a leg's joints."""
+    return [plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS]
+
+
+def _lowest(sole: Sequence[Vector]) -> Part:
+    """The height of the lowest point of a sole."""
+    heel, ball, tip = sole
+    return smaller(smaller(ball[1], heel[1]), tip[1])
 
 
 def _length(x: Part, z: Part) -> Part:

@@ -161,12 +161,12 @@ class SteerModel(ControlModel):
             raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
         return SaidActs(self, words) if isinstance(words, GenerateModel) else words
 
-    def phases(self, characters: int, given: ArrayLike | None = None) -> Rows | None:
+    def phases(self, characters: int, chosen: ArrayLike | None = None) -> Rows | None:
         """The phase of each character; None for those that search after every command."""
         every = self.matcher.settings.search_every
-        if given is None:
+        if chosen is None:
             return np.arange(characters) % every if characters >= SPREAD_FROM else None
-        phases = np.asarray(given)
+        phases = np.asarray(chosen)
         fits = phases.shape in ((), (characters,)) and phases.dtype.kind in "iu"
         if not (fits and (phases >= 0).all() and (phases < every).all()):
             raise ControlError(

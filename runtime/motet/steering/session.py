@@ -379,17 +379,17 @@ class SteerSession:
         """Whether what the left and the right hand reach for was out of reach in the last tick (characters, 2)."""
         return np.stack([self._state.left.beyond, self._state.right.beyond], axis=1)
 
-    def _with_points(self, before: Array, points: ArrayLike | None, who: CharacterIds) -> Array:
+    def _with_points(self, before: Array, points: ArrayLike | None, ids: CharacterIds) -> Array:
         """Points (B, 3) with new ones for some characters, NaN for None."""
-        characters = self._chosen(who)
+        characters = self._chosen(ids)
         after = before.copy()
         after[characters] = np.nan
         if points is not None:
             after[characters] = self._numbers("points need x, y and z", points, 3, count=len(characters))
         return after
 
-    def _chosen(self, who: CharacterIds) -> Rows:
-        return chosen_ids(who, self.characters)
+    def _chosen(self, ids: CharacterIds) -> Rows:
+        return chosen_ids(ids, self.characters)
 
     def _numbers(self, needed: str, values: Any, *columns: int, count: int | None = None) -> Array:
         """Numbers for all characters or for each; by default for all of the session (:func:`numbers_of`)."""
