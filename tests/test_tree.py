@@ -10,10 +10,10 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 194
+MOST_LARGE_FUNCTIONS = 192
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 50
+MOST_BANNED_NAMES = 49
 MOST_TUPLE_ASSIGNMENTS = 15
 MOST_NESTED_COMPREHENSIONS = 43
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
