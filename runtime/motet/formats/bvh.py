@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,12 @@ from motet.motion.rotations import Array, rotmats_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
+
+CHANNELS = {f"{axis}position": f"t{axis}" for axis in "xyz"} | {f"{axis}rotation": f"r{axis}" for axis in "xyz"}
+"""Channels in small letters -> their names in a motion."""
+
+MOST_EMPTY_FRAMES = 10**7
+"""Frames of a file without channels."""
 
 
 def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motion:
@@ -39,25 +46,38 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
     lines = text.read_text(file).split("\n")
     figures, motion_line = _hierarchy(path, lines)
     number = text.chosen(path, _figure_names(figures), figure, "figure")
-    start, declared, fps = _motion_header(path, lines, motion_line)
+    header = _motion_header(path, lines, motion_line)
+    # a line holds the channels of all figures, one after the other
     widths = [sum(len(node.channels) for node in nodes) for nodes in figures]
-    width = sum(widths)
-    # without channels nothing else confirms the number
-    if not width and declared > 10**7:
-        raise FormatError(path, f"the file declares {declared} frames and has no channels", start)
-    if partial:
-        lines = _complete_lines(lines, start, width)
-    values = _values(path, lines, start, width) if width else np.zeros((declared, 0))
-    _check_count(path, len(values), declared, partial, start)
-    # the columns of this figure among those of all
+    frames = _frames(path, lines, header, sum(widths), partial)
     first_column = sum(widths[:number])
-    values = values[:, first_column : first_column + widths[number]]
-    nodes = figures[number]
-    channels = []
+    values = frames[:, first_column : first_column + widths[number]]
+    return _motion(path, figures[number], values, header.fps)
+
+
+def _motion(path: Path, nodes: "list[_Node]", values: Array, fps: float) -> Motion:
+    """The motion of one figure with the values (T, D) of its channels."""
+    channels: list[str] = []
     for node in nodes:
         channels += [f"{node.name}.{kind}" for kind in node.channels]
     units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
-    return Motion(values, tuple(channels), units, fps, Skeleton(tuple(_joint(path, node) for node in nodes)))
+    joints = tuple(_joint(path, node) for node in nodes)
+    return Motion(values, tuple(channels), units, fps, Skeleton(joints))
+
+
+def _frames(path: Path, lines: list[str], header: "_Header", width: int, partial: bool) -> Array:
+    """The values (T, width) of all frames; FormatError where they are not those that the file declares."""
+    if not width:
+        # without channels nothing else confirms the number
+        if header.frames > MOST_EMPTY_FRAMES:
+            reason = f"the file declares {header.frames} frames and has no channels"
+            raise FormatError(path, reason, header.line)
+        return np.zeros((header.frames, 0))
+    if partial:
+        lines = _complete_lines(lines, header.line, width)
+    values = _values(path, lines, header.line, width)
+    _check_count(path, len(values), header, partial)
+    return values
 
 
 def _complete_lines(lines: list[str], start: int, width: int) -> list[str]:
@@ -69,15 +89,16 @@ def _complete_lines(lines: list[str], start: int, width: int) -> list[str]:
     return lines[:last] if is_cut else lines
 
 
-def _check_count(path: Path, held: int, declared: int, partial: bool, line: int) -> None:
+def _check_count(path: Path, held: int, header: "_Header", partial: bool) -> None:
     """FormatError where fewer frames are held than declared, unless ``partial``; other differences are logged."""
-    if held < declared and not partial:
-        reason = f"the file declares {declared} frames but holds {held}: correct the line 'Frames:'"
-        raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", line)
-    if held < declared:
-        log.info("%s: read %d of the declared %d frames", path, held, declared)
-    elif held > declared:
+    declared = header.frames
+    if held > declared:
         log.warning("%s: it declares %d frames but holds %d: read them all", path, declared, held)
+    elif held < declared and partial:
+        log.info("%s: read %d of the declared %d frames", path, held, declared)
+    elif held < declared:
+        reason = f"the file declares {declared} frames but holds {held}: correct the line 'Frames:'"
+        raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", header.line)
 
 
 def contents(file: File) -> text.Contents:
@@ -110,7 +131,8 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[list[_Node]], int]:
     """The joints of each ROOT, and the number of the line MOTION after them."""
     hierarchy = _Hierarchy(path)
     for line, content in enumerate(lines, 1):
-        for piece in re.split("([{}])", content):
+        # braces may stand beside other statements: each becomes a piece of its own
+        for piece in content.replace("{", "\n{\n").replace("}", "\n}\n").split("\n"):
             if not (statement := piece.strip()):
                 continue
             if hierarchy.is_complete() and statement.lower().split()[0] == "motion":
@@ -177,22 +199,29 @@ class _Hierarchy:
 
 
 def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
-    kinds = (("position", "t"), ("rotation", "r"))
-    known: dict[str, str] = {}
-    for kind, letter in kinds:
-        known |= {f"{axis}{kind}": f"{letter}{axis}" for axis in "xyz"}
-    if unknown := [word for word in words[1:] if word.lower() not in known]:
-        reason = f"channel {quoted(unknown[0])}: expected one of Xposition ... Zposition, Xrotation ... Zrotation"
-        raise FormatError(path, reason, line)
-    channels = tuple(known[word.lower()] for word in words[1:])
+    """The channels after their count, as "tx" ... "rz"; FormatError for others, or another count."""
+    channels = []
+    for word in words[1:]:
+        if word.lower() not in CHANNELS:
+            expected = "expected one of Xposition ... Zposition, Xrotation ... Zrotation"
+            raise FormatError(path, f"channel {quoted(word)}: {expected}", line)
+        channels.append(CHANNELS[word.lower()])
     if words[:1] != [str(len(channels))] or len(set(channels)) < len(channels):
         reason = f"CHANNELS needs a count and that many different channels, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)
-    return channels
+    return tuple(channels)
 
 
-def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int, int, float]:
-    """The number of lines before the first frame, the declared number of frames and the frame rate."""
+class _Header(NamedTuple):
+    """What the lines after MOTION state. line: the number of the last one, after which the frames begin."""
+
+    line: int
+    frames: int
+    fps: float
+
+
+def _motion_header(path: Path, lines: list[str], motion_line: int) -> _Header:
+    """The lines "Frames:" and "Frame Time:", in either order; FormatError for any other before both."""
     frames = None
     fps = None
     for line, content in enumerate(lines[motion_line:], start=motion_line + 1):
@@ -205,32 +234,41 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> tuple[int,
             reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(content.strip())}"
             raise FormatError(path, reason, line)
         if frames is not None and fps is not None:
-            return line, frames, fps
+            return _Header(line, frames, fps)
     raise FormatError(path, "the file ends before 'Frames:' and 'Frame Time:'", len(lines))
 
 
 def _fps(path: Path, word: str, line: int) -> float:
+    """The frame rate of a frame time: whole if its digits allow only one whole number."""
     seconds = text.number(word, path, line)
     if not seconds > 0:
         raise FormatError(path, f"frame time {word} s is out of range: expected more than 0", line)
     fps = text.frame_rate(1 / seconds, path, line)
     precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
-    near = [rate for rate in (round(fps) - 1, round(fps), round(fps) + 1) if rate > 0]
-    whole = [rate for rate in near if abs(1 / rate - seconds) <= precision]
-    return whole[0] if len(whole) == 1 else fps
+    possible = []
+    for rate in (round(fps) - 1, round(fps), round(fps) + 1):
+        if rate > 0 and abs(1 / rate - seconds) <= precision:
+            possible.append(rate)
+    return possible[0] if len(possible) == 1 else fps
 
 
 def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
     """The frames (T, width) after the header, one per line or not; FormatError if one is truncated."""
-    words = "\n".join(lines[start:]).split()
-    values = text.finite(words)
-    if values is not None and len(words) % width == 0:
+    frames = lines[start:]
+    # nearly all files have a frame in each line, which numpy reads at once
+    values = text.table(frames)
+    if values is None:
+        words = "\n".join(frames).split()
+        values = text.finite(words)
+    if values is not None and values.size % width == 0:
         return values.reshape(-1, width)
-    for line, content in enumerate(lines[start:], start=start + 1):
+    # a fault: line by line, to name the place
+    count = sum(len(content.split()) for content in frames)
+    for line, content in enumerate(frames, start=start + 1):
         row = text.numbers(content.split(), path, line)
-        if len(words) % width and len(row) not in (0, width):
+        if count % width and len(row) not in (0, width):
             raise FormatError(path, f"truncated frame: a frame has {width} values, this line has {len(row)}", line)
-    raise FormatError(path, f"{len(words)} values do not make complete frames of {width}")
+    raise FormatError(path, f"{count} values do not make complete frames of {width}")
 
 
 def write(file: File, motion: Motion) -> None:
@@ -245,20 +283,28 @@ def write(file: File, motion: Motion) -> None:
     motion, moving = text.with_still_offsets(place_of(file), motion)
     # some readers fail on blanks and colons in names
     names = text.plain_names(skeleton_of(motion).names, r"[^\w.-]")
-    translated = {0, *(skeleton_of(motion).index(name) for name in moving)}
+    translated = {0, *map(skeleton_of(motion).index, moving)}
     motion = text.with_names(motion, names)
     lines, joints = _tree(motion, translated)
+    rows = _rows(motion, joints, translated)
+    head = ["HIERARCHY", *lines, "MOTION", f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
+    frames = [" ".join(map(repr, row)) for row in rows.tolist()]
+    write_whole(file, "\n".join([*head, *frames, ""]))
+
+
+def _rows(motion: Motion, joints: list[int], translated: set[int]) -> Array:
+    """The values (T, D) of joints in the file's order, translations before rotations."""
     translations = local_translations(motion)
     angles = _zyx_degrees(motion)
     blocks = []
     for i in joints:
-        blocks += [translations[:, i], angles[:, i]] if i in translated else [angles[:, i]]
+        if i in translated:
+            blocks.append(translations[:, i])
+        blocks.append(angles[:, i])
     rows = np.concatenate(blocks, axis=1)
     if not np.isfinite(rows).all():
         raise MotionError("values of this motion are too large to convert")
-    head = ["HIERARCHY", *lines, "MOTION", f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]
-    frames = [" ".join(map(repr, row)) for row in rows.tolist()]
-    write_whole(file, "\n".join([*head, *frames, ""]))
+    return rows
 
 
 def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:

@@ -100,6 +100,17 @@ def finite(words: Sequence[str]) -> Array | None:
     return None if "_" in "".join(words) or not np.isfinite(values).all() else values
 
 
+def table(lines: Sequence[str]) -> Array | None:
+    """Lines of equally many finite numbers as (N, D), in one pass; None for others, and where the first is blank."""
+    if not lines or not lines[0].strip():  # numpy would warn of lines without numbers
+        return None
+    try:
+        values = np.loadtxt(lines, comments=None, ndmin=2, encoding=None)
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None
+
+
 def check_rate(path: Path, stated: float | None, given: float | None) -> None:
     """FormatError where a file states another frame rate than the one that was given for it."""
     if stated is not None and given is not None and abs(stated - given) > 1e-6 * stated:
