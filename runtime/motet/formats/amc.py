@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import compress, cycle, islice
 from pathlib import Path
 from typing import TypeVar
@@ -22,8 +22,8 @@ T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
-Layout = list[tuple[str, int]]
-"""The bones of a frame, and how many values each has."""
+Layout = dict[str, int]
+"""The bones of a frame in the file's order, and how many values each has."""
 
 
 def read(file: File, asf: str | Path | None = None, fps: float | None = None, partial: bool = False) -> Motion:
@@ -45,22 +45,11 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     header, unit, stated_fps = _header(path, lines, skeleton)
     text.check_rate(path, stated_fps, fps)
     layout = _layout(path, words_of(lines, header), skeleton.dofs)
-    try:
-        values = _values(path, lines, header, layout)
-    except FormatError:
-        last = max((n for n, line in enumerate(lines) if line.rstrip().isdecimal()), default=None)
-        if last is None or not partial:
-            raise
-        values = _values(path, lines[:last], header, layout)
-        log.info("%s: the last frame is truncated and was left out", path)
-    channels = []
-    units = []
-    for bone, _ in layout:
-        for dof in skeleton.dofs[bone]:
-            channels.append(f"{bone}.{dof}")
-            units.append("length" if dof[0] == "t" else unit)
+    values = _frames(path, lines, header, layout, partial)
+    channels = _channels(layout, skeleton.dofs)
     rates = [rate for rate in (stated_fps, fps, 120.0) if rate is not None]
-    return Motion(values, tuple(channels), tuple(units), text.frame_rate(rates[0], path), skeleton.skeleton)
+    rate = text.frame_rate(rates[0], path)
+    return Motion(values, channels, text.units_of(channels, unit), rate, skeleton.skeleton)
 
 
 def skeleton_for(stem: str, skeletons: Mapping[str, T]) -> T | None:
@@ -105,10 +94,10 @@ def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[st
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
     line, words = next(lines, (0, []))
     if not words:
-        return [(bone, len(names)) for bone, names in dofs.items()]
+        return {bone: len(names) for bone, names in dofs.items()}
     if not _is_frame_number(words):
         raise FormatError(path, f"expected a frame number alone on its line, not {quoted(' '.join(words))}", line)
-    layout: dict[str, int] = {}
+    layout: Layout = {}
     for line, words in lines:
         if _is_frame_number(words):
             break
@@ -117,68 +106,91 @@ def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[st
         if words[0] not in dofs:
             raise FormatError(path, f"bone {quoted(words[0])} has no degrees of freedom in the skeleton file", line)
         layout[words[0]] = len(dofs[words[0]])
-    return list(layout.items())
+    return layout
+
+
+def _channels(bones: Iterable[str], dofs: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """The channels of bones, each bone's in the order of its degrees of freedom."""
+    channels: list[str] = []
+    for bone in bones:
+        channels += [f"{bone}.{dof}" for dof in dofs[bone]]
+    return tuple(channels)
 
 
 def _is_frame_number(words: list[str]) -> bool:
     return len(words) == 1 and words[0].isdigit()
 
 
+def _frames(path: Path, lines: list[str], header: int, layout: Layout, partial: bool) -> Array:
+    """All values (T, D); if ``partial``, without a last frame that is not like the others."""
+    try:
+        return _values(path, lines, header, layout)
+    except FormatError:
+        frame_numbers = [line for line, content in enumerate(lines) if content.rstrip().isdecimal()]
+        if not partial or not frame_numbers:
+            raise
+        values = _values(path, lines[: frame_numbers[-1]], header, layout)
+        log.info("%s: the last frame is truncated and was left out", path)
+        return values
+
+
 def _values(path: Path, lines: list[str], header: int, layout: Layout) -> Array:
-    """All values (T, D), with every line checked against the first frame."""
-    plain = _plain_values(lines[header:], layout)
-    if plain is not None:
-        return plain
-    frame = [("", 0), *layout]  # the lines of a frame: its number, and a line for each bone
-    words_of_values: list[str] = []
-    at = line = frames = 0
-    for line, words in words_of(lines, header):
-        bone, count = frame[at]
-        is_number = _is_frame_number(words)
-        if at and is_number:
-            break
-        is_expected = words[0] == bone if at else is_number
-        if not is_expected:
-            wanted = f"bone {bone!r}" if at else "a frame number"
-            raise FormatError(path, f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
-        if len(words) - 1 != count:
-            raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
-        words_of_values += words[1:]
-        frames += at == 0
-        at = (at + 1) % len(frame)
-    if at:
-        raise FormatError(path, f"truncated frame: bone {frame[at][0]!r} is missing", line)
-    values = text.finite(words_of_values)
+    """All values (T, D); FormatError for a line that is not like that of the first frame."""
+    values = _values_at_once(lines[header:], layout)
     if values is None:
-        values = np.array(_checked_numbers(path, lines, header))
-    return values.reshape(frames, sum(count for _, count in layout))
-
-
-def _checked_numbers(path: Path, lines: list[str], header: int) -> list[float]:
-    """All values, line by line; FormatError names the line at fault."""
-    values: list[float] = []
-    for line, words in words_of(lines, header):
-        values += text.numbers(words[1:], path, line)
+        # a fault: line by line, to name the place
+        _check_lines(path, lines, header, layout)
+        rows = [text.numbers(words[1:], path, line) for line, words in words_of(lines, header)]
+        values = np.concatenate(rows).reshape(-1, sum(layout.values()))
     return values
 
 
-def _plain_values(lines: list[str], layout: Layout) -> Array | None:
-    """All values (T, D) of lines without comments that are all like in the first frame, several times as fast as line
-    by line; None for others, faulty ones included."""
+def _values_at_once(lines: list[str], layout: Layout) -> Array | None:
+    """All values (T, D) of lines that are all like in the first frame, several times as fast as line by line; None for
+    others, and for words that are no numbers."""
     # with an end after each line, the words of every frame are at the same places only if the lines are alike, too
-    words = " ; ".join([*filter(str.strip, lines), ""]).split()
+    content = _with_ends(lines)
+    if "#" in content:
+        content = _with_ends([line.partition("#")[0] for line in lines])
+    words = content.split()
     # of a frame's words: a name, an end, or None for a value; the first is the number of the frame
     kinds: list[str | None] = ["", ";"]
-    for bone, count in layout:
+    for bone, count in layout.items():
         kinds += [bone, *[None] * count, ";"]
     frames, rest = divmod(len(words), len(kinds))
-    if rest or not frames or not all(map(str.isdigit, words[:: len(kinds)])):
+    if rest or not all(map(str.isdigit, words[:: len(kinds)])):
         return None
-    for place, kind in enumerate(kinds[1:], start=1):
-        if kind is not None and words[place :: len(kinds)].count(kind) < frames:
+    for place, kind in enumerate(kinds):
+        if kind and words[place :: len(kinds)].count(kind) < frames:
             return None
     values = text.finite(list(compress(words, cycle([kind is None for kind in kinds]))))
     return None if values is None else values.reshape(frames, kinds.count(None))
+
+
+def _with_ends(lines: list[str]) -> str:
+    """Lines that are not blank, a semicolon after each."""
+    return " ; ".join([*filter(str.strip, lines), ""])
+
+
+def _check_lines(path: Path, lines: list[str], header: int, layout: Layout) -> None:
+    """FormatError for the first line that is not like that of the first frame, whatever its values are."""
+    frame = {"": 0} | layout  # the lines of a frame: its number, and a line for each bone
+    expected = cycle(frame.items())
+    bone, count = next(expected)
+    line = 0
+    for line, words in words_of(lines, header):
+        is_number = _is_frame_number(words)
+        if bone and is_number:
+            break
+        is_expected = words[0] == bone if bone else is_number
+        if not is_expected:
+            wanted = f"bone {bone!r}" if bone else "a frame number"
+            raise FormatError(path, f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
+        if len(words) - 1 != count:
+            raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
+        bone, count = next(expected)
+    if bone:
+        raise FormatError(path, f"truncated frame: bone {bone!r} is missing", line)
 
 
 def write(file: File, motion: Motion) -> None:
@@ -203,28 +215,39 @@ def write(file: File, motion: Motion) -> None:
     # a bone's name has no blanks or comments, and is neither a number nor a keyword
     names = text.plain_names(["root", *skeleton_of(motion).names[1:]], r"[\s#]|^(?=\d+$)|^(?=:)")
     motion = text.with_names(motion, names)
-    dofs = {joint.name: dofs for joint in skeleton_of(motion).joints if (dofs := _dofs_of(motion, joint))}
-    frames = _frames(motion, dofs)
+    dofs = {}
+    for joint in skeleton_of(motion).joints:
+        if dofs_of_joint := _dofs_of(motion, joint):
+            dofs[joint.name] = dofs_of_joint
+    frames = _frame_lines(motion, dofs)
     write_whole(path.with_suffix(".asf"), asf_text(Asf(skeleton_of(motion), dofs, "deg")))
-    write_whole(path, frames)
+    write_whole(path, "\n".join([*frames, ""]))
 
 
 def _dofs_of(motion: Motion, joint: Joint) -> tuple[str, ...]:
     """The joint's channels in the motion's order if the rotation order allows it: the first one turns first."""
-    parts = (name.rpartition(".") for name in motion.channels)
-    dofs = tuple(kind for name, _, kind in parts if name == joint.name)
+    dofs = []
+    for channel in motion.channels:
+        name, _, kind = channel.rpartition(".")
+        if name == joint.name:
+            dofs.append(kind)
+    # in the file, the first turn is applied first: the last letter of the order
     turns = [f"r{axis}" for axis in reversed(joint.order) if f"r{axis}" in dofs]
-    kept = [dof for dof in dofs if dof[0] == "r"] == turns
-    return dofs if kept else (*(dof for dof in dofs if dof[0] == "t"), *turns)
+    if [dof for dof in dofs if dof[0] == "r"] != turns:
+        dofs = [dof for dof in dofs if dof[0] == "t"] + turns
+    return tuple(dofs)
 
 
-def _frames(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> str:
+def _frame_lines(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """The lines of an AMC file: the header, and of each frame its number and a line for each bone."""
     bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
     unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"
-    channels = tuple(f"{bone}.{dof}" for bone in bones for dof in dofs[bone])
-    values = motion.select(channels, tuple("length" if name[-2] == "t" else unit for name in channels)).values
+    channels = _channels(bones, dofs)
+    values = motion.select(channels, text.units_of(channels, unit)).values
     lines = [f"# fps {motion.fps!r}", ":FULLY-SPECIFIED", ":RADIANS" if unit == "rad" else ":DEGREES"]
     for frame, row in enumerate(values.tolist(), start=1):
+        lines.append(str(frame))
         words = map(repr, row)
-        lines += [str(frame), *(" ".join([bone, *islice(words, len(dofs[bone]))]) for bone in bones)]
-    return "\n".join([*lines, ""])
+        for bone in bones:
+            lines.append(" ".join([bone, *islice(words, len(dofs[bone]))]))
+    return lines

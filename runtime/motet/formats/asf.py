@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from motet.errors import FormatError, MotionError, quoted
-from motet.formats.text import Names, Triple, complete_order, number, read_text, spaced, triple
+from motet.formats.text import NOWHERE, Names, Triple, complete_order, number, read_text, spaced, triple
 from motet.motion.rotations import euler_to_rotmat, rotmat_to_euler
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -22,6 +22,7 @@ CMU_METRES = 0.0254 / 0.45
 """CMU writes ``length 0.45`` for lengths in inches times 0.45. Other values have no known meaning."""
 
 Lines = list[tuple[int, list[str]]]
+"""Numbers of lines, and their words."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Asf:
 @dataclass
 class _Bone:
     name: str
-    reach: Triple = (0.0, 0.0, 0.0)
-    axis: Triple = (0.0, 0.0, 0.0)
+    reach: Triple = NOWHERE
+    axis: Triple = NOWHERE
     dofs: tuple[str, ...] = ()
     children: list[str] = field(default_factory=list)
     order: str = "XYZ"
@@ -59,19 +60,29 @@ def read_skeleton(path: str | Path) -> Asf:
 def _skeleton(path: Path, text: str) -> Asf:
     """A folder mostly holds motions of a few people: each skeleton is parsed once."""
     sections = _sections(path, text)
-    units = {words[0].lower(): words[1] for _, words in sections.get("units", []) if len(words) > 1}
-    angle = units.get("angle", "deg").lower()[:3]
+    units = _units(sections.get("units", []))
+    angle = units["angle"].lower()[:3]
     if angle not in ("deg", "rad"):
         raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
     bones = _read_bones(path, sections, 1.0 if angle == "deg" else 180 / np.pi)
     joints = _joints(bones)
     if lost := bones.keys() - {joint.name for joint in joints}:
         raise FormatError(path, f"the hierarchy does not reach bone {quoted(min(lost))}")
+    dofs = {bone.name: bone.dofs for bone in bones.values() if bone.dofs}
     try:
-        skeleton = Skeleton(tuple(joints), CMU_METRES if units.get("length") == "0.45" else None)
+        skeleton = Skeleton(tuple(joints), CMU_METRES if units["length"] == "0.45" else None)
     except MotionError as error:
         raise FormatError(path, str(error)) from error
-    return Asf(skeleton, {bone.name: bone.dofs for bone in bones.values() if bone.dofs}, angle)
+    return Asf(skeleton, dofs, angle)
+
+
+def _units(lines: Lines) -> dict[str, str]:
+    """The units by quantity, of angles degrees if the file does not say."""
+    units = {"angle": "deg", "length": ""}
+    for _, words in lines:
+        if len(words) > 1:
+            units[words[0].lower()] = words[1]
+    return units
 
 
 def _sections(path: Path, text: str) -> dict[str, Lines]:
@@ -122,14 +133,10 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
 
 def _root(path: Path, lines: Lines, factor: float) -> _Bone:
     """The root, with its position in place of its reach."""
-    # keyword -> its line and words, with defaults for those that may be absent
-    entries: dict[str, tuple[int, list[str]]] = {
-        "position": (0, ["", "0", "0", "0"]),
-        "orientation": (0, ["", "0", "0", "0"]),
-        "axis": (0, ["XYZ"]),
-        "order": (0, []),
-    }
-    entries |= {words[0].lower(): (line, words) for line, words in lines}
+    # of the lines that may be absent, these are the defaults
+    entries = {"position": (0, ["", "0", "0", "0"]), "axis": (0, ["XYZ"]), "order": (0, [""])}
+    entries["orientation"] = entries["position"]
+    entries |= _entries(lines)
     line, position = entries["position"]
     reach = triple(position[1:], path, line)
     line, angles = entries["orientation"]
@@ -140,17 +147,22 @@ def _root(path: Path, lines: Lines, factor: float) -> _Bone:
     return _Bone("root", reach, axis, dofs)
 
 
+def _entries(lines: Lines) -> dict[str, tuple[int, list[str]]]:
+    """The number and the words of each line by its keyword, which is the first of them."""
+    return {words[0].lower(): (line, words) for line, words in lines}
+
+
 def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
-    entries = {words[0].lower(): (line, words) for line, words in lines}
+    entries = {"dof": (0, [""]), "name": (0, [""])} | _entries(lines)
     if missing := [word for word in ("direction", "length", "axis") if word not in entries]:
         raise FormatError(path, f"this bone has no {' or '.join(missing)}", begin)
     line, length_words = entries["length"]
     length = number((*length_words, "")[1], path, line)
     line, direction = entries["direction"]
     reach = [repr(value * length) for value in triple(direction[1:], path, line)]
-    line, dof_words = entries.get("dof", (0, []))
+    line, dof_words = entries["dof"]
     dofs = _dofs(path, line, dof_words, known=("rx", "ry", "rz"))
-    _, name_words = entries.get("name", (0, [""]))
+    _, name_words = entries["name"]
     line, axis_words = entries["axis"]
     axis = _axis(path, line, axis_words, factor)
     return _Bone(name_words[-1], triple(reach, path, begin), axis, dofs)
@@ -165,6 +177,7 @@ def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:
     x, y, z = triple(words[1:-1], path, line)
     if order == "xyz":
         return x * factor, y * factor, z * factor
+    # the first letter turns first, so it is the last of the product
     frame = euler_to_rotmat(np.radians(np.array([z, y, x]) * factor), order[::-1])
     z, y, x = np.degrees(rotmat_to_euler(frame, "zyx")).tolist()
     return x, y, z
@@ -203,7 +216,8 @@ def _joints(bones: dict[str, _Bone]) -> list[Joint]:
         here = len(joints)
         turns = "".join(dof[1] for dof in reversed(bone.dofs) if dof[0] == "r")
         joints.append(Joint(name, parent, offset, complete_order(turns), bone.axis))
-        reach = bone.reach if parent >= 0 else (0.0, 0.0, 0.0)
+        # the root's reach is where it is, not where its children start
+        reach = bone.reach if parent >= 0 else NOWHERE
         waiting.extend((child, here, reach) for child in reversed(bone.children))
         if not bone.children and any(reach):
             joints.append(Joint(name + END_SUFFIX, here, reach))
@@ -221,18 +235,44 @@ def asf_text(asf: Asf) -> str:
     """An ASF file, angles in degrees. The root must be called "root" and names must have no blanks."""
     root, *bones = _bones(asf)
     unit = 0.45 if asf.skeleton.metres_per_unit == CMU_METRES else 1.0
-    lines = [":version 1.10", ":name motet", ":units", "  mass 1.0", f"  length {unit}", "  angle deg", ":root"]
-    lines += [f"  order {' '.join(root.dofs).upper()}", f"  axis {root.order}"]
-    lines += [f"  position {spaced(root.reach)}", f"  orientation {spaced(root.axis)}", ":bonedata"]
-    for i, bone in enumerate(bones, start=1):
-        length = float(np.linalg.norm(bone.reach))
-        direction = [value / length for value in bone.reach] if length else (0.0, 1.0, 0.0)
-        lines += ["  begin", f"    id {i}", f"    name {bone.name}", f"    direction {spaced(direction)}"]
-        lines += [f"    length {length!r}", f"    axis {spaced(bone.axis)} {bone.order}"]
-        lines += [f"    dof {' '.join(bone.dofs)}", "  end"] if bone.dofs else ["  end"]
-    lines += [":hierarchy", "  begin"]
-    lines += [f"    {' '.join([bone.name, *bone.children])}" for bone in (root, *bones) if bone.children]
-    return "\n".join([*lines, "  end", ""])
+    bone_data = "".join(_bone_text(bone, i) for i, bone in enumerate(bones, start=1))
+    hierarchy = ""
+    for bone in (root, *bones):
+        if bone.children:
+            hierarchy += f"    {' '.join([bone.name, *bone.children])}\n"
+    return f"""\
+:version 1.10
+:name motet
+:units
+  mass 1.0
+  length {unit}
+  angle deg
+:root
+  order {" ".join(root.dofs).upper()}
+  axis {root.order}
+  position {spaced(root.reach)}
+  orientation {spaced(root.axis)}
+:bonedata
+{bone_data}:hierarchy
+  begin
+{hierarchy}  end
+"""
+
+
+def _bone_text(bone: _Bone, number: int) -> str:
+    """The lines of a bone in :bonedata."""
+    length = float(np.linalg.norm(bone.reach))
+    direction = [value / length for value in bone.reach] if length else (0.0, 1.0, 0.0)
+    dofs = f"    dof {' '.join(bone.dofs)}\n" if bone.dofs else ""
+    return f"""\
+  begin
+    id {number}
+    name {bone.name}
+    direction {spaced(direction)}
+    length {length!r}
+    axis {spaced(bone.axis)} {bone.order}
+{dofs}  end
+"""
 
 
 def _bones(asf: Asf) -> list[_Bone]:
@@ -240,36 +280,55 @@ def _bones(asf: Asf) -> list[_Bone]:
     bones: dict[str, _Bone] = {}
     joints = asf.skeleton.joints
     names = Names(asf.skeleton.names)
-    tips = {i for i in range(1, len(joints)) if _is_tip(asf, i)}
+    tips = _tips(asf)
     for i, joint in enumerate(joints):
         if i in tips:
             continue
-        axis = joint.axis
-        children = asf.skeleton.children[i]
-        if joint.order != "zyx" and any(axis):  # in the order of its own rotation: some readers take one for the other
-            c, b, a = np.degrees(rotmat_to_euler(joint.frame, joint.order)).tolist()
-            axis = (a, b, c)
-        bone = _Bone(joint.name, (0.0, 0.0, 0.0), axis, asf.dofs.get(joint.name, ()), [], joint.order[::-1].upper())
+        bone = _Bone(joint.name, NOWHERE, _written_axis(joint), asf.dofs.get(joint.name, ()))
+        bone.order = joint.order[::-1].upper()
         bones[joint.name] = bone
-        offsets = {joints[child].offset for child in children}
-        start = (0.0, 0.0, 0.0)
+        # a bone ends where its children start, if that is one place; the root has no length, but a position
+        children = asf.skeleton.children[i]
+        starts = {joints[child].offset for child in children}
+        end = NOWHERE
         if joint.parent == -1:
             bone.reach = joint.offset
-        elif len(offsets) == 1:
-            start = bone.reach = offsets.pop()
-        for child in (joints[at] for at in children if at not in tips):
-            name = child.name
-            if child.offset != start:
-                name = names.unique(f"{child.name}_base")
-                bones[name] = _Bone(name, child.offset, children=[child.name])
-            bone.children.append(name)
+        elif len(starts) == 1:
+            end = bone.reach = starts.pop()
+        for base in _add_children(bone, end, [joints[at] for at in children if at not in tips], names):
+            bones[base.name] = base
     return list(bones.values())
 
 
-def _is_tip(asf: Asf, i: int) -> bool:
-    """Whether a joint needs no bone, because the reader adds it to the last bone."""
-    joint = asf.skeleton.joints[i]
-    parent = asf.skeleton.joints[asf.skeleton.joints[i].parent]
-    alone = asf.skeleton.children[joint.parent] == (i,) and not asf.skeleton.children[i]
-    named = joint.name == parent.name + END_SUFFIX and joint.name not in asf.dofs
-    return parent.parent != -1 and alone and named and any(joint.offset)
+def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: Names) -> list[_Bone]:
+    """Add the children of a bone with this end; those that start elsewhere hang on bones without channels that lead
+    there, which are returned."""
+    bases = []
+    for child in children:
+        name = child.name
+        if child.offset != end:
+            name = names.unique(f"{child.name}_base")
+            bases.append(_Bone(name, child.offset, children=[child.name]))
+        bone.children.append(name)
+    return bases
+
+
+def _written_axis(joint: Joint) -> Triple:
+    """The joint's axis in the order of its own rotation: some readers take one for the other."""
+    if joint.order == "zyx" or not any(joint.axis):
+        return joint.axis
+    c, b, a = np.degrees(rotmat_to_euler(joint.frame, joint.order)).tolist()
+    return a, b, c
+
+
+def _tips(asf: Asf) -> set[int]:
+    """The joints that need no bone, because the reader adds them to the last bone."""
+    joints = asf.skeleton.joints
+    tips = set()
+    for i, joint in enumerate(joints[1:], start=1):
+        parent = joints[joint.parent]
+        is_alone = asf.skeleton.children[joint.parent] == (i,) and not asf.skeleton.children[i]
+        is_named = joint.name == parent.name + END_SUFFIX and joint.name not in asf.dofs
+        if parent.parent != -1 and is_alone and is_named and any(joint.offset):
+            tips.add(i)
+    return tips

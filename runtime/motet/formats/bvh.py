@@ -48,7 +48,7 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
     number = text.chosen(path, _figure_names(figures), figure, "figure")
     header = _motion_header(path, lines, motion_line)
     # a line holds the channels of all figures, one after the other
-    widths = [sum(len(node.channels) for node in nodes) for nodes in figures]
+    widths = [len(_channel_names(nodes)) for nodes in figures]
     frames = _frames(path, lines, header, sum(widths), partial)
     first_column = sum(widths[:number])
     values = frames[:, first_column : first_column + widths[number]]
@@ -57,12 +57,17 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
 
 def _motion(path: Path, nodes: "list[_Node]", values: Array, fps: float) -> Motion:
     """The motion of one figure with the values (T, D) of its channels."""
+    channels = _channel_names(nodes)
+    joints = tuple(_joint(path, node) for node in nodes)
+    return Motion(values, channels, text.units_of(channels, "deg"), fps, Skeleton(joints))
+
+
+def _channel_names(nodes: "list[_Node]") -> tuple[str, ...]:
+    """The channels of a figure, such as "Hips.tx", in the order of the file."""
     channels: list[str] = []
     for node in nodes:
         channels += [f"{node.name}.{kind}" for kind in node.channels]
-    units = tuple("deg" if name[-2] == "r" else "length" for name in channels)
-    joints = tuple(_joint(path, node) for node in nodes)
-    return Motion(values, tuple(channels), units, fps, Skeleton(joints))
+    return tuple(channels)
 
 
 def _frames(path: Path, lines: list[str], header: "_Header", width: int, partial: bool) -> Array:
@@ -321,7 +326,9 @@ def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
             continue
         joints.append(i)
         is_last = _is_last(motion, i)
-        lines += [indent + line for line in _joint_lines(skeleton, i, i in translated, is_last)]
+        joint_text = _joint_text(skeleton, i, i in translated, is_last)
+        lines += [indent + line for line in joint_text.split("\n")]
+        # of what waits, the last comes next: the joints below, and then the brace
         waiting.append((None, depth))
         if not is_last:
             waiting += [(child, depth + 1) for child in reversed(skeleton.children[i])]
@@ -339,23 +346,31 @@ def _is_last(motion: Motion, i: int) -> bool:
     return child.name.endswith(END_SUFFIX) and not is_moved and not skeleton.children[children[0]]
 
 
-def _joint_lines(skeleton: Skeleton, i: int, is_translated: bool, is_last: bool) -> list[str]:
+def _joint_text(skeleton: Skeleton, i: int, is_translated: bool, is_last: bool) -> str:
     """The lines of a joint, without its closing brace."""
-    offset = skeleton.joints[i].offset if i else (0.0, 0.0, 0.0)
+    joint = skeleton.joints[i]
+    children = skeleton.children[i]
     positions = "6 Xposition Yposition Zposition" if is_translated else "3"
-    lines = [f"{'JOINT' if i else 'ROOT'} {skeleton.joints[i].name}", "{", f"\tOFFSET {text.spaced(offset)}"]
-    lines.append(f"\tCHANNELS {positions} Zrotation Yrotation Xrotation")
-    if is_last:
-        children = skeleton.children[i]
-        tip = skeleton.joints[children[0]].offset if children else (0.0, 0.0, 0.0)
-        lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {text.spaced(tip)}", "\t}"]
-    return lines
+    text_of_joint = f"""\
+{"JOINT" if i else "ROOT"} {joint.name}
+{{
+\tOFFSET {text.spaced(joint.offset if i else text.NOWHERE)}
+\tCHANNELS {positions} Zrotation Yrotation Xrotation"""
+    if not is_last:
+        return text_of_joint
+    tip = skeleton.joints[children[0]].offset if children else text.NOWHERE
+    return f"""{text_of_joint}
+\tEnd Site
+\t{{
+\t\tOFFSET {text.spaced(tip)}
+\t}}"""
 
 
 def _zyx_degrees(motion: Motion) -> Array:
     """Angles (T, J, 3) about z, y, x in degrees; unchanged if they already are."""
     skeleton = skeleton_of(motion)
     angles: Array = np.round(np.degrees(rotmats_to_euler(local_rotations(motion), "zyx")), 9).astype(np.float64)
+    # angles that already are about z, y and x are kept to the last bit
     kept = [i for i, joint in enumerate(skeleton.joints) if joint.order == "zyx" and not any(joint.axis)]
     angles[:, kept] = 0.0
     for name, columns in motion.rotation_columns().items():

@@ -19,7 +19,7 @@ import numpy as np
 from motet.errors import FormatError, MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
 from motet.files import File, place_of
-from motet.formats.gltf_data import Gltf, broken, parse
+from motet.formats.gltf_data import REST, Gltf, Tracks, broken, parse
 from motet.formats.text import (
     Clip,
     Contents,
@@ -38,9 +38,6 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
 
-PATHS = {"rotation": 4, "translation": 3, "scale": 3}
-"""The animated properties of a node, and how many numbers each has; mesh weights are left out."""
-
 MAX_SKINS = 500
 MAX_JOINTS = 3000
 """Skins of a file, and joints of its skeleton: a figure has a skin for each of its meshes, and a detailed facial rig
@@ -48,9 +45,6 @@ has a thousand joints."""
 
 LATE_START = 0.5
 """Seconds before the first key from which on a file's start is told; many programs count frames from 1."""
-
-Tracks = Mapping[tuple[int, str], Array]
-"""(Node, property) -> values (T, 3 or 4)."""
 
 
 def read(file: File, clip: Clip = None, rest: File | None = None, figure: FigureChoice = None) -> Motion:
@@ -415,7 +409,7 @@ def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
 def moved(animation: Mapping[str, Any]) -> set[int]:
     """The nodes that an animation moves."""
     targets = [channel["target"] for channel in animation.get("channels", [])]
-    return {target["node"] for target in targets if target.get("path") in PATHS and target.get("node") is not None}
+    return {target["node"] for target in targets if target.get("path") in REST and target.get("node") is not None}
 
 
 def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> tuple[Tracks, float]:
@@ -450,14 +444,14 @@ def _keys(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) 
     for channel in animation.get("channels", []):
         node = channel["target"].get("node")
         path = channel["target"].get("path")
-        if node not in nodes or path not in PATHS:
+        if node not in nodes or path not in REST:
             continue
         sampler = samplers[channel["sampler"]]
         times = gltf.array(sampler["input"])
         values = gltf.array(sampler["output"])
         interpolation = sampler.get("interpolation", "LINEAR")
         expected = times.size * (3 if interpolation == "CUBICSPLINE" else 1)  # a spline's keys have tangents
-        if values.size != expected * PATHS[path]:
+        if values.size != expected * len(REST[path]):
             counts = f"{times.size} times and {len(values)} values, not {expected},"
             track = f"the {path} of {quoted(gltf.name(node))}"
             raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {track}: export it again")
@@ -499,7 +493,7 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
 
     Beyond the first and last key the value stays (glTF 2.0, section 3.11 and appendix C).
     """
-    values = values.reshape(len(times), -1, PATHS[name])  # a key of a spline: in-tangent, value, out-tangent
+    values = values.reshape(len(times), -1, len(REST[name]))  # a key of a spline: in-tangent, value, out-tangent
     # the keys around each frame, and how far between them it is
     before = np.searchsorted(times, frames + 1e-6, side="right") - 1
     before = np.clip(before, 0, max(len(times) - 2, 0))

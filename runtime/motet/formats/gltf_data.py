@@ -34,6 +34,13 @@ MAX_NODES = 20_000
 """Nodes of a file: a figure has a few hundred."""
 
 
+Tracks = Mapping[tuple[int, str], Array]
+"""(Node, "translation", "rotation" or "scale") -> values (T, 3 or 4)."""
+
+REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+"""The parts of a node's transform, and what they are where a file does not say."""
+
+
 @contextmanager
 def broken(path: Path) -> Iterator[None]:
     """Turn errors from misplaced or mistyped content into FormatError."""
@@ -98,10 +105,9 @@ class Gltf:
         if "VRM" in extensions:
             old = extensions["VRM"].get("humanoid", {}).get("humanBones", [])
             return {bone["bone"]: bone["node"] for bone in old if bone["node"] != -1}  # UniVRM's bones that are not set
-        vrm: dict[str, Any] = next(
-            (extensions[name] for name in ("VRMC_vrm", "VRMC_vrm_animation") if name in extensions), {}
-        )
-        return {bone: value["node"] for bone, value in vrm.get("humanoid", {}).get("humanBones", {}).items()}
+        vrm = extensions.get("VRMC_vrm", extensions.get("VRMC_vrm_animation", {}))
+        bones = vrm.get("humanoid", {}).get("humanBones", {})
+        return {bone: value["node"] for bone, value in bones.items()}
 
     def name(self, node: int) -> str:
         """A node's name, or one made from its number; FormatError if it is not text."""
@@ -118,39 +124,39 @@ class Gltf:
             scale = np.linalg.norm(matrix[:3, :3], axis=0)
             turn = rotmat_to_quat(matrix[:3, :3] / np.where(scale > 0, scale, 1.0))
             return {"translation": matrix[:3, 3], "rotation": turn, "scale": scale}
-        rest = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
-        return {name: np.array(properties.get(name, values), np.float64) for name, values in rest.items()}
+        return {name: np.array(properties.get(name, values), np.float64) for name, values in REST.items()}
 
-    def world(
-        self, nodes: Iterable[int] | None = None, tracks: Mapping[tuple[int, str], Array] | None = None
-    ) -> tuple[Array, Array, Array]:
+    def world(self, nodes: Iterable[int] | None = None, tracks: Tracks | None = None) -> tuple[Array, Array, Array]:
         """Linear maps and rotations (T, N, 3, 3) and positions (T, N, 3) of nodes in the world, at rest (T = 1) or
-        moved by tracks, values (T, ...) of a node's "translation", "rotation" or "scale".
+        moved by tracks.
 
         nodes: the nodes to fill, including all their ancestors; all by default. Others are not filled.
         """
-        tracks = tracks or {}
+        wanted = set(self.order if nodes is None else nodes)
+        in_order = [node for node in self.order if node in wanted]
+        linear, turns, places = self._in_parents(in_order, tracks or {})
+        # each parent comes before its children, and is in the world by then
+        for node in in_order:
+            parent = self.parents[node]
+            if parent >= 0:
+                places[:, node] = places[:, parent] + rotated(linear[:, parent], places[:, node])
+                linear[:, node] = product(linear[:, parent], linear[:, node])
+                turns[:, node] = product(turns[:, parent], turns[:, node])
+        return linear, turns, places
+
+    def _in_parents(self, nodes: Iterable[int], tracks: Tracks) -> tuple[Array, Array, Array]:
+        """As :meth:`world`, each node in its parent."""
         frames = len(next(iter(tracks.values()), [0]))
         linear = frames_last((frames, len(self.parents), 3, 3))
         turns = frames_last((frames, len(self.parents), 3, 3))
         places = frames_last((frames, len(self.parents), 3))
-        wanted = self.order if nodes is None else set(nodes)
-        for node in self.order:
-            if node not in wanted:
-                continue
-            # the node in its parent
+        for node in nodes:
             properties = {name: tracks.get((node, name), rest) for name, rest in self.local(node).items()}
             quat = properties["rotation"]
             turn = quat_to_rotmat(quat / np.linalg.norm(quat, axis=-1, keepdims=True))
             linear[:, node] = turn * properties["scale"][..., None, :]
             turns[:, node] = turn
             places[:, node] = properties["translation"]
-            # and in the world, where its parent, which comes before it, already is
-            parent = self.parents[node]
-            if parent >= 0:
-                places[:, node] = places[:, parent] + rotated(linear[:, parent], places[:, node])
-                linear[:, node] = product(linear[:, parent], linear[:, node])
-                turns[:, node] = product(turns[:, parent], turns[:, node])
         return linear, turns, places
 
     def array(self, index: int) -> Array:
@@ -172,20 +178,23 @@ class Gltf:
         return self._arrays[index]
 
     def _decoded(self, index: int) -> Array:
+        """The numbers (N, ...) of an accessor as the file has them, whatever they are."""
         accessor = self.objects("accessors")[index]
         width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor["type"]]
         kind = np.dtype(COMPONENTS[accessor["componentType"]])
         count = accessor["count"]
+        # an accessor without a view is all zeros, of which a sparse one replaces some
         if "bufferView" in accessor:
             values = self._rows(index, accessor, kind, count, width).astype(np.float64)
+        elif count * width > self.size:
+            raise FormatError(self.path, f"accessor {index} has more zeros than the file has bytes")
         else:
-            if count * width > self.size:
-                raise FormatError(self.path, f"accessor {index} has more zeros than the file has bytes")
             values = np.zeros((count, width))
         if "sparse" in accessor:
             sparse = accessor["sparse"]
             changed = self._sparse_places(index, sparse, count)
             values[changed] = self._rows(index, sparse["values"], kind, len(changed), width)
+        # whole numbers may stand for 0 to 1, or -1 to 1
         return np.maximum(values / np.iinfo(kind).max, -1.0) if accessor.get("normalized") else values
 
     def _sparse_places(self, index: int, sparse: Mapping[str, Any], count: int) -> NDArray[np.int64]:
@@ -232,24 +241,30 @@ class Gltf:
             remedy = "install the extra with  pip install 'motet[meshopt]', or unpack the file with"
             command = "npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac"
             raise FormatError(self.path, f"its animations are packed by meshoptimizer: {remedy}  {command}")
+        content = self._packed(packed)
+        decode = import_module("meshopt").decode_gltf_buffer
+        kind = (packed["count"], packed["byteStride"], packed["mode"], packed.get("filter"))
+        try:
+            unpacked: bytes = decode(content, *kind).tobytes()
+        except (ValueError, TypeError) as error:
+            raise FormatError(self.path, f"a packed part is broken: {str(error)[:200]}") from error
+        return unpacked
+
+    def _packed(self, packed: Mapping[str, Any]) -> bytes:
+        """The packed bytes of a view; FormatError where they are not in the file, or would unpack to too many."""
         start = packed.get("byteOffset", 0)
         length = packed["byteLength"]
-        count = packed["count"]
-        stride = packed["byteStride"]
-        content = self.buffers[packed["buffer"]][start : start + length]
+        content: bytes = self.buffers[packed["buffer"]][start : start + length]
         if not 0 <= start <= start + length or len(content) < length:
             raise FormatError(self.path, "a packed part extends beyond its buffer: the file is truncated")
+        count = packed["count"]
+        stride = packed["byteStride"]
         room = MAX_UNPACKED - sum(map(len, self._unpacked.values()))
         # bytes that one packed byte can expand to: a block of 256 equal bytes takes two bits
         if not (count > 0 and stride > 0 and count * stride <= min(room, 1024 * length)):
             reason = f"a packed part of {length} bytes cannot hold {count} elements of {stride} bytes"
             raise FormatError(self.path, reason)
-        decode = import_module("meshopt").decode_gltf_buffer
-        try:
-            unpacked: bytes = decode(content, count, stride, packed["mode"], packed.get("filter")).tobytes()
-        except (ValueError, TypeError) as error:
-            raise FormatError(self.path, f"a packed part is broken: {str(error)[:200]}") from error
-        return unpacked
+        return content
 
 
 def parse(file: File) -> Gltf:

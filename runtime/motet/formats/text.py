@@ -6,7 +6,7 @@ Walk of file.glb or, if there is no such clip, the figure of that name.
 
 import logging
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from itertools import permutations
@@ -20,11 +20,13 @@ from motet.files import File, place_of
 from motet.motion.kinematics import AXES, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Joint, Skeleton
 
 log = logging.getLogger(__name__)
 
 Triple = tuple[float, float, float]
+
+NOWHERE: Triple = (0.0, 0.0, 0.0)
 
 Clip = str | int | None
 """One of a file's clips: its name, its number from 1, or None for the first."""
@@ -111,10 +113,10 @@ def table(lines: Sequence[str]) -> Array | None:
     return values if np.isfinite(values).all() else None
 
 
-def check_rate(path: Path, stated: float | None, given: float | None) -> None:
-    """FormatError where a file states another frame rate than the one that was given for it."""
-    if stated is not None and given is not None and abs(stated - given) > 1e-6 * stated:
-        raise FormatError(path, f"the file states {stated:g} fps, but {given:g} was given")
+def check_rate(path: Path, stated: float | None, expected: float | None) -> None:
+    """FormatError where a file states another frame rate than the one that its reader was called with."""
+    if stated is not None and expected is not None and abs(stated - expected) > 1e-6 * stated:
+        raise FormatError(path, f"the file states {stated:g} fps, but {expected:g} was given")
 
 
 def numbers(words: Sequence[str], path: Path, line: int | None) -> list[float]:
@@ -157,10 +159,15 @@ def most_poses(size: int) -> int:
     return min(MAX_POSES, FREE_POSES + size)
 
 
+def units_of(channels: Iterable[str], angle: str) -> tuple[str, ...]:
+    """The units of translations, "length", and of Euler angles, which are in the unit ``angle``."""
+    return tuple("length" if name[-2] == "t" else angle for name in channels)
+
+
 def complete_order(axes: str) -> str:
     """An Euler order of all three axes that contains ``axes`` in this order: a missing axis does not turn."""
-    orders = ("".join(order) for order in permutations("zyx"))
-    return next(order for order in orders if [axis for axis in order if axis in axes] == list(axes))
+    pattern = ".*".join(["", *axes, ""])
+    return next(order for order in map("".join, permutations("zyx")) if re.fullmatch(pattern, order))
 
 
 class Names:
@@ -183,8 +190,8 @@ class Names:
 
 def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
     """Unique non-empty names, with ``_`` for every character that matches the regular expression ``forbidden``."""
-    given = Names()
-    return [given.unique(re.sub(forbidden, "_", name) or "_") for name in names]
+    plain = Names()
+    return [plain.unique(re.sub(forbidden, "_", name) or "_") for name in names]
 
 
 def with_names(motion: Motion, names: Sequence[str]) -> Motion:
@@ -204,36 +211,45 @@ def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[
     MotionError for a motion without skeleton; FormatError names channels that are neither an Euler angle nor a
     translation of one of its joints.
     """
-    skeleton = skeleton_of(motion)
     _check_channels(path, motion)
-    joints = list(skeleton.joints)
-    translations = local_translations(motion)
-    moved = {channel.rpartition(".")[0] for channel in motion.channels if channel[-2] == "t"}
-    # a translation that stays is an offset
-    moving = []
-    for i, joint in enumerate(skeleton.joints[1:], start=1):
-        if joint.name in moved and len(motion):
-            if np.ptp(translations[:, i], axis=0).max() > 1e-9 * skeleton.height:
-                moving.append(joint.name)
-            else:
-                x, y, z = translations[0, i].tolist()
-                joints[i] = replace(joint, offset=(x, y, z))
-    translated = (skeleton.names[0], *moving)
-    kept = []
-    for channel in motion.channels:
+    joints, moving = _still_joints(motion)
+    translated = (joints[0].name, *moving)
+    channels = []
+    units = []
+    for channel, unit in zip(motion.channels, motion.units, strict=True):
         joint_name, _, kind = channel.rpartition(".")
         if kind[0] == "r" or joint_name in translated:
-            kept.append(channel)
-    still = motion.select(tuple(kept))
-    units = tuple("length" if unit == "m" else unit for unit in still.units)
-    still = still.select(still.channels, units)
-    return replace(still, skeleton=Skeleton(tuple(joints), skeleton.metres_per_unit)), tuple(moving)
+            channels.append(channel)
+            units.append("length" if unit == "m" else unit)
+    still = motion.select(tuple(channels), tuple(units))
+    return replace(still, skeleton=replace(skeleton_of(motion), joints=tuple(joints))), tuple(moving)
+
+
+def _still_joints(motion: Motion) -> tuple[list[Joint], list[str]]:
+    """The joints, with the translation as the offset of those whose translation stays, and the names of those, without
+    the root, whose translation changes."""
+    skeleton = skeleton_of(motion)
+    joints = list(skeleton.joints)
+    moving: list[str] = []
+    translations = local_translations(motion)
+    moved = {channel.rpartition(".")[0] for channel in motion.channels if channel[-2] == "t"}
+    for i, joint in enumerate(skeleton.joints[1:], start=1):
+        if joint.name not in moved or not len(motion):
+            continue
+        if np.ptp(translations[:, i], axis=0).max() > 1e-9 * skeleton.height:
+            moving.append(joint.name)
+        else:
+            x, y, z = translations[0, i].tolist()
+            joints[i] = replace(joint, offset=(x, y, z))
+    return joints, moving
 
 
 def _check_channels(path: str | Path, motion: Motion) -> None:
     """FormatError for channels that are neither an Euler angle nor a translation of a joint."""
     skeleton = skeleton_of(motion)
-    units_of = {f"r{axis}": (*TURN,) for axis in AXES} | {f"t{axis}": ("length", "m") for axis in AXES}
+    units_of: dict[str, Collection[str]] = {}
+    for axis in AXES:
+        units_of |= {f"r{axis}": TURN, f"t{axis}": ("length", "m")}
     wrong = []
     for channel, unit in zip(motion.channels, motion.units, strict=True):
         joint, _, kind = channel.rpartition(".")
