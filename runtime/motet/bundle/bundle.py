@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.fields import LARGEST
+from motet.bundle.fields import LARGEST, Json
 from motet.bundle.graph import OnnxGraph, SessionOptions
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
 from motet.bundle.members import Archive, Folder, array_of
@@ -170,7 +170,7 @@ def entry(data: bytes) -> FileEntry:
     return FileEntry(len(data), hashlib.sha256(data).hexdigest())
 
 
-def write_bundle(path: str | Path, manifest: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+def write_bundle(path: str | Path, manifest: Json, files: Mapping[str, bytes]) -> None:
     """Write a bundle as one zip (a path that ends in .zip) or as a new folder, with sizes and sha256 filled in.
 
     BundleError for a manifest that could not be read back.

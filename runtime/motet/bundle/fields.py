@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from motet.errors import BundleError
 from motet.settings import is_number
 
+Json = Mapping[str, Any]
+"""A JSON object."""
+
 LARGEST = 1e9
 """Of any number: what is larger is an error, and would overflow in float32 soon."""
 
@@ -37,7 +40,7 @@ class Fields:
         self.path = path
         if not isinstance(data, Mapping):
             raise self.fault("an object", data)
-        self.data: Mapping[str, Any] = data
+        self.data: Json = data
 
     def __contains__(self, key: str) -> bool:
         return self.data.get(key) is not None
@@ -124,7 +127,7 @@ class Fields:
         """An object."""
         return Fields(self.value(key), self.at(key))
 
-    def mapping(self, key: str) -> Mapping[str, Any]:
+    def mapping(self, key: str) -> Json:
         """An object of anything; empty where there is none."""
         return self.fields(key).data if key in self else {}
 

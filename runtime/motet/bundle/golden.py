@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.bundle import archive_bytes
+from motet.bundle.fields import Json
 from motet.bundle.graph import Arrays, Graph
 from motet.bundle.manifest import Golden
 from motet.bundle.members import Archive, array_bytes, array_of
@@ -31,16 +32,14 @@ class Replayable(Protocol):
 
     graphs: Mapping[str, Graph]
 
-    def replay(self, inputs: Arrays, settings: Mapping[str, Any]) -> Arrays:
+    def replay(self, inputs: Arrays, settings: Json) -> Arrays:
         """The outputs of the whole run."""
 
     def meaning(self, frames: Array) -> Arrays:
         """What frames (T, D), and the ids of words, mean by the manifest."""
 
 
-def vectors(
-    model: Replayable, feeds: Mapping[str, Arrays], run_inputs: Arrays, settings: Mapping[str, Any], frames: Array
-) -> bytes:
+def vectors(model: Replayable, feeds: Mapping[str, Arrays], run_inputs: Arrays, settings: Json, frames: Array) -> bytes:
     """The golden vectors of a model: of its graphs from the ``feeds`` of each role, of a run, and of the meaning of
     ``frames`` (T, D)."""
     arrays: dict[str, Arrays] = {}

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from motet.bundle.fields import Fields, parse
+from motet.bundle.fields import Fields, Json, parse
 from motet.bundle.graph import GraphSpec
 from motet.bundle.members import MAX_SIZE, NAME
 from motet.errors import BundleError, MotionError
 from motet.motion.motion import UNITS
+from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import REPRESENTATIONS, MotionContract
 
@@ -56,7 +54,7 @@ class Control(NamedTuple):
     """What a model of control is told: its labels, and for each the frames (K, D) that a run starts from."""
 
     labels: tuple[str, ...]
-    starts: Mapping[str, NDArray[np.float64]]
+    starts: Mapping[str, Array]
 
 
 class Golden(NamedTuple):
@@ -64,7 +62,7 @@ class Golden(NamedTuple):
 
     file: str
     tolerance: float
-    run: Mapping[str, Any]
+    run: Json
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,22 +80,22 @@ class Manifest:
     loop: str
     version: str
     motion: MotionContract
-    defaults: Mapping[str, Any]
-    settings: Mapping[str, Mapping[str, Any]]
-    text: Mapping[str, Any] | None
+    defaults: Json
+    settings: Mapping[str, Json]
+    text: Json | None
     vocabulary: tuple[str, ...]
     common: Mapping[str, str]
     control: Control | None
-    config: Mapping[str, Any]
-    licence: Mapping[str, Any]
-    training: Mapping[str, Any]
-    quality: Mapping[str, Any]
-    parity: Mapping[str, Any]
+    config: Json
+    licence: Json
+    training: Json
+    quality: Json
+    parity: Json
     graphs: Mapping[str, GraphEntry]
     tables: Mapping[str, TableEntry]
     files: Mapping[str, FileEntry]
     golden: Golden | None
-    source: Mapping[str, Any]
+    source: Json
 
     @cached_property
     def identity(self) -> str:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,8 +66,7 @@ class Format:
 
     def write(self) -> Callable[[File, Motion], None]:
         """The function that writes it."""
-        module, _, name = self.writer.rpartition(".")
-        function: Callable[[File, Motion], None] = getattr(import_module(f"motet.{module}"), name)
+        function: Callable[[File, Motion], None] = resolve_name(f"motet.{self.writer}")
         return function
 
 
@@ -170,8 +170,7 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     clip = named_clip if clip is None else clip
     figure = named_figure if figure is None else figure
     settings = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "figure": figure, "rest": rest}
-    options = {name: value for name, value in settings.items() if value is not None}
-    _check_options(path, kind, options)
+    options = _options_for(path, kind, settings)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
             motion: Motion = kind.module().read(file, **options)
@@ -181,11 +180,13 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
         raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
 
 
-def _check_options(path: Path, kind: Format, options: Mapping[str, Any]) -> None:
-    """FormatError for an option that the format does not take."""
+def _options_for(path: Path, kind: Format, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings that are not None; FormatError for one that the format does not take."""
+    options = {name: value for name, value in settings.items() if value is not None}
     for name in options.keys() - set(kind.options):
         takers = " ".join(known.extension for known in FORMATS if name in known.options)
         raise FormatError(path, f"{name!r} is an option for {takers} files only")
+    return options
 
 
 def split_part(file: File, format: str | None = None) -> tuple[File, str | None, str | None]:

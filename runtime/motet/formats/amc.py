@@ -12,7 +12,7 @@ import numpy as np
 from motet.errors import FormatError, quoted
 from motet.files import File, check_place, place_of, write_whole
 from motet.formats import text
-from motet.formats.asf import CMU_METRES, Asf, asf_text, read_skeleton, words_of
+from motet.formats.asf import CMU_METRES, Asf, Dofs, asf_text, read_skeleton, words_of
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -90,7 +90,7 @@ def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | N
     return len(lines), unit, fps
 
 
-def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[str, tuple[str, ...]]) -> Layout:
+def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Dofs) -> Layout:
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
     line, words = next(lines, (0, []))
     if not words:
@@ -109,7 +109,7 @@ def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Mapping[st
     return layout
 
 
-def _channels(bones: Iterable[str], dofs: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+def _channels(bones: Iterable[str], dofs: Dofs) -> tuple[str, ...]:
     """The channels of bones, each bone's in the order of its degrees of freedom."""
     channels: list[str] = []
     for bone in bones:
@@ -238,7 +238,7 @@ def _dofs_of(motion: Motion, joint: Joint) -> tuple[str, ...]:
     return tuple(dofs)
 
 
-def _frame_lines(motion: Motion, dofs: Mapping[str, tuple[str, ...]]) -> list[str]:
+def _frame_lines(motion: Motion, dofs: Dofs) -> list[str]:
     """The lines of an AMC file: the header, and of each frame its number and a line for each bone."""
     bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
     unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"

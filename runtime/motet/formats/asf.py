@@ -21,6 +21,9 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 CMU_METRES = 0.0254 / 0.45
 """CMU writes ``length 0.45`` for lengths in inches times 0.45. Other values have no known meaning."""
 
+Dofs = Mapping[str, tuple[str, ...]]
+"""Of each joint with channels their names, such as "rx"."""
+
 Lines = list[tuple[int, list[str]]]
 """Numbers of lines, and their words."""
 
@@ -33,7 +36,7 @@ class Asf:
     """
 
     skeleton: Skeleton
-    dofs: Mapping[str, tuple[str, ...]]
+    dofs: Dofs
     angle: str
 
 

@@ -8,7 +8,7 @@ import csv
 import io
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,23 +29,18 @@ def read(file: File) -> Motion:
     header: list[str] = []
     channels: list[re.Match[str]] = []
     values = array("d")  # row after row
-    reader = csv.reader(io.StringIO(read_text(file)))
-    try:
-        for row in reader:
-            if not row or row[0].startswith("#"):
-                comment = ",".join(row)
-                if comment.startswith(COMMENT):
-                    rate = number(comment.removeprefix(COMMENT), path, reader.line_num)
-                    fps = frame_rate(rate, path, reader.line_num)
-            elif not header:
-                header = row
-                channels = _channels(path, header)
-            elif len(row) == len(header):
-                values.extend(numbers(row, path, reader.line_num))
-            else:
-                raise FormatError(path, f"expected {len(header)} values, not {len(row)}", reader.line_num)
-    except csv.Error as error:
-        raise FormatError(path, f"not a table: {error}", reader.line_num) from error
+    for line, row in _rows(file):
+        if row[0].startswith("#"):
+            comment = ",".join(row)
+            if comment.startswith(COMMENT):
+                fps = frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
+        elif not header:
+            header = row
+            channels = _channels(path, header)
+        elif len(row) == len(header):
+            values.extend(numbers(row, path, line))
+        else:
+            raise FormatError(path, f"expected {len(header)} values, not {len(row)}", line)
     if not header:
         raise _no_header(path)
     table = np.array(values).reshape(-1, len(header))
@@ -53,6 +48,17 @@ def read(file: File) -> Motion:
     names = tuple(channel[1] for channel in channels)
     units = tuple(channel[2] for channel in channels)
     return Motion(table[:, 1:], names, units, fps)
+
+
+def _rows(file: File) -> Iterator[tuple[int, list[str]]]:
+    """The rows that are not empty, each with the number of its line."""
+    reader = csv.reader(io.StringIO(read_text(file)))
+    try:
+        for row in reader:
+            if row:
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise FormatError(place_of(file), f"not a table: {error}", reader.line_num) from error
 
 
 def _rate_of_times(path: Path, times: Array) -> float:
@@ -84,7 +90,7 @@ def write(file: File, motion: Motion) -> None:
     text = io.StringIO()
     text.write(f"{COMMENT}{motion.fps!r}\n")
     writer = csv.writer(text, lineterminator="\n")
-    titles = (f"{name} [{unit}]" for name, unit in zip(motion.channels, motion.units, strict=True))
+    titles = map("{} [{}]".format, motion.channels, motion.units)
     writer.writerow(["time", *titles])
     for frame, row in enumerate(motion.values.tolist()):
         writer.writerow([repr(frame / motion.fps), *map(repr, row)])

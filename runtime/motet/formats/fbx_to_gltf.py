@@ -33,6 +33,9 @@ Vector = Sequence[float]
 Matrix = Sequence[Vector]
 """Four columns of three numbers: the axes and the origin of one space in another."""
 
+Json = dict[str, Any]
+"""A JSON object."""
+
 Thing = TypeVar("Thing")
 
 KEPT: list[Any] = []
@@ -217,10 +220,10 @@ def key_rate(curve: Any, highest: float) -> float:
     return 1 / step if step * highest >= 1 else 0.0
 
 
-def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
+def as_gltf(scene: Scene, take: Take | None) -> Json:
     """The skeleton and a take of it, as a glTF document with its buffer embedded."""
     rest = scene.rest()
-    nodes: list[dict[str, Any]] = [{"name": node.name} for node in scene.nodes]
+    nodes: list[Json] = [{"name": node.name} for node in scene.nodes]
     for i, node in enumerate(scene.nodes):
         if i in scene.bound:
             columns = zip(rest[i], (0, 0, 0, 1), strict=True)
@@ -230,17 +233,17 @@ def as_gltf(scene: Scene, take: Take | None) -> dict[str, Any]:
     for i, parent in enumerate(scene.parents):
         if parent >= 0:
             nodes[parent].setdefault("children", []).append(i)
-    document: dict[str, Any] = {"asset": {"version": "2.0"}, "nodes": nodes}
+    document: Json = {"asset": {"version": "2.0"}, "nodes": nodes}
     if any(scene.skins):
         document["skins"] = [{"joints": sorted(bones)} for bones in scene.skins if bones]
     return document if take is None else document | _animation(scene, take, rest)
 
 
-def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> dict[str, Any]:
+def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> Json:
     times = frame_times(scene, take)
     values = array("f", [time - times[0] for time in times])
     accessors = [{"bufferView": 0, "componentType": 5126, "count": len(times), "type": "SCALAR"}]
-    channels: list[dict[str, Any]] = []
+    channels: list[Json] = []
     for node in sorted(scene.near):
         poses = [ufbx.evaluate_transform(take.stack.anim, scene.nodes[node], time) for time in times]
         if node not in take.moved and not any(_differ(matrix_of(pose), rest[node]) for pose in poses):
@@ -267,7 +270,7 @@ def _differ(a: Matrix, b: Matrix) -> bool:
     return any(abs(x - y) > 1e-5 * max(1.0, abs(y)) for x, y in pairs)
 
 
-def main(number: int) -> dict[str, Any]:
+def main(number: int) -> Json:
     """The glTF document of the file on standard input."""
     content = sys.stdin.buffer.read()
     with suppress(ImportError, ValueError, OSError):  # limits memory by the file's size, if the system can

@@ -12,7 +12,7 @@ path by its hip height. The fingers form a relaxed hand.
 
 import json
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from motet.draw.figure import COLOURS, Body, Bone
 from motet.errors import MotionError
 from motet.figures.humanoid import BONES, FINGERS, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.files import File, write_whole
-from motet.formats.gltf_data import COMPONENTS
+from motet.formats.gltf_data import COMPONENTS, Json
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
@@ -39,11 +39,11 @@ Track = tuple[int, str, Array]
 class Buffer:
     """The binary part of a file: arrays, each an accessor with its own view, after those of ``document``."""
 
-    def __init__(self, document: Mapping[str, Any] | None = None, content: bytes = b"") -> None:
+    def __init__(self, document: Json | None = None, content: bytes = b"") -> None:
         document = document or {}
         self.content = bytearray(content + bytes(-len(content) % 4))
-        self.views: list[dict[str, Any]] = list(document.get("bufferViews", []))
-        self.accessors: list[dict[str, Any]] = list(document.get("accessors", []))
+        self.views: list[Json] = list(document.get("bufferViews", []))
+        self.accessors: list[Json] = list(document.get("accessors", []))
 
     def add(self, values: NDArray[Any], dtype: str = "<f4", target: int = 0, bounded: bool = False) -> int:
         """Index of the new accessor of values (N, ...), for a use in a mesh or none.
@@ -65,7 +65,7 @@ class Buffer:
         self.accessors.append(accessor)
         return len(self.accessors) - 1
 
-    def parts(self) -> dict[str, Any]:
+    def parts(self) -> Json:
         """The document's entries for its binary part."""
         length = len(self.content)
         return {"bufferViews": self.views, "accessors": self.accessors, "buffers": [{"byteLength": length}]}
@@ -89,11 +89,11 @@ def with_body(
     buffer: Buffer,
     motion: Motion,
     skeleton: Skeleton,
-    nodes: Sequence[Mapping[str, Any]],
-    made: Mapping[str, Any],
-    skin: Mapping[str, Any],
+    nodes: Sequence[Json],
+    made: Json,
+    skin: Json,
     inverse_bind: Array,
-) -> dict[str, Any]:
+) -> Json:
     """The document of an animation of nodes, with a body that a skin with matrices (J, 4, 4) moves."""
     unit = "m" if skeleton.metres_per_unit else "unknown"
     facts = {"fps": motion.fps, "frames": len(motion), "length_unit": unit}
@@ -111,7 +111,7 @@ def with_body(
     }
 
 
-def container(document: Mapping[str, Any], content: bytes) -> bytes:
+def container(document: Json, content: bytes) -> bytes:
     """A GLB file of a JSON object and the binary part."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
@@ -119,9 +119,9 @@ def container(document: Mapping[str, Any], content: bytes) -> bytes:
     return head + struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(content), b"BIN\0") + content
 
 
-def joint_nodes(skeleton: Skeleton) -> list[dict[str, Any]]:
+def joint_nodes(skeleton: Skeleton) -> list[Json]:
     """A node for each joint, at rest, in their order."""
-    nodes: list[dict[str, Any]] = []
+    nodes: list[Json] = []
     for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
         nodes.append({"name": joint.name, "translation": list(joint.offset)})
         if children:
@@ -140,13 +140,13 @@ def joint_tracks(motion: Motion, skeleton: Skeleton) -> Iterator[Track]:
             yield i, "translation", moves[:, i]
 
 
-def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> dict[str, Any]:
+def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]) -> Json:
     """The animation of tracks from the motion's first frame; its arrays go into the buffer."""
     if not len(motion):
         raise MotionError("this motion has no frames, and glTF cannot hold an empty animation")
     times = {len(motion): buffer.add(np.arange(len(motion)) / motion.fps, bounded=True)}
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
+    samplers: list[Json] = []
+    channels: list[Json] = []
     for node, path, values in tracks:
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         if len(values) not in times:
@@ -169,7 +169,7 @@ def _rest(skeleton: Skeleton) -> Array:
     return rest
 
 
-def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> dict[str, Any]:
+def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> Json:
     """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers.
 
     corners: how many each prism has around its bone.
@@ -202,13 +202,12 @@ def _prism_triangles(corners: int) -> NDArray[np.int64]:
     far_next = near_next + corners
     first_tip = 0 * near
     last_tip = first_tip + 2 * corners + 1
-    parts = [
-        (first_tip, near_next, near),
-        (near, near_next, far),
-        (near_next, far_next, far),
-        (last_tip, far, far_next),
-    ]
-    return np.concatenate([np.stack(part, axis=1).reshape(-1) for part in parts])
+    first_cap = (first_tip, near_next, near)
+    side = ((near, near_next, far), (near_next, far_next, far))
+    last_cap = (last_tip, far, far_next)
+    # from (part, corner, triangle) to triangle after triangle
+    triangles: NDArray[np.int64] = np.array([first_cap, *side, last_cap]).swapaxes(1, 2).reshape(-1)
+    return triangles
 
 
 def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, Array]:
@@ -216,14 +215,22 @@ def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, A
     axis = end - start
     length = float(np.linalg.norm(axis))
     axis = axis / length if length else np.array([0.0, 1.0, 0.0])
+    ring = _ring(axis, corners)
+    near = start + bone.start_radius * ring
+    far = end + bone.end_radius * ring
+    near_tip = start - 0.7 * bone.start_radius * axis
+    far_tip = end + 0.7 * bone.end_radius * axis
+    return np.array([near_tip, *near, *far, far_tip]), np.array([-axis, *ring, *ring, axis])
+
+
+def _ring(axis: Array, corners: int) -> Array:
+    """Points (corners, 3) of a circle of radius 1 about an axis."""
+    # any direction across the axis: from the coordinate along which it is shortest
     side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     side /= np.linalg.norm(side)
     angles = np.arange(corners)[:, None] * 2 * np.pi / corners
-    ring = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
-    thick = bone.start_radius
-    thin = bone.end_radius
-    places = [start - 0.7 * thick * axis, *(start + thick * ring), *(end + thin * ring), end + 0.7 * thin * axis]
-    return np.array(places), np.array([-axis, *ring, *ring, axis])
+    ring: Array = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
+    return ring
 
 
 def _with_fingers() -> Skeleton:
@@ -255,7 +262,7 @@ def write_vrma(file: File, motion: Motion) -> None:
     hands = ((joint, "rotation", rotmat_to_quat(turned[joint : joint + 1])) for joint in fingers)
     named = (*BONES, *(VRMA_SKELETON.names[joint] for joint in fingers))
     bones = {bone: {"node": VRMA_SKELETON.index(bone)} for bone in named}
-    document: dict[str, Any] = {
+    document: Json = {
         "asset": {"version": "2.0", "generator": "motet"},
         "extensionsUsed": [extension],
         "extensions": {extension: {"specVersion": "1.0", "humanoid": {"humanBones": bones}}},

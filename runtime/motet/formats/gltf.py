@@ -12,14 +12,13 @@ import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from motet.errors import FormatError, MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
 from motet.files import File, place_of
-from motet.formats.gltf_data import REST, Gltf, Tracks, broken, parse
+from motet.formats.gltf_data import REST, Gltf, Json, Tracks, broken, parse
 from motet.formats.text import (
     Clip,
     Contents,
@@ -43,6 +42,9 @@ MAX_JOINTS = 3000
 """Skins of a file, and joints of its skeleton: a figure has a skin for each of its meshes, and a detailed facial rig
 has a thousand joints."""
 
+NodeSet = set[int]
+"""Nodes of a file, by their numbers in it."""
+
 LATE_START = 0.5
 """Seconds before the first key from which on a file's start is told; many programs count frames from 1."""
 
@@ -62,7 +64,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
         scene = _scene(file)
         gltf = scene.gltf
         stance = {} if rest is None else _stance(rest)
-        parts = _contents(scene, scene.names, [moved(animation) for animation in scene.animations])
+        parts = _contents(scene, scene.names, map(moved, scene.animations))
         take = _take(scene, *choice(gltf.path, parts, clip, figure))
         if stance and not stance.keys() & set(take.figure.names):
             raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
@@ -86,20 +88,21 @@ def contents(file: File) -> Contents:
     """The animations that move a figure, and the figures; FormatError like :func:`read`."""
     with broken(place_of(file)):
         scene = _scene(file)
-        return _contents(scene, scene.names, [moved(animation) for animation in scene.animations])
+        return _contents(scene, scene.names, map(moved, scene.animations))
 
 
-def contents_of_takes(file: File, names: Sequence[str], takes: Sequence[set[int]]) -> Contents:
+def contents_of_takes(file: File, names: Sequence[str], takes: Sequence[NodeSet]) -> Contents:
     """The figures of a file, with clips that are not in it, by their names and the nodes that each moves."""
     with broken(place_of(file)):
         return _contents(_scene(file), names, takes)
 
 
-def _contents(scene: "_Scene", names: Sequence[str], takes: Sequence[set[int]]) -> Contents:
+def _contents(scene: "_Scene", names: Sequence[str], takes: Iterable[NodeSet]) -> Contents:
+    moved_by = dict(zip(names, takes, strict=True))
     figures = {}
     for title, joints in scene.figures.items():
         near = above(scene.gltf, joints)
-        figures[title] = tuple(name for name, nodes in zip(names, takes, strict=True) if nodes & near)
+        figures[title] = tuple(name for name in names if moved_by[name] & near)
     return Contents(tuple(names), figures)
 
 
@@ -111,8 +114,8 @@ class _Scene:
     """
 
     gltf: Gltf
-    figures: dict[str, set[int]]
-    animations: list[dict[str, Any]]
+    figures: dict[str, NodeSet]
+    animations: list[Json]
     names: tuple[str, ...]
 
 
@@ -250,7 +253,7 @@ def _moving(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array
     return moving
 
 
-def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
+def figures(gltf: Gltf, moved: NodeSet) -> list[NodeSet]:
     """The joints of each figure of a file, by node; of a VRM file only the humanoid's; FormatError if none.
 
     moved: the nodes that its animations move. Skins belong to one figure if one is below the other, or both are below a
@@ -277,7 +280,7 @@ def figures(gltf: Gltf, moved: set[int]) -> list[set[int]]:
     return _humans(gltf, _grouped(gltf, [*sets, animated], moved, roots)) or groups
 
 
-def _skins(gltf: Gltf) -> list[set[int]]:
+def _skins(gltf: Gltf) -> list[NodeSet]:
     """The joints of each skin; FormatError for too many skins."""
     skins = gltf.objects("skins")
     if len(skins) > MAX_SKINS:
@@ -285,7 +288,7 @@ def _skins(gltf: Gltf) -> list[set[int]]:
     return [set(skin.get("joints", [])) for skin in skins]
 
 
-def _no_skeleton(gltf: Gltf, moved: set[int]) -> FormatError:
+def _no_skeleton(gltf: Gltf, moved: NodeSet) -> FormatError:
     """The error for a file without joints, with what its animations move instead."""
     if gltf.document.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions"):
         return FormatError(gltf.path, "it animates only expressions of a face, and no bones: it has no motion")
@@ -296,23 +299,23 @@ def _no_skeleton(gltf: Gltf, moved: set[int]) -> FormatError:
     return FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
 
 
-def _grouped(gltf: Gltf, sets: list[set[int]], moved: set[int], roots: Mapping[int, int]) -> list[set[int]]:
+def _grouped(gltf: Gltf, sets: list[NodeSet], moved: NodeSet, roots: Mapping[int, int]) -> list[NodeSet]:
     """Sets of joints put together that belong to one figure."""
     # a set that spans several trees belongs to several figures
-    parts: dict[tuple[int, int], set[int]] = {}
+    parts: dict[tuple[int, int], NodeSet] = {}
     for i, joints in enumerate(sets):
         for node in joints:
             parts.setdefault((i, roots[node]), set()).add(node)
     # parts below the same moved node, or below each other, are one figure
     tops = [_top(gltf, part) for part in parts.values()]
     heads = _heads(gltf, moved | set(tops))
-    groups: dict[int, set[int]] = {}
+    groups: dict[int, NodeSet] = {}
     for part, top in zip(parts.values(), tops, strict=True):
         groups.setdefault(heads[top], set()).update(part)
     return list(groups.values())
 
 
-def _humans(gltf: Gltf, groups: list[set[int]]) -> list[set[int]]:
+def _humans(gltf: Gltf, groups: list[NodeSet]) -> list[NodeSet]:
     """The figures, among the ten with the most joints, that are humans by their names or their tree at rest."""
     _, _, places = gltf.world()
     humans = []
@@ -327,7 +330,7 @@ def _humans(gltf: Gltf, groups: list[set[int]]) -> list[set[int]]:
     return humans
 
 
-def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]:
+def _animated(gltf: Gltf, moved: NodeSet, roots: Mapping[int, int]) -> NodeSet:
     """In each tree the moved nodes and the bones below them, if some are below others; empty if none are."""
 
     def is_thing(node: int, *kinds: str) -> bool:
@@ -336,7 +339,7 @@ def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]
         return is_light or any(kind in properties for kind in kinds)
 
     bones = {node for node in moved if not is_thing(node, "camera")}
-    below: set[int] = set()
+    below: NodeSet = set()
     for node in gltf.order:
         is_below = gltf.parents[node] in bones or gltf.parents[node] in below
         if is_below and (node in bones or not is_thing(node, "mesh", "camera")):
@@ -345,7 +348,7 @@ def _animated(gltf: Gltf, moved: set[int], roots: Mapping[int, int]) -> set[int]
     return {node for node in bones | below if roots[node] in trees}
 
 
-def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
+def _heads(gltf: Gltf, among: NodeSet) -> dict[int, int]:
     """The highest of ``among`` that each node is or is below."""
     heads: dict[int, int] = {}
     for node in gltf.order:
@@ -356,7 +359,7 @@ def _heads(gltf: Gltf, among: set[int]) -> dict[int, int]:
     return heads
 
 
-def _top(gltf: Gltf, part: set[int]) -> int:
+def _top(gltf: Gltf, part: NodeSet) -> int:
     """The lowest common ancestor of a part: that of its first and last node in branch order."""
     first = min(part, key=gltf.order.__getitem__)
     last = max(part, key=gltf.order.__getitem__)
@@ -366,9 +369,9 @@ def _top(gltf: Gltf, part: set[int]) -> int:
     return last
 
 
-def above(gltf: Gltf, nodes: Iterable[int]) -> set[int]:
+def above(gltf: Gltf, nodes: Iterable[int]) -> NodeSet:
     """The nodes and all their ancestors."""
-    reached: set[int] = set()
+    reached: NodeSet = set()
     for node in nodes:
         at = node
         while at >= 0 and at not in reached:
@@ -377,7 +380,7 @@ def above(gltf: Gltf, nodes: Iterable[int]) -> set[int]:
     return reached
 
 
-def likeliest(gltf: Gltf, groups: list[set[int]], moved: set[int]) -> set[int]:
+def likeliest(gltf: Gltf, groups: list[NodeSet], moved: NodeSet) -> NodeSet:
     """The figure with the most moving nodes, counting its ancestors, or else with the most joints."""
     best = max(groups, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
     if len(groups) > 1:
@@ -387,7 +390,7 @@ def likeliest(gltf: Gltf, groups: list[set[int]], moved: set[int]) -> set[int]:
     return best
 
 
-def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
+def figure_of(gltf: Gltf, joints: NodeSet) -> Figure:
     """The joints and the nodes between them, with the ends attached to them, by motet's and Blender's naming."""
     over = above(gltf, [gltf.parents[_top(gltf, joints)]])
     inside = above(gltf, joints) - over
@@ -406,13 +409,13 @@ def figure_of(gltf: Gltf, joints: set[int]) -> Figure:
     return Figure(nodes, parents, names)
 
 
-def moved(animation: Mapping[str, Any]) -> set[int]:
+def moved(animation: Json) -> NodeSet:
     """The nodes that an animation moves."""
     targets = [channel["target"] for channel in animation.get("channels", [])]
     return {target["node"] for target in targets if target.get("path") in REST and target.get("node") is not None}
 
 
-def _tracks(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> tuple[Tracks, float]:
+def _tracks(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> tuple[Tracks, float]:
     """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
     keys = _keys(gltf, animation, name, nodes)
     times_of_tracks = [times for times, _, _ in keys.values()]
@@ -437,7 +440,7 @@ Keys = dict[tuple[int, str], tuple[Array, Array, str]]
 """(Node, property) -> times (K,), values (K, 3 or 4), or three times as many for splines, and the interpolation."""
 
 
-def _keys(gltf: Gltf, animation: Mapping[str, Any], name: str, nodes: set[int]) -> Keys:
+def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
     """The keys of some nodes; FormatError where times and values differ in number."""
     samplers = animation.get("samplers", [])
     keys: Keys = {}

@@ -9,7 +9,6 @@ import base64
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from motet.files import File, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
 from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
-from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, broken, parse, read_beside
+from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, Json, broken, parse, read_beside
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product, quat_to_rotmat, rotated, rotmat_to_quat
@@ -98,7 +97,7 @@ class Nodes:
             node = self.gltf.parents[node]
         return self.joints.index(node) if node >= 0 else -1
 
-    def turnable(self, node: int) -> dict[str, Any]:
+    def turnable(self, node: int) -> Json:
         """A node as animation requires it: with translation, rotation and scale instead of a matrix."""
         properties = self.gltf.objects("nodes")[node]
         if "matrix" not in properties:
@@ -199,7 +198,7 @@ def _primitives(gltf: Gltf) -> list[tuple[int, dict[str, int], int | None]]:
 
 
 def _skinned(
-    nodes: Nodes, skin: dict[str, Any], points: Array, joints: NDArray[np.intp], weights: Array
+    nodes: Nodes, skin: Json, points: Array, joints: NDArray[np.intp], weights: Array
 ) -> tuple[Array, NDArray[np.intp]]:
     """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
     linear = nodes.linear[skin["joints"]]
@@ -243,7 +242,7 @@ def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
     write_whole(file, content)
 
 
-def _turnable_nodes(nodes: Nodes, animations: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _turnable_nodes(nodes: Nodes, animations: Sequence[Json]) -> list[Json]:
     """All nodes of the file, those that animations move as animation requires them."""
     targets: set[int] = set()
     for each in animations:
@@ -254,7 +253,7 @@ def _turnable_nodes(nodes: Nodes, animations: Sequence[Mapping[str, Any]]) -> li
     return turnable
 
 
-def _embedded_buffers(gltf: Gltf) -> list[dict[str, Any]]:
+def _embedded_buffers(gltf: Gltf) -> list[Json]:
     """The buffers without references to files: the first is the binary part, others are data: URIs."""
     buffers = []
     for index, buffer in enumerate(gltf.objects("buffers")):
@@ -267,7 +266,7 @@ def _embedded_buffers(gltf: Gltf) -> list[dict[str, Any]]:
     return buffers
 
 
-def _embedded_images(gltf: Gltf) -> list[dict[str, Any]]:
+def _embedded_images(gltf: Gltf) -> list[Json]:
     """The images without references to files; FormatError for one not in the folder of a .gltf, or no picture."""
     images = []
     room = GLTF_MAX_BYTES - gltf.size
@@ -317,12 +316,12 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
     write_whole(file, container(document, bytes(buffer.content)))
 
 
-def _bare_nodes(nodes: Nodes, number_of: Mapping[int, int]) -> list[dict[str, Any]]:
+def _bare_nodes(nodes: Nodes, number_of: Mapping[int, int]) -> list[Json]:
     """Nodes without meshes and the like, and with children by their new numbers."""
     bare = []
     for node in number_of:
         properties = nodes.turnable(node)
-        kept: dict[str, Any] = {"name": nodes.gltf.name(node)}
+        kept: Json = {"name": nodes.gltf.name(node)}
         for key in ("translation", "rotation", "scale"):
             if key in properties:
                 kept[key] = properties[key]

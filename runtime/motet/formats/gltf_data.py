@@ -34,6 +34,9 @@ MAX_NODES = 20_000
 """Nodes of a file: a figure has a few hundred."""
 
 
+Json = dict[str, Any]
+"""A JSON object."""
+
 Tracks = Mapping[tuple[int, str], Array]
 """(Node, "translation", "rotation" or "scale") -> values (T, 3 or 4)."""
 
@@ -57,7 +60,7 @@ class Gltf:
     """A parsed file: its JSON object, its buffers, and the folder of the files that it may name, if any."""
 
     path: Path
-    document: dict[str, Any]
+    document: Json
     buffers: tuple[bytes, ...]
     beside: Path | None = None
     _arrays: dict[int, Array] = field(default_factory=dict)
@@ -69,9 +72,9 @@ class Gltf:
         """Total bytes of all buffers and of the parts unpacked from them."""
         return sum(map(len, (*self.buffers, *self._unpacked.values())))
 
-    def objects(self, name: str) -> list[dict[str, Any]]:
+    def objects(self, name: str) -> list[Json]:
         """One of the file's lists of objects, empty if absent."""
-        objects: list[dict[str, Any]] = self.document.get(name, [])
+        objects: list[Json] = self.document.get(name, [])
         return objects
 
     @cached_property
@@ -197,7 +200,7 @@ class Gltf:
         # whole numbers may stand for 0 to 1, or -1 to 1
         return np.maximum(values / np.iinfo(kind).max, -1.0) if accessor.get("normalized") else values
 
-    def _sparse_places(self, index: int, sparse: Mapping[str, Any], count: int) -> NDArray[np.int64]:
+    def _sparse_places(self, index: int, sparse: Json, count: int) -> NDArray[np.int64]:
         """The rows, of ``count``, that a sparse accessor replaces, in rising order; FormatError if they are not."""
         indices = sparse["indices"]
         kind = np.dtype(COMPONENTS[indices["componentType"]])
@@ -209,7 +212,7 @@ class Gltf:
             raise FormatError(self.path, f"accessor {index} is broken: {reason}")
         return places
 
-    def _rows(self, index: int, part: Mapping[str, Any], kind: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
+    def _rows(self, index: int, part: Json, kind: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Elements (count, width) of a part of an accessor, which names a view; FormatError beyond its buffer."""
         size = kind.itemsize * width
         content, start, stride = self._view(part["bufferView"])
@@ -235,7 +238,7 @@ class Gltf:
             self._unpacked[index] = self._unpack(packed)
         return self._unpacked[index], 0, packed["byteStride"]
 
-    def _unpack(self, packed: Mapping[str, Any]) -> bytes:
+    def _unpack(self, packed: Json) -> bytes:
         """The bytes of a view packed by meshoptimizer."""
         if find_spec("meshopt") is None:
             remedy = "install the extra with  pip install 'motet[meshopt]', or unpack the file with"
@@ -250,7 +253,7 @@ class Gltf:
             raise FormatError(self.path, f"a packed part is broken: {str(error)[:200]}") from error
         return unpacked
 
-    def _packed(self, packed: Mapping[str, Any]) -> bytes:
+    def _packed(self, packed: Json) -> bytes:
         """The packed bytes of a view; FormatError where they are not in the file, or would unpack to too many."""
         start = packed.get("byteOffset", 0)
         length = packed["byteLength"]
@@ -285,7 +288,7 @@ def parse(file: File) -> Gltf:
     return Gltf(path, document, _buffers(path, document, binary, beside), beside)
 
 
-def _buffers(path: Path, document: Mapping[str, Any], binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
+def _buffers(path: Path, document: Json, binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
     """The contents of all buffers; FormatError for sizes out of range."""
     buffers = document.get("buffers", [])
     sizes = [buffer["byteLength"] for buffer in buffers]
@@ -309,7 +312,7 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
     return chunks[b"JSON"], chunks.get(b"BIN\0", b"")
 
 
-def _buffer(path: Path, buffer: Mapping[str, Any], binary: bytes, beside: Path | None) -> bytes:
+def _buffer(path: Path, buffer: Json, binary: bytes, beside: Path | None) -> bytes:
     """The content of a buffer, up to its declared size; files in the folder ``beside`` only if given."""
     uri = buffer.get("uri")
     size = buffer["byteLength"]

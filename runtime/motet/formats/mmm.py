@@ -36,22 +36,11 @@ def read(file: File) -> Motion:
     in "rad". The frame rate comes from the time steps. FormatError names the file and the line or frame at fault.
     """
     path = place_of(file)
-    joints: list[str] = []
-    flat = array("d")  # frame after frame
-    count = 0
-    for element in _ended(file):
-        if element.tag == "JointOrder":
-            if joints or count:
-                raise FormatError(path, "a motion must have one JointOrder, before its frames")
-            joints = [joint.get("name", "") for joint in element.iter("Joint")]
-        elif element.tag == "MotionFrame":
-            flat.extend(_frame(path, element, len(joints), count))
-            count += 1
+    joints, rows = _joints_and_rows(file)
     if len(set(joints)) != len(joints) or not all(joints):
         raise FormatError(path, "joint names in the JointOrder must be unique and not empty")
-    if not joints or not count:
+    if not joints or not len(rows):
         raise FormatError(path, "not an MMM motion: expected a Motion with JointOrder and MotionFrames")
-    rows = np.array(flat).reshape(count, -1)
     # the file is in millimetres, z up, and its angles are roll, pitch and yaw, R = Rz Ry Rx
     x, y, z = rows[:, 1:4].T * 0.001
     roll, pitch, yaw = rows[:, 4:7].T
@@ -59,6 +48,23 @@ def read(file: File) -> Motion:
     names = ("root.tx", "root.ty", "root.tz", "root.rx", "root.ry", "root.rz", *joints)
     units = ("m",) * 3 + ("rad",) * (3 + len(joints))
     return Motion(values, names, units, _rate_of_times(path, rows[:, 0]))
+
+
+def _joints_and_rows(file: File) -> tuple[list[str], Array]:
+    """The joints of the JointOrder and, of each frame, the time, the root's pose and the angles (T, 7 + J)."""
+    path = place_of(file)
+    joints: list[str] = []
+    values = array("d")  # frame after frame
+    count = 0
+    for element in _ended(file):
+        if element.tag == "JointOrder":
+            if joints or count:
+                raise FormatError(path, "a motion must have one JointOrder, before its frames")
+            joints = [joint.get("name", "") for joint in element.iter("Joint")]
+        elif element.tag == "MotionFrame":
+            values.extend(_frame(path, element, len(joints), count))
+            count += 1
+    return joints, np.array(values).reshape(count, 7 + len(joints))
 
 
 def _rate_of_times(path: Path, times: Array) -> float:

@@ -14,6 +14,7 @@ import io
 import json
 import math
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -26,37 +27,47 @@ from motet.files import File, place_of, write_whole
 from motet.formats.text import check_rate, frame_rate, most_poses, read_bytes
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import product, rotvec_to_rotmat
+from motet.motion.rotations import Array, product, rotvec_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
 
 NPZ_MAX_BYTES = 2**29
 """Bytes of an unpacked array: over an hour of a hundred channels at 120 fps."""
 
-AMASS_JOINTS = (
-    Joint("pelvis", -1, (0.0, 0.0, 0.0)),
-    Joint("left_hip", 0, (0.07, -0.08, 0.0)),
-    Joint("right_hip", 0, (-0.07, -0.08, 0.0)),
-    Joint("spine1", 0, (0.0, 0.11, -0.02)),
-    Joint("left_knee", 1, (0.03, -0.39, 0.0)),
-    Joint("right_knee", 2, (-0.03, -0.39, 0.0)),
-    Joint("spine2", 3, (0.0, 0.13, 0.01)),
-    Joint("left_ankle", 4, (-0.01, -0.42, -0.03)),
-    Joint("right_ankle", 5, (0.01, -0.42, -0.03)),
-    Joint("spine3", 6, (0.0, 0.06, 0.01)),
-    Joint("left_foot", 7, (0.02, -0.06, 0.13)),
-    Joint("right_foot", 8, (-0.02, -0.06, 0.13)),
-    Joint("neck", 9, (0.0, 0.21, -0.02)),
-    Joint("left_collar", 9, (0.08, 0.11, -0.01)),
-    Joint("right_collar", 9, (-0.08, 0.11, -0.01)),
-    Joint("head", 12, (0.0, 0.09, 0.03)),
-    Joint("left_shoulder", 13, (0.1, 0.03, -0.01)),
-    Joint("right_shoulder", 14, (-0.1, 0.03, -0.01)),
-    Joint("left_elbow", 16, (0.26, 0.0, -0.02)),
-    Joint("right_elbow", 17, (-0.26, 0.0, -0.02)),
-    Joint("left_wrist", 18, (0.25, 0.0, 0.0)),
-    Joint("right_wrist", 19, (-0.25, 0.0, 0.0)),
-)
-"""SMPL's joints in order, with offsets in metres of a plain body in a T-pose, facing z, y up."""
+JOINT_TABLE = """\
+pelvis         -1   0.0    0.0    0.0
+left_hip        0  0.07  -0.08    0.0
+right_hip       0 -0.07  -0.08    0.0
+spine1          0   0.0   0.11  -0.02
+left_knee       1  0.03  -0.39    0.0
+right_knee      2 -0.03  -0.39    0.0
+spine2          3   0.0   0.13   0.01
+left_ankle      4 -0.01  -0.42  -0.03
+right_ankle     5  0.01  -0.42  -0.03
+spine3          6   0.0   0.06   0.01
+left_foot       7  0.02  -0.06   0.13
+right_foot      8 -0.02  -0.06   0.13
+neck            9   0.0   0.21  -0.02
+left_collar     9  0.08   0.11  -0.01
+right_collar    9 -0.08   0.11  -0.01
+head           12   0.0   0.09   0.03
+left_shoulder  13   0.1   0.03  -0.01
+right_shoulder 14  -0.1   0.03  -0.01
+left_elbow     16  0.26    0.0  -0.02
+right_elbow    17 -0.26    0.0  -0.02
+left_wrist     18  0.25    0.0    0.0
+right_wrist    19 -0.25    0.0    0.0
+"""
+"""Of each of SMPL's joints the name, the parent's number, and the offset in metres, in their order."""
+
+
+def _joints_of_table() -> Iterator[Joint]:
+    for line in JOINT_TABLE.splitlines():
+        name, parent, x, y, z = line.split()
+        yield Joint(name, int(parent), (float(x), float(y), float(z)))
+
+
+AMASS_JOINTS = tuple(_joints_of_table())
+"""SMPL's joints: a plain body in a T-pose, facing z, y up."""
 
 
 ROTATIONS = (("poses",), ("root_orient", "pose_body"), ("global_orient", "body_pose"))
@@ -79,7 +90,7 @@ def read(file: File, fps: float | None = None) -> Motion:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
-            if parts := next((parts for parts in ROTATIONS if names >= set(parts)), None):
+            if parts := next(filter(names.issuperset, ROTATIONS), None):
                 kind = "a file of SMPL bodies"
                 return _smpl(path, archive, names, parts, len(content), fps)
             motion = _motet(path, archive, names)
@@ -122,28 +133,34 @@ def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     return header
 
 
+ARRAYS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
+"""motet's arrays, and of each the kinds of dtypes that it may have."""
+
+OTHERS = {
+    "posed_joints": "Kimodo's npz, which has no skeleton: convert it to BVH with its own kimodo_convert",
+    "body_pos_w": "a robot's motion for training controllers, not a human's",
+    "dof_pos": "the motor angles of a robot, not a human's motion",
+    "joint_pos": "the motor angles of a robot, not a human's motion",
+    "joints": "places of joints, as of HumanML3D, without rotations",
+    "betas": "a body's shape without its poses",
+}
+"""An array of files that are not read -> what these are."""
+
+
 def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
-    arrays = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
-    others = {
-        "posed_joints": "Kimodo's npz, which has no skeleton: convert it to BVH with its own kimodo_convert",
-        "body_pos_w": "a robot's motion for training controllers, not a human's",
-        "dof_pos": "the motor angles of a robot, not a human's motion",
-        "joint_pos": "the motor angles of a robot, not a human's motion",
-        "joints": "places of joints, as of HumanML3D, without rotations",
-        "betas": "a body's shape without its poses",
-    }
-    for name, kind in others.items():
-        if name in names and not names >= arrays.keys():
+    for name, kind in OTHERS.items():
+        if name in names and not names >= ARRAYS.keys():
             raise FormatError(path, f"this is {kind}; expected a motion from motet, AMASS or other SMPL bodies")
-    values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in arrays.items())
+    values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in ARRAYS.items())
     bones = Skeleton.from_json(json.loads(str(skeleton))) if str(skeleton) else None
-    names_of_channels, units_of_channels = (tuple(map(str, words.tolist())) for words in (channels, units))
-    return Motion(values, names_of_channels, units_of_channels, frame_rate(float(fps), path), bones)
+    rate = frame_rate(float(fps), path)
+    return Motion(values, tuple(map(str, channels.tolist())), tuple(map(str, units.tolist())), rate, bones)
 
 
 def _smpl(
     path: Path, archive: zipfile.ZipFile, names: set[str], parts: tuple[str, ...], size: int, fps: float | None
 ) -> Motion:
+    # rotations in their parents' frames
     turned = _joints(path, archive, parts, size)
     trans = _path_of_root(path, archive, names, len(turned))
     rate = _rate(path, archive, names, fps)
@@ -158,7 +175,7 @@ def _smpl(
     return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans}, rate)
 
 
-def _joints(path: Path, archive: zipfile.ZipFile, parts: tuple[str, ...], size: int) -> NDArray[np.float64]:
+def _joints(path: Path, archive: zipfile.ZipFile, parts: tuple[str, ...], size: int) -> Array:
     """Rotations (T, 22, 3, 3) of the body's joints, each in its parent's frame."""
     with archive.open(f"{parts[0]}.npy") as stream:
         shape = _header(stream)[0]
@@ -174,9 +191,9 @@ def _joints(path: Path, archive: zipfile.ZipFile, parts: tuple[str, ...], size: 
     return np.array(turned[:, : len(AMASS_JOINTS)])
 
 
-def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames: int) -> NDArray[np.float64]:
+def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames: int) -> Array:
     """The translation (T, 3) of the root in metres."""
-    place = next((name for name in ("trans", "transl") if name in names), None)
+    place = next(filter(names.__contains__, ("trans", "transl")), None)
     if place is None:
         raise FormatError(path, "no translation of the root: expected an array trans or transl")
     trans = array(archive, place, "fiu").astype(np.float64)
@@ -187,7 +204,7 @@ def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames:
 
 def _rate(path: Path, archive: zipfile.ZipFile, names: set[str], fps: float | None) -> float:
     """The frame rate that a file states, or else the one that was given."""
-    name = next((name for name in RATES if name in names), None)
+    name = next(filter(names.__contains__, RATES), None)
     if name is not None:
         stated = frame_rate(float(array(archive, name, "fiu")), path)
         check_rate(path, stated, fps)
@@ -197,21 +214,27 @@ def _rate(path: Path, archive: zipfile.ZipFile, names: set[str], fps: float | No
     return frame_rate(fps, path)
 
 
-def _rotations(path: Path, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotations(path: Path, name: str, values: Array) -> Array:
     """Rotations (T, J, 3, 3) of joints, from vectors (T, 3 J) or (T, J, 3), or matrices (T, J, 3, 3) or (T, 3, 3)."""
     if not np.isfinite(values).all():
         raise FormatError(path, f"{name} holds numbers that are not finite")
+    # the root's may come without an axis of joints
     if values.ndim == 3 and values.shape[1:] == (3, 3) and name in ("global_orient", "root_orient"):
         values = values[:, None]
     if values.ndim == 4 and values.shape[2:] == (3, 3):
-        off = np.abs(values @ np.swapaxes(values, -1, -2) - np.eye(3)).max(initial=0.0)
-        if off > 0.01 or np.linalg.det(values).min(initial=1.0) < 0:
-            raise FormatError(path, f"{name} holds matrices that are no rotations")
+        _check_matrices(path, name, values)
         return np.array(values)
     if values.ndim not in (2, 3) or math.prod(values.shape[1:]) % 3:
         shapes = "(frames, 3 times joints), (frames, joints, 3) or (frames, joints, 3, 3)"
         raise FormatError(path, f"{name} of shape {values.shape}: expected {shapes}")
     return rotvec_to_rotmat(values.reshape(len(values), -1, 3))
+
+
+def _check_matrices(path: Path, name: str, matrices: Array) -> None:
+    """FormatError where some of the matrices (T, J, 3, 3) are no rotations."""
+    differences = matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)
+    if np.abs(differences).max(initial=0.0) > 0.01 or np.linalg.det(matrices).min(initial=1.0) < 0:
+        raise FormatError(path, f"{name} holds matrices that are no rotations")
 
 
 def write(file: File, motion: Motion) -> None:

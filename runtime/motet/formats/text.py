@@ -283,8 +283,8 @@ def chosen(path: Path, names: Sequence[str], part: Clip, kind: Literal["clip", "
     if part is None:
         _note_others(path, names, kind)
         return 0
-    if isinstance(part, str) and _tidy(part) in names:
-        return names.index(_tidy(part))
+    if is_name_of(part, names):
+        return names.index(_tidy(str(part)))
     at = int(part) if isinstance(part, int) or (part.isdecimal() and len(part) < 10) else 0
     if 1 <= at <= len(names):
         return at - 1
@@ -344,15 +344,19 @@ def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]
     the shortest one with one of ``extensions``.
     """
 
-    def exists(path: Path) -> bool:
-        try:
-            return path.is_file()
-        except OSError:  # not a valid file name
-            return False
-
-    if not isinstance(file, str | Path) or MARK not in str(file) or exists(Path(file)):
+    if not isinstance(file, str | Path) or MARK not in str(file) or _exists(Path(file)):
         return file, None
     parts = str(file).split(MARK)
-    ways = [(Path(MARK.join(parts[:i])), MARK.join(parts[i:])) for i in range(1, len(parts))]
-    ways = [(path, clip) for path, clip in ways if path.suffix.lower() in extensions]
-    return next((way for way in ways if exists(way[0])), ways[0] if ways else (file, None))
+    ways: list[tuple[Path, str]] = []
+    for i in range(1, len(parts)):
+        path = Path(MARK.join(parts[:i]))
+        if path.suffix.lower() in extensions:
+            ways.append((path, MARK.join(parts[i:])))
+    return next((way for way in ways if _exists(way[0])), ways[0] if ways else (file, None))
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # not a valid file name
+        return False
