@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 192
+MOST_LARGE_FUNCTIONS = 179
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 49
+MOST_BANNED_NAMES = 47
 MOST_TUPLE_ASSIGNMENTS = 15
-MOST_NESTED_COMPREHENSIONS = 43
+MOST_NESTED_COMPREHENSIONS = 40
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -84,14 +84,14 @@ ONE_WAY = {
 CEILINGS = {
     "motet": 3_200,
     "motet.bench": 5_200,
-    "motet.bundle": 10_300,
+    "motet.bundle": 10_200,
     "motet.cli": 16_700,
     "motet.compose": 7_600,
     "motet.corpus": 9_200,
     "motet.decode": 4_000,
     "motet.draw": 12_000,
     "motet.figures": 32_000,
-    "motet.formats": 37_100,
+    "motet.formats": 37_000,
     "motet.generate": 25_900,
     "motet.live": 5_700,
     "motet.models": 9_300,
