@@ -60,18 +60,18 @@ def log_probability(step: FakeGraph, context: Array, ids: tuple[int, ...]) -> fl
 def test_draws_are_those_of_each_row_alone(draws: int, temperature: float, banned: tuple[int, ...]) -> None:
     step, context = word_step(5, WORDS, 3, 0.5), contexts(6)
     limits = LIMITS._replace(banned=banned)
-    together = draw_sequences(step, context, limits, draws, temperature)
+    together = draw_sequences(step, {"context": context}, limits, draws, temperature)
     for row, found in zip(context, together, strict=True):
         assert {d.ids: d.times for d in found} == Counter(naive(step, row, draws, temperature, limits))
         assert [d.log_probability for d in found] == pytest.approx(
             [log_probability(step, row, d.ids) for d in found], abs=1e-5
         )
-        assert draw_sequences(step, row[None], limits, draws, temperature) == [found]
+        assert draw_sequences(step, {"context": row[None]}, limits, draws, temperature) == [found]
 
 
 def test_sequences_come_as_often_as_they_are_probable() -> None:
     step, context = word_step(6, WORDS, 3, 0.3), contexts(1)
-    (found,) = draw_sequences(step, context, Limits(START, END, 2), 20000, 1.0)
+    (found,) = draw_sequences(step, {"context": context}, Limits(START, END, 2), 20000, 1.0)
     came = {d.ids: d.times / 20000 for d in found}
     normal = [word for word in range(WORDS) if word != END]
     for ids in ((), *product(normal, repeat=1)):
@@ -82,7 +82,7 @@ def test_sequences_come_as_often_as_they_are_probable() -> None:
 
 def test_cold_draws_are_the_greedy_sequence() -> None:
     step, context = word_step(4, WORDS, 3), contexts(3)
-    for row, found in zip(context, draw_sequences(step, context, LIMITS, 50, 0.01), strict=True):
+    for row, found in zip(context, draw_sequences(step, {"context": context}, LIMITS, 50, 0.01), strict=True):
         ids, word, state = [], START, np.zeros((1, STATE), np.float32)
         while len(ids) < LIMITS.longest:
             out = step({"word": np.array([word]), "context": row[None], "state": state})
@@ -95,9 +95,9 @@ def test_cold_draws_are_the_greedy_sequence() -> None:
 
 def test_one_call_for_each_step_of_the_whole_batch_and_none_for_no_rows() -> None:
     step = word_step(6, WORDS, 3, 0.01)
-    draw_sequences(step, contexts(9), Limits(START, END, 4), 20, 1.0)
+    draw_sequences(step, {"context": contexts(9)}, Limits(START, END, 4), 20, 1.0)
     assert step.calls == 5
-    assert draw_sequences(step, contexts(0), LIMITS, 20, 1.0) == []
+    assert draw_sequences(step, {"context": contexts(0)}, LIMITS, 20, 1.0) == []
     assert step.calls == 5
 
 

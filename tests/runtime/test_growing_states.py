@@ -67,7 +67,9 @@ def test_a_beam_carries_a_cache_that_grows(beams: int) -> None:
     contexts = np.random.default_rng(1).normal(size=(4, 3)).astype(np.float32)
     normal = [word for word in range(WORDS) if word != END]
     every = [ids for length in range(4) for ids in product(normal, repeat=length)]
-    for context, found in zip(contexts, beam_search(step(), contexts, Limits(START, END, 3), beams), strict=True):
+    for context, found in zip(
+        contexts, beam_search(step(), {"context": contexts}, Limits(START, END, 3), beams), strict=True
+    ):
         for ids, score, _ in found:
             assert score == pytest.approx(log_probability(context, ids), abs=1e-5)
         if beams > len(every):
@@ -76,7 +78,9 @@ def test_a_beam_carries_a_cache_that_grows(beams: int) -> None:
 
 def test_draws_carry_a_cache_that_grows() -> None:
     contexts = np.random.default_rng(2).normal(size=(3, 3)).astype(np.float32)
-    for context, drawn in zip(contexts, draw_sequences(step(), contexts, Limits(START, END, 5), 40, 1.0), strict=True):
+    for context, drawn in zip(
+        contexts, draw_sequences(step(), {"context": contexts}, Limits(START, END, 5), 40, 1.0), strict=True
+    ):
         assert max(len(one.ids) for one in drawn) > 1
         for one in drawn:
             assert one.log_probability == pytest.approx(log_probability(context, one.ids), abs=1e-5)

@@ -32,11 +32,11 @@ def test_sequences_score_what_the_step_says_word_by_word() -> None:
         asked.append(len(word))
         return tuple(step({"word": word, "context": context, "state": state}).values())
 
-    found = score_words(FakeGraph(step.spec, counted), contexts, ROWS, SAID)
+    found = score_words(FakeGraph(step.spec, counted), {"context": contexts}, ROWS, SAID)
     np.testing.assert_allclose(found, expected, atol=1e-5)
     assert asked == [2, 2, 2, 2]  # what begins alike is asked once, and a single row twice
     for n, row in enumerate(ROWS):
-        assert score_words(step, contexts, np.array([row]), SAID[n : n + 1])[0] == found[n]
+        assert score_words(step, {"context": contexts}, np.array([row]), SAID[n : n + 1])[0] == found[n]
 
 
 def test_frames_score_what_the_step_says_frame_by_frame() -> None:

@@ -77,7 +77,12 @@ def test_sentences_are_scored_for_windows_near_theirs(rows: int) -> None:
     said = [(start, *VOCABULARY.encode(text)[0].tolist(), end) for text in texts]
     told: list[tuple[int, int]] = []
     found = near_scores(
-        model.graphs["step"], model.embed(motions), said, 1, lambda done, total: told.append((done, total)), rows
+        model.graphs["step"],
+        {"context": model.embed(motions)},
+        said,
+        1,
+        lambda done, total: told.append((done, total)),
+        rows,
     )
     assert told[-1] == (5, 5)
     by_ids = dict(zip(said, texts, strict=True))

@@ -114,10 +114,10 @@ def known() -> dict[str, Any]:
 
 def described(model: DescribeModel) -> dict[str, Any]:
     """By the agreement of 60 draws."""
-    loop, context = model.LOOPS["consensus"], model.contexts([golden("describe")])
+    loop, encoded = model.LOOPS["consensus"], model._encoded([golden("describe")])
     settings = loop.settled(loop.defaults(model.manifest.defaults), {"draws": 60, "beams": 5})
     settings["noise"] = noise_of(model.limits(settings), 60, 4)  # type: ignore[assignment]  # as describe passes it on
-    (row,) = model._hypotheses(loop, context, settings)
+    (row,) = model._hypotheses(loop, encoded, settings)
     return {
         "draws": [
             {"text": model.vocabulary.decode(one.ids), "logProbability": one.log_probability, "score": one.score}
@@ -144,7 +144,7 @@ def scored(model: DescribeModel) -> float:
     ids = model.vocabulary.ids
     words = np.concatenate([[ids[SOS]], model.ids("a person walks"), [ids[EOS]]])[None]
     context = model.contexts([golden("describe")])
-    return float(score_words(model.graphs["step"], context, np.zeros(1, np.int64), words)[0])
+    return float(score_words(model.graphs["step"], {"context": context}, np.zeros(1, np.int64), words)[0])
 
 
 def expected(model: PredictModel) -> list[float]:

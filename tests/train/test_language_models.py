@@ -21,6 +21,7 @@ from motet_train.runs import MODELS
 
 D, V = 3, 11
 DESCRIBE = MotionToLanguageConfig(D, V, encoder_units=(4, 5), decoder_units=(6, 7), embedding=4)
+ATTENTIVE = replace(DESCRIBE, attention=True)
 GENERATE = LanguageToMotionConfig(D, V, encoder_units=(4, 5), decoder_units=(6, 7), embedding=4, components=2)
 
 
@@ -69,7 +70,7 @@ def test_parameters_are_exactly_those_of_the_paper() -> None:
     assert [layer.weight.shape[1] for layer in generate.decoder.layers] == [218, 573, 573]
 
 
-@pytest.mark.parametrize("net", [describer(), generator()])
+@pytest.mark.parametrize("net", [describer(), describer(ATTENTIVE), generator()])
 def test_a_row_of_a_batch_loses_what_it_loses_alone(net: MotionToLanguage | LanguageToMotion) -> None:
     rows = batch()
     found = net.eval().terms(rows)[0]
@@ -104,6 +105,54 @@ def test_the_loss_of_words_is_the_cross_entropy_of_steps() -> None:
     torch.testing.assert_close(net.terms(rows)[0], torch.stack(expected), atol=1e-5, rtol=1e-5)
 
 
+def test_steps_that_attend_give_the_loss_of_whole_sentences() -> None:
+    net, rows = describer(ATTENTIVE).eval(), batch()
+    encoder, step = (net.graphs()[role][0] for role in ("encoder", "step"))
+    context, states = encoder(rows.frames, rows.lengths)
+    sentences = [[SOS, *row[row != PAD].tolist(), EOS] for row in rows.words]
+    expected = []
+    for i, sentence in enumerate(sentences):
+        state = torch.zeros(1, 13)
+        row = slice(i, i + 1)
+        for word, following in pairwise(sentence):
+            given = (torch.tensor([word]), context[row], states[row], rows.lengths[row], state)
+            log_probabilities, state = step(*given)
+            assert log_probabilities.exp().sum().item() == pytest.approx(1, abs=1e-5)
+            expected.append(-log_probabilities[0, following])
+    torch.testing.assert_close(net.terms(rows)[0], torch.stack(expected), atol=1e-5, rtol=1e-5)
+
+
+@torch.no_grad()
+def test_attention_is_the_softmax_of_products_over_the_states_of_a_row() -> None:
+    net, rows = describer(ATTENTIVE).eval(), batch()
+    _, states = net.encode_states(rows.frames, rows.lengths)
+    queries = torch.randn(3, 4, 13, generator=torch.Generator().manual_seed(2))
+    weights = net.attention.weights(queries, states, rows.lengths)
+    attended = net.attention(queries, states, rows.lengths)
+    for row, length in enumerate(rows.lengths.tolist()):
+        for step in range(4):
+            # frame by frame, of the row's own frames alone
+            scores = [float(queries[row, step] @ net.attention.weight @ states[row, t]) for t in range(length)]
+            shares = torch.tensor(scores).div(10**0.5).softmax(dim=0)
+            torch.testing.assert_close(weights[row, step, :length], shares, atol=1e-6, rtol=1e-5)
+            assert (weights[row, step, length:] == 0).all()
+            wanted = sum(share * states[row, t] for t, share in enumerate(shares))
+            torch.testing.assert_close(attended[row, step], wanted, atol=1e-6, rtol=1e-5)
+
+
+def test_states_are_those_of_a_row_alone_and_end_with_it() -> None:
+    net, rows = describer(ATTENTIVE).eval(), batch()
+    context, states = net.encode_states(rows.frames, rows.lengths)
+    assert torch.equal(context, net.encode(rows.frames, rows.lengths))
+    for row, length in enumerate(rows.lengths.tolist()):
+        single = alone(rows, row)
+        torch.testing.assert_close(states[row, :length], net.encode_states(single.frames, single.lengths)[1][0])
+        assert (states[row, length:] == 0).all()
+        # forwards the last state is the context's, backwards the first one
+        ends = torch.cat([states[row, length - 1, :5], states[row, 0, 5:]])
+        torch.testing.assert_close(ends, context[row])
+
+
 def test_the_likelihood_of_frames_is_that_of_steps() -> None:
     net, rows = generator().eval(), batch()
     step = net.graphs()["step"][0]
@@ -123,7 +172,9 @@ def test_the_likelihood_of_frames_is_that_of_steps() -> None:
     torch.testing.assert_close(true.terms(rows)[0], -torch.stack(expected), atol=1e-4, rtol=1e-5)
 
 
-@pytest.mark.parametrize("net", [describer(), generator(), generator(replace(GENERATE, loss="likelihood"))])
+@pytest.mark.parametrize(
+    "net", [describer(), describer(ATTENTIVE), generator(), generator(replace(GENERATE, loss="likelihood"))]
+)
 def test_a_few_steps_lower_the_loss(net: MotionToLanguage | LanguageToMotion) -> None:
     rows = batch()
     optimiser = torch.optim.NAdam(net.parameters(), lr=1e-2)
@@ -138,7 +189,7 @@ def test_a_few_steps_lower_the_loss(net: MotionToLanguage | LanguageToMotion) ->
 
 
 def test_training_drops_and_running_does_not() -> None:
-    for net in (describer(), generator()):
+    for net in (describer(), describer(ATTENTIVE), generator()):
         assert not torch.equal(net.terms(batch())[0], net.terms(batch())[0])
         net.eval()
         assert torch.equal(net.terms(batch())[0], net.terms(batch())[0])
@@ -148,6 +199,7 @@ def test_training_drops_and_running_does_not() -> None:
     ("name", "net"),
     [
         ("motion-to-language", describer(replace(DESCRIBE, gates="hard"))),
+        ("motion-to-language", describer(ATTENTIVE)),
         ("language-to-motion", generator(replace(GENERATE, loss="likelihood"))),
     ],
 )

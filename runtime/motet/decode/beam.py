@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Ids, Loop, Scores, advance, two_rows, zero_state
+from motet.decode.loop import Ids, Loop, Scores, advance, taken, two_rows, zero_state
 from motet.settings import Range, Settings
 
 
@@ -56,14 +56,15 @@ class Drawn(NamedTuple):
     times: int
 
 
-def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> list[list[Hypothesis]]:
-    """For each row of ``context`` (B, C) up to ``beams`` hypotheses, the most probable first.
+def beam_search(step: Graph, contexts: Arrays, limits: Limits, beams: int) -> list[list[Hypothesis]]:
+    """For each row of ``contexts`` up to ``beams`` hypotheses, the most probable first.
 
-    step: word (N,), context (N, C) and fed back states -> log_probabilities (N, V). One call for all rows and beams.
+    step: word (N,), contexts (N, ...) and fed back states -> log_probabilities (N, V). One call for all rows and beams.
+    contexts: what is known of each row, by the step's inputs: "context" (B, C), and with attention further ones.
     Scores are log-probabilities, not divided by length. A hypothesis that ended keeps its score and its place as long
     as no ``beams`` others are better; a row is done when all of its have ended.
     """
-    rows = len(context)
+    rows = len(contexts["context"])
     end = limits.end
     scores = np.where(np.arange(beams) == 0, 0.0, -np.inf) * np.ones((rows, 1))
     words = np.full((rows, beams, 1), limits.start, dtype=np.int64)
@@ -72,13 +73,14 @@ def beam_search(step: Graph, context: Floats, limits: Limits, beams: int) -> lis
         alive = two_rows(np.flatnonzero((words[:, :, -1] != end) & np.isfinite(scores)))
         if not len(alive):
             break
-        inputs: Arrays = {"word": words[:, :, -1].ravel()[alive], "context": context[alive // beams]}
-        outputs, following = advance(step, {name: array[alive] for name, array in state.items()}, inputs)
+        row = alive // beams
+        inputs: Arrays = {"word": words[:, :, -1].ravel()[alive], **taken(contexts, row)}
+        outputs, following = advance(step, taken(state, alive), inputs)
         left = limits.possible(outputs["log_probabilities"], length)
         scores, parents, chosen = _best(scores, alive, left, end)
         words = np.concatenate([np.take_along_axis(words, parents[:, :, None], 1), chosen[:, :, None]], axis=2)
         places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * beams).ravel() % len(alive)
-        state = {name: np.take(array, places, axis=0) for name, array in following.items()}
+        state = taken(following, places)
     return [_hypotheses(*row, end) for row in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)]
 
 
@@ -119,18 +121,18 @@ def noise_of(limits: Limits, draws: int, seed: int = 0) -> Floats:
 
 
 def draw_sequences(
-    step: Graph, context: Floats, limits: Limits, draws: int, temperature: float, noise: Floats | None = None
+    step: Graph, contexts: Arrays, limits: Limits, draws: int, temperature: float, noise: Floats | None = None
 ) -> list[list[Drawn]]:
-    """For each row of ``context`` (B, C) the different ones of ``draws`` sequences; ``draws`` in all.
+    """For each row of ``contexts`` the different ones of ``draws`` sequences; ``draws`` in all.
 
-    step: as :func:`beam_search`; N is how many different beginnings the draws have. Temperature T divides the
+    step, contexts: as :func:`beam_search`; N is how many different beginnings the draws have. Temperature T divides the
     log-probabilities. noise: uniform numbers (longest + 1, draws), those of :func:`noise_of` by default.
 
     The n draws that begin alike take the words at u / n, (1 + u) / n, ... (n - 1 + u) / n of the distribution, with one
     uniform number u (systematic sampling). A word of probability p then comes n p times, rounded up or down, and n p
     times on average: the draws show the distribution better than independent ones.
     """
-    rows = len(context)
+    rows = len(contexts["context"])
     noise = noise_of(limits, draws) if noise is None else noise
     words = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
     scores = np.zeros(rows * draws)
@@ -142,7 +144,8 @@ def draw_sequences(
     for length in range(limits.longest + 1):
         if not len(alive):
             break
-        outputs, following = advance(step, state, {"word": last, "context": context[row]})
+        inputs: Arrays = {"word": last, **taken(contexts, row)}
+        outputs, following = advance(step, state, inputs)
         left = limits.possible(outputs["log_probabilities"].astype(np.float64), length)
         shares = np.cumsum(np.exp((left - left.max(axis=1, keepdims=True)) / temperature), axis=1)
         chosen = _spread(shares / shares[:, -1:], begun, noise[length, alive % draws])
@@ -155,7 +158,7 @@ def draw_sequences(
         begun = np.searchsorted(unique, longer)
         parent, last = np.divmod(unique, left.shape[1])
         row = row[parent]
-        state = {name: array[parent] for name, array in following.items()}
+        state = taken(following, parent)
     return [
         _counted(words[at : at + draws].tolist(), scores[at : at + draws].tolist(), limits.end)
         for at in range(0, rows * draws, draws)
@@ -179,18 +182,18 @@ def _counted(words: list[list[int]], scores: list[float], end: int) -> list[Draw
 
 def consensus(
     step: Graph,
-    context: Floats,
+    contexts: Arrays,
     limits: Limits,
     beams: int,
     draws: int,
     temperature: float,
     noise: Floats | None = None,
 ) -> list[list[Hypothesis]]:
-    """For each row of ``context`` (B, C) up to ``beams`` of the sequences drawn, the one that agrees best first.
+    """For each row of ``contexts`` up to ``beams`` of the sequences drawn, the one that agrees best first.
 
     The others: see :func:`draw_sequences`. Scores are agreements, 0 to 1.
     """
-    return [by_consensus(row)[:beams] for row in draw_sequences(step, context, limits, draws, temperature, noise)]
+    return [by_consensus(row)[:beams] for row in draw_sequences(step, contexts, limits, draws, temperature, noise)]
 
 
 def by_consensus(drawn: Sequence[Drawn]) -> list[Hypothesis]:
@@ -223,15 +226,15 @@ def agreement(sequences: Sequence[tuple[int, ...]], times: Ids) -> Scores:
     return agreements
 
 
-def score_words(step: Graph, contexts: Floats, rows: Ids, words: Ids) -> Scores:
+def score_words(step: Graph, contexts: Arrays, rows: Ids, words: Ids) -> Scores:
     """Log-probabilities (N,) of N sequences of words, each under the context of its row.
 
-    step: as :func:`beam_search`. contexts: (R, C). rows: (N,) of contexts. words: (N, W), the start, the words, the
+    step, contexts: as :func:`beam_search`. rows: (N,) of contexts. words: (N, W), the start, the words, the
     end, and 0 behind it. Sequences of one row share the steps of the words with which they all begin.
     """
     totals = np.zeros(len(rows))
     group = rows
-    state = zero_state(step, len(contexts))
+    state = zero_state(step, len(contexts["context"]))
     count = int(words.max()) + 1
     for previous, coming in zip(words.T, words.T[1:], strict=False):
         alive = np.flatnonzero(coming)
@@ -239,8 +242,9 @@ def score_words(step: Graph, contexts: Floats, rows: Ids, words: Ids) -> Scores:
             break
         _, first, same = np.unique(group[alive] * count + previous[alive], return_index=True, return_inverse=True)
         chosen = two_rows(alive[first])
-        before = {name: array[group[chosen]] for name, array in state.items()}
-        outputs, state = advance(step, before, {"word": previous[chosen], "context": contexts[rows[chosen]]})
+        row = rows[chosen]
+        inputs: Arrays = {"word": previous[chosen], **taken(contexts, row)}
+        outputs, state = advance(step, taken(state, group[chosen]), inputs)
         group = np.zeros_like(rows)
         group[alive] = same
         totals[alive] += outputs["log_probabilities"][same, coming[alive]]

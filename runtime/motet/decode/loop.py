@@ -69,6 +69,11 @@ def zero_state(step: Graph, rows: int, provided: Collection[str] = ()) -> State:
     return {name: np.zeros((rows, *step.spec.start_shape(name)), dtype=step.spec.input(name).dtype) for name in names}
 
 
+def taken(arrays: Arrays, rows: Ids) -> State:
+    """Those rows of each array, in that order; some may come more than once."""
+    return {name: np.take(array, rows, axis=0) for name, array in arrays.items()}
+
+
 def two_rows(indices: Ids) -> Ids:
     """Indices of the rows to run, a single one twice.
 

@@ -3,7 +3,7 @@
 import hashlib
 import logging
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
@@ -66,9 +66,16 @@ class BundleModel(ABC):
         self._tuned = {kind: kind.read(settings.get(name, {}), f"settings.{name}") for name, kind in known.items()}
         self.sizes: Sizes = {"D": len(self.contract.channels)}
 
-    def bind(self, role: str, inputs: Mapping[str, str], outputs: Mapping[str, str]) -> None:
-        """Check the graph of a role against :attr:`sizes`, and record its new sizes; BundleError like :func:`bind`."""
-        bind(role, self.graphs[role].spec, inputs, outputs, self.sizes)
+    def bind(
+        self,
+        role: str,
+        inputs: Mapping[str, str],
+        outputs: Mapping[str, str],
+        provided: Collection[TensorSpec] = (),
+    ) -> None:
+        """Check the graph of a role against :attr:`sizes`, and record its new sizes; arguments and BundleError like
+        :func:`bind`."""
+        bind(role, self.graphs[role].spec, inputs, outputs, self.sizes, provided)
 
     def settings(self, kind: type[S]) -> S:
         """The settings of a feature, one of :attr:`SETTINGS`: the bundle's values, defaults for the others."""

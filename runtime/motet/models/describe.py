@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.decode.beam import LOOPS, Hypothesis, Limits, noise_of, score_words
-from motet.decode.loop import Loop, Scores
+from motet.decode.loop import Ids, Loop, Scores, taken, two_rows
 from motet.errors import DecodingError
-from motet.models.language import MAX_SECONDS, LanguageModel, padded
+from motet.models.language import ENCODED, MAX_SECONDS, LanguageModel, padded
 from motet.models.nearest_neighbour import AnswerSettings, Known, Seen, known_of, path_of
 from motet.motion.motion import Motion, motions_of
 from motet.motion.rotations import Array
@@ -33,6 +33,26 @@ AT_ONCE = 256
 
 LEAST = 1e-6
 """The probability below which none is told."""
+
+EVENLY = 16
+"""Where the step attends to frames, motions are padded to a multiple of this many, and only those of one length are
+decoded together: how a sum over frames is rounded depends on their number."""
+
+
+@dataclass(frozen=True, eq=False)
+class Encoded:
+    """Motions as a step knows them.
+
+    rows: (N,), which of the motions these are. contexts: the step's inputs (N, ...) that the encoder takes or gives, by
+    name.
+    """
+
+    rows: Ids
+    contexts: Arrays
+
+    def __getitem__(self, part: slice) -> "Encoded":
+        """Some of the motions."""
+        return Encoded(self.rows[part], {name: array[part] for name, array in self.contexts.items()})
 
 
 @dataclass(frozen=True)
@@ -101,8 +121,8 @@ class _Options(TypedDict, total=False):
 
 
 class DescribeModel(LanguageModel):
-    """A motion captioning model. Its loops (:mod:`motet.decode.beam`) take the step, contexts (B, C), limits and their
-    settings by name, and return up to ``beams`` hypotheses for each row, best first."""
+    """A motion captioning model. Its loops (:mod:`motet.decode.beam`) take the step, contexts (B, ...) by name, limits
+    and their settings by name, and return up to ``beams`` hypotheses for each row, best first."""
 
     VERB = "describe"
     SETTINGS = (ConfidenceSettings, TimelineSettings, AnswerSettings)
@@ -113,7 +133,9 @@ class DescribeModel(LanguageModel):
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
         super().__init__(manifest, graphs, tables)
         self.bind("encoder", {"frames": "batch time D", "lengths": "*batch"}, {"context": "batch C"})
-        self.bind("step", self.loop.inputs, self.loop.outputs)
+        encoder = graphs["encoder"].spec
+        self.bind("step", self.loop.inputs, self.loop.outputs, provided=(*encoder.inputs, *encoder.outputs))
+        self._attends = graphs["step"].spec.takes("lengths")
         if "space" in graphs:
             self.bind("space", {"frames": "batch time D", "lengths": "*batch"}, {"vector": "batch E"})
             self.known = known_of(self)
@@ -161,8 +183,8 @@ class DescribeModel(LanguageModel):
         settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), counts)}
         if "draws" in settings:
             settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
-        contexts = self.embed(motions_of(motions))
-        rows = list(map(self._described, self._hypotheses(loop, contexts, settings, progress)))
+        encoded = self._encoded([self.frames(motion) for motion in motions_of(motions)])
+        rows = list(map(self._described, self._hypotheses(loop, encoded, settings, progress)))
         return rows[0] if isinstance(motions, Motion) else rows
 
     def _described(self, hypotheses: Sequence[Hypothesis]) -> list[Description]:
@@ -223,11 +245,14 @@ class DescribeModel(LanguageModel):
             path = best_path(self._kinds(motion, spans, progress), known_settings.change * 0.5 / known_settings.hop)
             return self._parts(motion, edges(spans, path))
         spans = windows(len(motion), motion.fps, settings)
-        contexts = self.embed([motion[start:stop] for start, stop in spans])
-        likeliest = self._hypotheses(beam, contexts, beam.defaults(self.manifest.defaults))
+        # windows have one length, and so are one group
+        encoded = self._encoded([self.frames(motion[start:stop]) for start, stop in spans])
+        likeliest = self._hypotheses(beam, encoded, beam.defaults(self.manifest.defaults))
         ids = self.vocabulary.ids
         sentences = [(ids[SOS], *best.ids, ids[EOS]) for best, *_ in likeliest]
-        scores = near_scores(self.graphs["step"], contexts, sentences, round(settings.near / settings.hop), progress)
+        near = round(settings.near / settings.hop)
+        step = self.graphs["step"]
+        scores = near_scores(step, encoded[0].contexts, sentences, near, progress)
         return self._parts(motion, edges(spans, best_path(scores, settings.change)))
 
     def _kinds(self, motion: Motion, spans: Sequence[tuple[int, int]], progress: Progress) -> Iterator[Array]:
@@ -258,16 +283,46 @@ class DescribeModel(LanguageModel):
         return parts
 
     def _hypotheses(
-        self, loop: Loop, contexts: Floats, settings: Mapping[str, Any], progress: Progress = silent
+        self, loop: Loop, encoded: Sequence[Encoded], settings: Mapping[str, Any], progress: Progress = silent
     ) -> list[list[Hypothesis]]:
-        """The hypotheses of many contexts, decoded in batches of the loop's size."""
+        """The hypotheses of all motions, decoded in batches of the loop's size."""
         rest = {name: value for name, value in settings.items() if name != "max_words"}
-        rows: list[list[Hypothesis]] = []
-        for start in range(0, len(contexts), loop.batch):
-            batch = contexts[start : start + loop.batch]
-            rows += loop.run(self.graphs["step"], batch, self.limits(settings), **rest)
-            progress(len(rows), len(contexts))
-        return rows
+        limits = self.limits(settings)
+        count = sum(len(group.rows) for group in encoded)
+        hypotheses: dict[int, list[Hypothesis]] = {}
+        for group in encoded:
+            for start in range(0, len(group.rows), loop.batch):
+                batch = group[start : start + loop.batch]
+                decoded = loop.run(self.graphs["step"], batch.contexts, limits, **rest)
+                hypotheses.update(zip(batch.rows.tolist(), decoded, strict=True))
+                progress(len(hypotheses), count)
+        return [hypotheses[row] for row in range(count)]
+
+    def _encoded(self, sequences: Sequence[Array]) -> list[Encoded]:
+        """Frames (T_i, D) of motions as the step knows them, in groups to be decoded together."""
+        if not self._attends:
+            return [Encoded(np.arange(len(sequences)), {"context": self.contexts(sequences)})]
+        lengths = np.array(list(map(len, sequences)), dtype=np.int64)
+        even = -(-lengths // EVENLY) * EVENLY
+        groups = []
+        for length in np.unique(even):
+            rows = np.flatnonzero(even == length)
+            alike = [sequence for sequence, whole in zip(sequences, even, strict=True) if whole == length]
+            groups.append(Encoded(rows, self._attended(alike, int(length))))
+        return groups
+
+    def _attended(self, sequences: Sequence[Array], length: int) -> Arrays:
+        """All that the step takes of motions, frames (T_i, D) padded to one length: (N, ...), by name."""
+        encoder = self.graphs["encoder"]
+        frames, lengths = padded(sequences, "float32", length)
+        inputs = {"frames": frames, "lengths": lengths}
+        parts = []
+        for start in range(0, len(sequences), ENCODED):
+            rows = np.arange(start, min(start + ENCODED, len(sequences)))
+            feeds = taken(inputs, two_rows(rows))
+            parts.append(taken({**feeds, **encoder(feeds)}, np.arange(len(rows))))
+        names = [name for name in parts[0] if self.graphs["step"].spec.takes(name)]
+        return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The context vector (C,) float32 of a motion, or (N, C) of several; MotionError like :meth:`frames`."""
@@ -278,7 +333,9 @@ class DescribeModel(LanguageModel):
         """Log-probability of a sentence given a motion; unknown words count as UNK, and a TextWarning names them."""
         ids = self.vocabulary.ids
         words = np.concatenate([[ids[SOS]], self.ids(sentence), [ids[EOS]]])[None]
-        return float(score_words(self.graphs["step"], self.embed([motion]), np.zeros(1, np.int64), words)[0])
+        (encoded,) = self._encoded([self.frames(motion)])
+        scores = score_words(self.graphs["step"], encoded.contexts, encoded.rows, words)
+        return float(scores[0])
 
     def limits(self, settings: Mapping[str, Any]) -> Limits:
         """The limits of a sentence, in ids of the vocabulary, with "max_words" of the settings."""
@@ -289,7 +346,7 @@ class DescribeModel(LanguageModel):
         """Frames (T, D), and noise where the loop draws, to ids (W, words) int64 and log-probabilities (W,)."""
         extra = {"noise": inputs["noise"]} if "noise" in inputs else {}
         chosen = self.loop.settled(self.defaults, settings)
-        (row,) = self._hypotheses(self.loop, self.contexts([inputs["frames"]]), {**chosen, **extra})
+        (row,) = self._hypotheses(self.loop, self._encoded([inputs["frames"]]), {**chosen, **extra})
         ids = np.zeros((len(row), max(len(hypothesis.ids) for hypothesis in row)), dtype=np.int64)
         for place, hypothesis in zip(ids, row, strict=True):
             place[: len(hypothesis.ids)] = hypothesis.ids
@@ -307,7 +364,7 @@ def windows(frames: int, fps: float, settings: TimelineSettings) -> list[tuple[i
 
 def near_scores(
     step: Graph,
-    contexts: Floats,
+    contexts: Arrays,
     sentences: Sequence[tuple[int, ...]],
     near: int,
     progress: Progress = silent,
@@ -315,9 +372,9 @@ def near_scores(
 ) -> Scores:
     """Log-probabilities (W, S) of the sentences of W windows, sorted by their ids, given each window.
 
-    said: the ids of a sentence for each window, from the start to the end. near: how many windows before and after a
-    window are scored for its sentence; the others get minus infinity. progress: counts windows. at_once: pairs scored
-    in one batch.
+    contexts: of the windows, as in :func:`motet.decode.beam.beam_search`. sentences: the ids of one for each window,
+    from the start to the end. near: how many windows before and after a window are scored for its sentence; the others
+    get minus infinity. progress: counts windows. at_once: pairs scored in one batch.
     """
     places = {ids: place for place, ids in enumerate(sorted(set(sentences)))}
     words = padded([np.array(ids) for ids in places], "int64")[0]

@@ -242,6 +242,9 @@ by_steps = with_options(steps, split)
 loss = click.option(
     "--loss", type=click.Choice(list(LOSSES)), help="Eq. 12, or the true likelihood. [default: the preset's]"
 )
+attention = click.option(
+    "--attention/--no-attention", default=None, help="Let words attend to the encoder's states. [default: the preset's]"
+)
 start = click.option("--start", type=Path, help="Run of a codec: train its decoder alone (--preset decoder, sharp).")
 parts = with_options(
     click.option("--codec", type=Path, required=True, help="Run of a codec, trained on the same data and split."),
@@ -253,7 +256,7 @@ known_parts = with_options(
     click.option("--writer", type=Path, required=True, help="Run of describe, which writes sentences (--draws)."),
     split,
 )
-_on_store("describe", language.RECIPES, language.train_language, by_epochs)
+_on_store("describe", language.RECIPES, language.train_language, by_epochs, attention)
 _on_store("known", known.RECIPES, known.train_known, known_parts)
 _on_store("search", search.RECIPES, search.train_search, by_epochs)
 _on_store("mixture", plappert2017.RECIPES, language.train_language, by_epochs, loss)

@@ -15,7 +15,7 @@ from torch.nn import functional
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.data.batches import Batch
 from motet_train.models.net import Net, Part, before, normalised
-from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding
+from motet_train.models.recurrent import GRU, Attention, Decoder, Encoder, WordEmbedding
 
 PAD = 0
 SOS = 1
@@ -90,6 +90,9 @@ class MotionToLanguageConfig:
     """Number of first channels whose sum so far the encoder also sees: way and turn since the start."""
     summary: float = 0.0
     """Weight of the loss of :class:`SummaryHead`; 0 leaves the head out."""
+    attention: bool = False
+    """Whether the words also see the encoder's states through :class:`motet_train.models.recurrent.Attention`, beside
+    the last ones, which are the context; the paper names this as future work."""
 
 
 class MotionToLanguage(LanguageNet):
@@ -105,19 +108,31 @@ class MotionToLanguage(LanguageNet):
         self.encoder = Encoder(GRU, config.channels + config.travelled + 1, config.encoder_units, *shared)
         self.embedding = WordEmbedding(config.words, config.embedding, config.dropout)
         self.decoder = Decoder(GRU, config.embedding, context, config.decoder_units, False, *shared)
-        self.output = nn.Linear(sum(config.decoder_units), config.words)
+        seen = sum(config.decoder_units)
+        self.attention = Attention(seen, context) if config.attention else None
+        self.output = nn.Linear(seen + (context if config.attention else 0), config.words)
         nn.init.xavier_uniform_(self.output.weight)
         nn.init.zeros_(self.output.bias)
         self.summary = SummaryHead(context, config.channels) if config.summary else None
 
     def encode(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Frames (B, T, D) in the contract's units, of lengths (B,), to contexts (B, C)."""
+        context: Tensor = self.encoder(self._seen(frames), lengths)
+        return context
+
+    def encode_states(self, frames: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """The contexts (B, C) of :meth:`encode`, and the states (B, T, C), 0 after a row's end, for the attention."""
+        states, context = self.encoder.states(self._seen(frames), lengths)
+        real = before(lengths, frames.shape[1])[..., None]
+        return context, torch.where(real, states, 0.0)
+
+    def _seen(self, frames: Tensor) -> Tensor:
+        """What the encoder sees of frames (B, T, D): normalised, the sums so far, and the flag."""
         normal = normalised(frames, self.mean, self.scale)
         sums = normal[..., : self.config.travelled].cumsum(dim=1) / 10  # a second's frames at the usual rate
         if self.training and self.config.frame_noise:
             normal = normal + self.config.frame_noise * torch.randn_like(normal)
-        context: Tensor = self.encoder(torch.cat([normal, sums, torch.ones_like(normal[..., :1])], dim=-1), lengths)
-        return context
+        return torch.cat([normal, sums, torch.ones_like(normal[..., :1])], dim=-1)
 
     def outputs(self, words: Tensor, context: Tensor) -> Tensor:
         """Outputs of the decoder (B, W, S) after each of the words (B, W) and all before it."""
@@ -125,7 +140,8 @@ class MotionToLanguage(LanguageNet):
         return outputs
 
     def log_probabilities(self, outputs: Tensor) -> Tensor:
-        """Outputs of the decoder (..., S) to log-probabilities of the next word (..., V), eq. 5 and 6."""
+        """Outputs of the decoder (..., S), and what they attend to, to log-probabilities of the next word (..., V),
+        eq. 5 and 6."""
         dropped = functional.dropout(outputs, self.config.dropout, self.training)
         return functional.log_softmax(self.output(dropped).float(), dim=-1)
 
@@ -135,8 +151,13 @@ class MotionToLanguage(LanguageNet):
         words = functional.pad(batch.words, (1, 0), value=SOS)
         targets = functional.pad(batch.words, (0, 1), value=PAD).scatter(1, lengths[:, None], EOS)
         active = before(lengths + 1, words.shape[1])
-        context = self.encode(batch.frames, batch.lengths)
-        outputs = self.outputs(words, context)
+        if self.attention is None:
+            context = self.encode(batch.frames, batch.lengths)
+            outputs = self.outputs(words, context)
+        else:
+            context, states = self.encode_states(batch.frames, batch.lengths)
+            outputs = self.outputs(words, context)
+            outputs = torch.cat([outputs, self.attention(outputs, states, batch.lengths)], dim=-1)
         # padded steps are left out before the output layer, which is the largest product of all
         losses = functional.nll_loss(self.log_probabilities(outputs[active]), targets[active], reduction="none")
         return losses, self.summary_loss(batch, context)
@@ -146,14 +167,34 @@ class MotionToLanguage(LanguageNet):
         following = self.decoder.step(self.embedding(word[:, None])[:, 0], context, state)
         return self.log_probabilities(following), following
 
+    def attending_step(
+        self, word: Tensor, context: Tensor, states: Tensor, lengths: Tensor, state: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """:meth:`step` that also attends to the first ``lengths`` (B,) of the encoder's states (B, T, C)."""
+        assert self.attention is not None
+        following = self.decoder.step(self.embedding(word[:, None])[:, 0], context, state)
+        attended = self.attention(following[:, None], states, lengths)[:, 0]
+        return self.log_probabilities(torch.cat([following, attended], dim=-1)), following
+
     def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
         """The encoder and the step, each with its contract."""
-        context = TensorSpec("context", ("batch", 2 * self.config.encoder_units[-1]))
+        size = 2 * self.config.encoder_units[-1]
         frames = TensorSpec("frames", ("batch", "time", self.config.channels))
         lengths = TensorSpec("lengths", ("batch",), "int64")
+        context = TensorSpec("context", ("batch", size))
+        if self.attention is None:
+            encoder = Part(self, self.encode), GraphSpec((frames, lengths), (context,))
+            return {"encoder": encoder, "step": (Part(self, self.step), self._step_spec(context))}
+        states = TensorSpec("states", ("batch", "time", size))
+        encoder = Part(self, self.encode_states), GraphSpec((frames, lengths), (context, states))
+        step = Part(self, self.attending_step), self._step_spec(context, states, lengths)
+        return {"encoder": encoder, "step": step}
+
+    def _step_spec(self, *contexts: TensorSpec) -> GraphSpec:
+        """The contract of a step that takes these of a motion."""
+        units = sum(self.config.decoder_units)
         word = TensorSpec("word", ("batch",), "int64")
-        state, following = (TensorSpec(n, ("batch", sum(self.config.decoder_units))) for n in ("state", "next_state"))
+        state = TensorSpec("state", ("batch", units))
         scores = TensorSpec("log_probabilities", ("batch", self.config.words))
-        step = GraphSpec((word, context, state), (scores, following), {"state": "next_state"})
-        encoder = GraphSpec((frames, lengths), (context,))
-        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+        following = TensorSpec("next_state", ("batch", units))
+        return GraphSpec((word, *contexts, state), (scores, following), {"state": "next_state"})

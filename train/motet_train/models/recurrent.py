@@ -156,6 +156,10 @@ class Encoder(nn.Module):
 
     def forward(self, x: Tensor, lengths: Tensor) -> Tensor:
         """Sequences (B, T, I) of the given lengths (B,) to contexts (B, C)."""
+        return self.states(x, lengths)[1]
+
+    def states(self, x: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """The states (B, T, C) of the last layer, any finite numbers after a row's end; and the contexts (B, C)."""
         active = before(lengths, x.shape[1]).T[..., None]
         active = torch.stack([active, active.flip(0)])
         x = x.transpose(0, 1)
@@ -166,7 +170,32 @@ class Encoder(nn.Module):
             states = layer(torch.stack([x, x.flip(0)]), active)
             x = torch.cat([states[0], states[1].flip(0)], dim=-1)
             context = states[:, -1].transpose(0, 1).flatten(1)
-        return context
+        return x.transpose(0, 1), context
+
+
+class Attention(nn.Module):
+    """Global attention over the states of an encoder, with the "general" score (Luong, Pham and Manning 2015, 3.1).
+
+    The score of a state h under a query q is q W h, here divided by the root of the size of h as in Vaswani et al.
+    (2017); the softmax over a row's own states weighs their sum. A product costs less than the sum and tanh of Bahdanau
+    et al. (2015). And the query is the decoder's newest output, not the one before it, so that in training all steps of
+    a sentence attend at once.
+    """
+
+    def __init__(self, queries: int, states: int) -> None:
+        super().__init__()
+        self.weight = nn.Parameter(torch.empty(queries, states))
+        nn.init.xavier_uniform_(self.weight)
+
+    def forward(self, queries: Tensor, states: Tensor, lengths: Tensor) -> Tensor:
+        """What queries (B, W, S) see of the first ``lengths`` (B,) states (B, T, C): (B, W, C)."""
+        return self.weights(queries, states, lengths) @ states
+
+    def weights(self, queries: Tensor, states: Tensor, lengths: Tensor) -> Tensor:
+        """How much of each state a query sees (B, W, T): their sum is 1, and 0 is seen after a row's end."""
+        scores = queries @ self.weight @ states.mT / states.shape[-1] ** 0.5
+        real = before(lengths, states.shape[1])[:, None]
+        return torch.where(real, scores, -torch.inf).softmax(dim=-1)
 
 
 class Decoder(nn.Module):

@@ -108,40 +108,52 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
 
     data: the store's name.
     """
-    recipe = job.recipe
-    visits = recipe.visits
-    batch_size = job.training.batch
-    corpus = divided(store, visits.mirror, by)
-    config = asdict(recipe.sized(channels=len(corpus.contract.channels), words=len(corpus.vocabulary)))
-    if "travelled" in config and not named(store.representation).required:
-        config["travelled"] = 0  # its channels do not tell the path
+    corpus = divided(store, job.recipe.visits.mirror, by)
+    config = _config(job.recipe, corpus)
     torch.manual_seed(job.about.seed)
-    net = MODELS[recipe.model](config)
+    net = MODELS[job.recipe.model](config)
     assert isinstance(net, LanguageNet)
     net.measure_by(corpus.contract.mean, corpus.contract.std)
+    learner = _learner(job, corpus, net)
+    about = manifest(job, corpus, config, data, by)
+    if job.recipe.verb != "describe":
+        return job.run(net, learner, about)
+    return job.run(net, learner, about, tuned=partial(_confidence, corpus))
+
+
+def _config(recipe: Recipe, corpus: Divided) -> dict[str, Any]:
+    """The sizes of a recipe's net for a corpus."""
+    config = asdict(recipe.sized(channels=len(corpus.contract.channels), words=len(corpus.vocabulary)))
+    if "travelled" in config and not named(corpus.store.representation).required:
+        config["travelled"] = 0  # its channels do not tell the path
+    return config
+
+
+def _learner(job: Job, corpus: Divided, net: LanguageNet) -> GradientLearner:
+    """What trains a net on the training part of a corpus, and validates it on the validation part."""
+    visits = job.recipe.visits
+    batch_size = job.training.batch
     train = corpus.examples(corpus.parts.train)
     validation = corpus.examples(corpus.parts.validation)
-
-    def loss(batch: Batch) -> Terms:
-        losses, summary = net.terms(batch)
-        terms = (Term(losses, len(losses)),)
-        return terms if summary is None else (*terms, Term(summary, len(batch)))
 
     def validated() -> dict[str, Any]:
         longest = visits.windows and visits.windows[1]
         return {"validation": round(validation_loss(net, validation, batch_size, longest), 6)}
 
-    learner = GradientLearner(
+    return GradientLearner(
         net.to(job.device),
         job.training,
-        loss,
+        partial(_loss, net),
         lambda rng: train.epoch(rng, batch_size, visits.offsets, visits.windows, visits.pairs),
         validated,
     )
-    about = manifest(job, corpus, config, data, by)
-    if recipe.verb != "describe":
-        return job.run(net, learner, about)
-    return job.run(net, learner, about, tuned=partial(_confidence, corpus))
+
+
+def _loss(net: LanguageNet, batch: Batch) -> Terms:
+    """The terms of a batch: the losses of all active steps, and that of the summary head, if there is one."""
+    losses, summary = net.terms(batch)
+    terms = (Term(losses, len(losses)),)
+    return terms if summary is None else (*terms, Term(summary, len(batch)))
 
 
 def _confidence(corpus: Divided, run: Run) -> tuple[ConfidenceSettings]:
@@ -163,7 +175,7 @@ def manifest(job: Job, corpus: Divided, config: Mapping[str, Any], data: str, by
     """The manifest of a run of a model that reads or writes sentences. data: the store's name."""
     parts = corpus.parts
     records = corpus.store.records
-    sentences = [sentence for entry in records for sentence in entry.sentences]
+    sentences = list(chain.from_iterable(entry.sentences for entry in records))
     about = {
         "name": data,
         "motions": len(records),

@@ -1,6 +1,6 @@
 import { FIELDS } from "../generated.js";
 import type { InferenceSession, TypedTensor } from "onnxruntime-web";
-import type { NumberArray } from "./arrays.js";
+import type { NumberArray, Numbers } from "./arrays.js";
 import { BundleError } from "../errors.js";
 import { checkGraph } from "./graphSafety.js";
 import { loaded, type Runtime } from "./runtime.js";
@@ -133,18 +133,21 @@ function bounded(data: Float32Array): boolean {
   return true;
 }
 
-/** Rows of all states, in a new order, with any repeated or left out. */
-export function taken(states: Record<string, NumberArray<Float32Array>>, order: number[]) {
-  const reordered: Record<string, NumberArray<Float32Array>> = {};
-  for (const [name, array] of Object.entries(states)) {
+/** Rows of all arrays, in a new order, with any repeated or left out. */
+export function taken<T extends Numbers>(arrays: Record<string, NumberArray<T>>, order: number[]) {
+  const reordered: Record<string, NumberArray<T>> = {};
+  for (const [name, array] of Object.entries(arrays)) {
     const { data, shape } = array;
     if (order.length === shape[0] && order.every((row, at) => row === at)) {
       reordered[name] = array;
       continue;
     }
     const width = data.length / shape[0]!;
-    const picked = new Float32Array(order.length * width);
-    order.forEach((row, at) => picked.set(data.subarray(row * width, (row + 1) * width), at * width));
+    const Same = data.constructor as new (length: number) => T;
+    const picked = new Same(order.length * width);
+    order.forEach((row, at) => {
+      picked.set(data.subarray(row * width, (row + 1) * width) as unknown as ArrayLike<never>, at * width);
+    });
     reordered[name] = { data: picked, shape: [order.length, ...shape.slice(1)] };
   }
   return reordered;

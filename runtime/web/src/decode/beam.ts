@@ -1,5 +1,5 @@
-import { integers, type NumberArray } from "../bundle/arrays.js";
-import { type Graph, taken } from "../bundle/graph.js";
+import { integers } from "../bundle/arrays.js";
+import { type Arrays, type Graph, taken } from "../bundle/graph.js";
 
 /** A finished sequence of ids, without its end, and the sum of its log-probabilities, with it. score: its rank. */
 export interface Hypothesis {
@@ -22,10 +22,13 @@ export interface Limits {
   longest: number;
 }
 
-/** The most probable sequences for a context (1, C), best first: docs/reference/bundle.md, the loop `beam`. */
+/**
+ * The most probable sequences for contexts, best first: docs/reference/bundle.md, the loop `beam`. The contexts are what
+ * the step takes of a motion (1, ...), by name.
+ */
 export async function beamSearch(
   step: Graph,
-  context: NumberArray<Float32Array>,
+  contexts: Arrays,
   limits: Limits,
   beams: number,
 ): Promise<Hypothesis[]> {
@@ -36,10 +39,10 @@ export async function beamSearch(
     const open = kept.filter((hypothesis) => !hypothesis.ended);
     const word = integers(open.map((hypothesis) => hypothesis.ids.at(-1) ?? start));
     const repeated = taken(
-      { context },
+      contexts,
       open.map(() => 0),
     );
-    const { outputs, states: next } = await step.step({ word, context: repeated.context! }, states);
+    const { outputs, states: next } = await step.step({ word, ...repeated }, states);
     const { data, shape } = outputs.log_probabilities!;
     const words = shape[1]!;
     const grown: (Open & { parent: number })[] = [];
@@ -65,17 +68,17 @@ export async function beamSearch(
   return kept.map(({ ids, score }) => ({ ids, logProbability: score, score }));
 }
 
-/** The log-probability of a sequence of ids, and of its end, for a context (1, C). */
+/** The log-probability of a sequence of ids, and of its end, for contexts as {@link beamSearch} takes them. */
 export async function scoreWords(
   step: Graph,
-  context: NumberArray<Float32Array>,
+  contexts: Arrays,
   { start, end }: Limits,
   ids: number[],
 ): Promise<number> {
   let states = step.zeroState(1);
   let sum = 0;
   for (const [at, id] of [...ids, end].entries()) {
-    const next = await step.step({ word: integers([ids[at - 1] ?? start]), context }, states);
+    const next = await step.step({ word: integers([ids[at - 1] ?? start]), ...contexts }, states);
     sum += next.outputs.log_probabilities!.data[id]!;
     states = next.states;
   }

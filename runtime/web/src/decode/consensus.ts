@@ -1,7 +1,7 @@
 /* The sentence that agrees best with many drawn ones: docs/reference/bundle.md, the loop `consensus`. */
-import { integers, type NumberArray } from "../bundle/arrays.js";
+import { integers } from "../bundle/arrays.js";
 import type { Hypothesis, Limits } from "./beam.js";
-import { type Graph, taken } from "../bundle/graph.js";
+import { type Arrays, type Graph, taken } from "../bundle/graph.js";
 import type { Noise } from "./random.js";
 
 /** A drawn sequence of ids, the model's log-probability of it, and how often it came. */
@@ -19,16 +19,16 @@ interface Beginning {
   ended: boolean;
 }
 
-/** The sequences drawn for a context (1, C), the one that agrees best with all first; scores are agreements, 0 to 1. */
+/** The sequences drawn for contexts as beamSearch takes them, the one that agrees best with all first; scores are agreements, 0 to 1. */
 export async function consensus(
   step: Graph,
-  context: NumberArray<Float32Array>,
+  contexts: Arrays,
   limits: Limits,
   draws: number,
   temperature: number,
   noise: Noise,
 ): Promise<Hypothesis[]> {
-  const drawn = await drawSequences(step, context, limits, draws, temperature, noise);
+  const drawn = await drawSequences(step, contexts, limits, draws, temperature, noise);
   const scores = agreement(drawn);
   const equal = scores.map((score) => Math.round(score * 1e9)); // what only rounding tells apart
   const order = drawn
@@ -43,7 +43,7 @@ export async function consensus(
 
 async function drawSequences(
   step: Graph,
-  context: NumberArray<Float32Array>,
+  contexts: Arrays,
   limits: Limits,
   draws: number,
   temperature: number,
@@ -57,16 +57,11 @@ async function drawSequences(
   const ended: Beginning[] = [];
   for (let length = 0; open.length; length++) {
     const word = integers(open.map((beginning) => beginning.ids.at(-1) ?? limits.start));
-    const { outputs, states: next } = await step.step(
-      {
-        word,
-        context: taken(
-          { context },
-          open.map(() => 0),
-        ).context!,
-      },
-      states,
+    const repeated = taken(
+      contexts,
+      open.map(() => 0),
     );
+    const { outputs, states: next } = await step.step({ word, ...repeated }, states);
     const { data, shape } = outputs.log_probabilities!;
     const grown = open.flatMap((beginning, row) => {
       const gains = data.subarray(row * shape[1]!, (row + 1) * shape[1]!);

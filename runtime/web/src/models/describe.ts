@@ -1,10 +1,9 @@
 import { DESCRIBE, confidenceSettings } from "../generated.js";
-import type { NumberArray } from "../bundle/arrays.js";
 import { beamSearch, type Hypothesis, type Limits, scoreWords } from "../decode/beam.js";
 import type { Manifest } from "../bundle/bundle.js";
 import { consensus } from "../decode/consensus.js";
 import { DecodingError } from "../errors.js";
-import type { Graph } from "../bundle/graph.js";
+import type { Arrays, Graph } from "../bundle/graph.js";
 import { type Known, pathOf } from "./nearestNeighbour.js";
 import { type Frames, LanguageModel } from "./base.js";
 import { type Noise, Pcg64 } from "../decode/random.js";
@@ -96,13 +95,13 @@ export class DescribeModel extends LanguageModel {
       ? settings.decoding === "consensus"
       : this.manifest.loop === "consensus";
     const draws = settings.draws ?? (drawing ? this.setting("draws") : undefined);
-    if (draws === undefined) return beamSearch(this.graphs.step!, await this.context(frames), limits, beams);
+    if (draws === undefined) return beamSearch(this.graphs.step!, await this.contexts(frames), limits, beams);
     const source = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
     const temperature = this.setting("temperature", settings.temperature);
-    const context = await this.context(frames);
+    const contexts = await this.contexts(frames);
     const beginnings = await consensus(
       this.graphs.step!,
-      context,
+      contexts,
       limits,
       this.setting("draws", draws),
       temperature,
@@ -114,11 +113,15 @@ export class DescribeModel extends LanguageModel {
   /** The log-probability of a sentence given frames (T, D). */
   async score(frames: Frames, text: string): Promise<number> {
     const { ids } = this.vocabulary.encode(text);
-    return scoreWords(this.graphs.step!, await this.context(frames), this.limits(), ids);
+    return scoreWords(this.graphs.step!, await this.contexts(frames), this.limits(), ids);
   }
 
-  private async context(frames: Frames): Promise<NumberArray<Float32Array>> {
-    return (await this.graphs.encoder!.run(this.motion(frames))).context!;
+  /** What the step takes of a motion: all inputs that the encoder takes or gives. */
+  private async contexts(frames: Frames): Promise<Arrays> {
+    const motion = this.motion(frames);
+    const encoded: Arrays = { ...motion, ...(await this.graphs.encoder!.run(motion)) };
+    const names = this.graphs.step!.spec.inputs.map(({ name }) => name).filter((name) => name in encoded);
+    return Object.fromEntries(names.map((name) => [name, encoded[name]!]));
   }
 
   private limits(maxWords?: number): Limits {
