@@ -94,7 +94,7 @@ CEILINGS = {
     "motet.formats": 37_000,
     "motet.generate": 25_900,
     "motet.live": 5_700,
-    "motet.models": 9_300,
+    "motet.models": 9_900,
     "motet.motion": 16_400,
     "motet.papers": 7_300,
     "motet.predict": 5_400,
@@ -108,9 +108,9 @@ CEILINGS = {
     "motet_train.cli": 8_500,
     "motet_train.data": 21_900,
     "motet_train.evaluate": 45_100,
-    "motet_train.models": 20_600,
+    "motet_train.models": 21_300,
     "motet_train.papers": 41_400,
-    "motet_train.recipes": 15_400,
+    "motet_train.recipes": 15_500,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""
