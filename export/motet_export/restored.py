@@ -38,12 +38,21 @@ def restored(bundle: Bundle) -> Run:
     _copy_arrays(state, bundle)
     weight_names = _randomised(other)
     for role, (module, spec) in other.graphs().items():
-        stored = _tensors(bundle.read(manifest.graphs[role].file))
+        stored = _renamed(_tensors(bundle.read(manifest.graphs[role].file)), net)
         random = _tensors(export_graph(module, spec, {}))
         _restore(state, other.state_dict(), stored, random, weight_names)
     run = Run(manifest.source, net.eval())
     _check(run, bundle)
     return run
+
+
+def _renamed(tensors: Tensors, net: Net) -> Tensors:
+    """Tensors of a graph by the names that weights have today."""
+    renamed = {}
+    for name, value in tensors.items():
+        weight = name.removeprefix("net.")
+        renamed[name.removesuffix(weight) + net.current_name(weight)] = value
+    return renamed
 
 
 def _copy_arrays(state: dict[str, torch.Tensor], bundle: Bundle) -> None:

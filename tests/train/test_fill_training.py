@@ -89,6 +89,19 @@ def net(store: Store, **sizes: int) -> Filler:
     return found.eval()
 
 
+def test_weights_of_older_runs_are_loaded_by_the_names_of_today(store: Store) -> None:
+    fresh = net(store)
+    names = {"distances": "told", "qkv": "asked", "proj": "mixed", "mlp_in": "inward", "mlp_out": "outward"}
+    state = {}
+    for name, value in fresh.state_dict().items():
+        old = ".".join(names.get(part, part) for part in name.split("."))
+        state[old] = value + 1
+    assert {"told.weight", "blocks.0.asked.weight", "blocks.0.outward.bias", "outward.bias"} <= state.keys()
+    fresh.load_state_dict(state)
+    assert all(value.equal(state[name]) for name, value in fresh.state_dict().items() if name in state)
+    assert fresh.blocks[0].qkv.weight.equal(state["blocks.0.asked.weight"])  # type: ignore[union-attr, operator]
+
+
 def drawn(store: Store, sizes: tuple[int, int, int], batch: int = 3) -> GapWindow:
     windows = GapWindows(store, (0, 1, 2), sum(sizes), frame_mirror(store.contract((0,))))
     return windows.draw(batch, sizes, np.random.default_rng(1))

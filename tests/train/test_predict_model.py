@@ -18,7 +18,6 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.models.predictor import LEAST, ErrorHead, Predictor, PredictorConfig, error_signs
 from motet_train.papers.li2018.expmap import CMU_ACTIONS, expmap_material, read_expmap
-from motet_train.papers.li2018.published import CONV
 from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
@@ -104,7 +103,7 @@ def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     assert shown.exit_code == 0, shown.output
     assert "true 33 67 133 167 233 417" in " ".join(shown.stdout.split())
     assert "label them 80 160 320 400 560 1000" in " ".join(shown.stdout.split())
-    assert f"published: {CONV}" in shown.stdout
+    assert f"published: {'ConvSeq2Seq (Li 2018)'}" in shown.stdout
     assert (tmp_path / "plots" / "predict-error.png").stat().st_size > 1000
     found = json.loads(run("evaluate", out, "--data", data, "--json", "--save").stdout)
     floors = {"zero_velocity", "constant_velocity", "damped_velocity"}

@@ -11,9 +11,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.bundle.graph import GraphSpec
 from motet.text.vocabulary import SPECIALS, UNK
-from motet_train.models.net import Net, before, gelu
+from motet_train.models.net import Net, before, float_rows, gelu, id_rows
 
 UNKNOWN = SPECIALS.index(UNK)
 """The id of unknown words."""
@@ -95,9 +95,9 @@ class ActionNet(Net):
 
     def encoder(self) -> tuple[nn.Module, GraphSpec]:
         """Itself as a graph, the encoder of sentences."""
-        words = TensorSpec("words", ("batch", "words"), "int64")
-        lengths = TensorSpec("lengths", ("batch",), "int64")
-        return self, GraphSpec((words, lengths), (TensorSpec("context", ("batch", self.config.actions)),))
+        words = id_rows("words", "words")
+        lengths = id_rows("lengths")
+        return self, GraphSpec((words, lengths), (float_rows("context", self.config.actions),))
 
     def graphs(self) -> dict[str, Any]:
         """None: it is a part of the model that writes codes."""

@@ -11,15 +11,16 @@ width, H heads.
 """
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.bundle.graph import GraphSpec
 from motet.representation.placed import ROOT_PLACE, mirror
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net, constants, gelu, normalised, renamed, zero_linear
+from motet_train.models.net import Graphs, Net, constants, float_rows, gelu, normalised, zero_linear
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class FillerConfig:
 class Block(nn.Module):
     """Attention to all frames, and a feed-forward layer."""
 
+    OLD_NAMES: ClassVar = {"asked": "qkv", "mixed": "proj", "inward": "mlp_in", "outward": "mlp_out"}
     slopes: Tensor
 
     def __init__(self, width: int, heads: int, inner: int) -> None:
@@ -53,7 +55,6 @@ class Block(nn.Module):
         self.proj = nn.Linear(width, width)
         self.mlp_in = nn.Linear(width, inner)
         self.mlp_out = nn.Linear(inner, width)
-        renamed(self, {"asked": "qkv", "mixed": "proj", "inward": "mlp_in", "outward": "mlp_out"})
         # half of the heads attend to all frames alike
         slopes = torch.cat([0.5 ** torch.linspace(1, 4, heads // 2), torch.zeros(heads - heads // 2)])
         constants(self, slopes=slopes[:, None, None])
@@ -76,6 +77,7 @@ class Filler(Net):
     """Placed frames before, plainly through and after a gap to those that fill it. mean, scale: (E,) of such frames."""
 
     CONFIG = FillerConfig
+    OLD_NAMES: ClassVar = {"told": "distances"}
     frequencies: Tensor
     mirrored: Tensor
     signs: Tensor
@@ -87,7 +89,6 @@ class Filler(Net):
         self.inward = nn.Linear(3 * (config.channels + 3 * len(config.tree.parents)), width)
         self.ends = nn.Sequential(nn.Linear(2 * width, width), nn.GELU(), nn.Linear(width, width))
         self.distances = nn.Linear(4 * config.waves + 1, width)
-        renamed(self, {"told": "distances"})
         self.blocks = nn.ModuleList(Block(width, config.heads, config.inner) for _ in range(config.layers))
         self.norm = nn.LayerNorm(width)
         self.outward = zero_linear(width, config.channels)
@@ -160,8 +161,8 @@ class Filler(Net):
         joints: Tensor = self.places(frames[..., ROOT_PLACE:]) + frames[..., None, :ROOT_PLACE]
         return joints
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The one graph."""
         axes = {"past": "before", "plain": "gap", "after": "behind", "filled": "gap"}
-        *inputs, filled = (TensorSpec(name, ("batch", axis, self.config.channels)) for name, axis in axes.items())
+        *inputs, filled = (float_rows(name, axis, self.config.channels) for name, axis in axes.items())
         return {"filler": (self, GraphSpec(tuple(inputs), (filled,)))}

@@ -15,10 +15,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.bundle.graph import GraphSpec
 from motet_train.data.batches import Pairs
 from motet_train.models.kinematics import EulerPlaces, Figure
-from motet_train.models.net import Net, Part, before, normalised
+from motet_train.models.net import Graphs, Net, Part, before, float_rows, id_rows, normalised
 from motet_train.models.recurrent import WordEmbedding
 
 LIMIT = 5.0
@@ -121,12 +121,12 @@ class JointEmbedding(Net):
         between_texts = contrast(texts @ others.T / self.config.temperature, pairs.groups)
         return between_motion_and_text + self.config.wordings * between_texts
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """Both encoders, each with its contract."""
-        vector = TensorSpec("vector", ("batch", self.config.vector))
-        lengths = TensorSpec("lengths", ("batch",), "int64")
-        frames = TensorSpec("frames", ("batch", "time", self.config.channels))
-        words = TensorSpec("words", ("batch", "words"), "int64")
+        vector = float_rows("vector", self.config.vector)
+        lengths = id_rows("lengths")
+        frames = float_rows("frames", "time", self.config.channels)
+        words = id_rows("words", "words")
         return {
             "motion": (Part(self, self.embed_motion), GraphSpec((frames, lengths), (vector,))),
             "text": (Part(self, self.embed_text), GraphSpec((words, lengths), (vector,))),

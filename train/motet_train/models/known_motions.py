@@ -4,17 +4,13 @@ Nothing here is trained: the nets come from runs of their own.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import torch
-from numpy.typing import NDArray
-from torch import nn
 
-from motet.bundle.graph import GraphSpec
 from motet.models.nearest_neighbour import Known
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
-from motet_train.models.net import Net
+from motet_train.models.net import Graphs, Net, Tables
 
 
 @dataclass(frozen=True)
@@ -70,10 +66,10 @@ class KnownMotions(Net):
             getattr(net, f"known_{name}").copy_(table)
         return net
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """Those of the net that writes sentences, and the space's encoder of motions."""
         return {**self.writer.graphs(), "space": self.space.graphs()["motion"]}
 
-    def tables(self) -> dict[str, NDArray[Any]]:
+    def tables(self) -> Tables:
         """What is known."""
         return {f"known_{name}": getattr(self, f"known_{name}").numpy() for name in self.known_tables}

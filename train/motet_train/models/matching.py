@@ -4,17 +4,14 @@ See :mod:`motet.steering.matching`, whose letters are used here; P = 4 J + 1 are
 """
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.bundle.graph import GraphSpec
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net
+from motet_train.models.net import Graphs, Net, Tables
 
 Speeds = tuple[float, float, float, float, float]
 """Of a gait in m/s: the slowest, the usual one, and the fastest forward, sideways and backwards; 0 where it does not go
@@ -85,11 +82,11 @@ class Matching(Net):
         points = self.places(quat_to_sixd(quats).flatten(-2))
         return torch.cat([points[..., :1], points[..., 1:2] + height[..., None], points[..., 2:]], dim=-1)
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """None: the loop is springs, a search and a linear map."""
         return {}
 
-    def tables(self) -> dict[str, NDArray[Any]]:
+    def tables(self) -> Tables:
         """All that the loop plays."""
         return {name: getattr(self, name).detach().cpu().numpy().astype(dtype) for name, dtype in DTYPES.items()}
 

@@ -11,17 +11,16 @@ C width, H heads, L numbers that a step's codes stand for, T frames, D channels.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.models.action_net import ActionNet, ActionsConfig
 from motet_train.models.codec import CodecConfig, MotionCodec
-from motet_train.models.net import Net, Part, constants, gelu, renamed, zero_linear
+from motet_train.models.net import Graphs, Net, Part, Tables, constants, float_rows, gelu, id_rows, zero_linear
 
 
 @dataclass(frozen=True)
@@ -42,13 +41,16 @@ class CodeModelConfig:
     unsaid: float = 0.1
 
 
-OLD_NAMES = {"told": "modulation", "asked": "qkv", "mixed": "proj", "inward": "mlp_in", "outward": "mlp_out"}
-"""Parts of a block, by their names in older runs."""
-
-
 class Block(nn.Module):
     """Attention to the past and a gated feed-forward layer, both modulated by the action."""
 
+    OLD_NAMES: ClassVar = {
+        "told": "modulation",
+        "asked": "qkv",
+        "mixed": "proj",
+        "inward": "mlp_in",
+        "outward": "mlp_out",
+    }
     slopes: Tensor
 
     def __init__(self, width: int, heads: int, condition: int) -> None:
@@ -59,7 +61,6 @@ class Block(nn.Module):
         self.proj = nn.Linear(width, width, bias=False)
         self.mlp_in = nn.Linear(width, 4 * width)
         self.mlp_out = nn.Linear(4 * width, width)
-        renamed(self, OLD_NAMES)
         slopes = 2.0 ** -torch.linspace(1, 8, heads)
         constants(self, slopes=slopes[:, None, None])
 
@@ -249,7 +250,7 @@ class MotionCodes(Net):
         config = self.config.codec
         return frames.reshape(codes.shape[0], -1, config.hop, config.channels), self.codec.book[moves]
 
-    def tables(self) -> dict[str, NDArray[Any]]:
+    def tables(self) -> Tables:
         """The memory, and the numbers that a move (M, 3) and a code of the body (V, L) stand for."""
         codec = self.config.codec
         every = torch.arange(codec.codes)[:, None].expand(-1, codec.groups)
@@ -261,24 +262,24 @@ class MotionCodes(Net):
         """Frames of steps (B, N, T / N, D) in the contract's units to the codes (B, N, P - 1) of the body."""
         return self.codec.to_codes(self.codec.encode(frames.flatten(1, 2)))
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder of sentences, the step and its parts, and the codec's two ways."""
         return {"encoder": self.text.encoder(), **self._writer_graphs(), **self._codec_graphs()}
 
-    def _writer_graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def _writer_graphs(self) -> Graphs:
         """The step, and the codes of its parts."""
         # what goes in, with the past of attention
         writer = self.config.writer
-        codes = TensorSpec("codes", ("batch", len(self.sizes)), "int64")
-        action = TensorSpec("action", ("batch",), "int64")
-        age = TensorSpec("age", ("batch",), "int64")
+        codes = id_rows("codes", len(self.sizes))
+        action = id_rows("action")
+        age = id_rows("age")
         size = 2 * writer.width // writer.heads
         shape = ("batch", writer.layers, writer.heads, "past", size)
         past = TensorSpec("past", shape)
 
         # what comes out
-        known = TensorSpec("known", ("batch", writer.width))
-        numbers = TensorSpec("numbers", ("batch", self.writer.seen.in_features))
+        known = float_rows("known", writer.width)
+        numbers = float_rows("numbers", self.writer.seen.in_features)
         next_past = TensorSpec("next_past", shape)
         scores = TensorSpec("log_probabilities", ("batch", len(self.sizes), max(self.sizes)))
         start = {"past": (writer.layers, writer.heads, 0, size)}
@@ -288,13 +289,13 @@ class MotionCodes(Net):
             "part": (Part(self, self.part), GraphSpec((known, codes), (scores,))),
         }
 
-    def _codec_graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def _codec_graphs(self) -> Graphs:
         """Codes to frames, and frames to codes."""
         codec = self.config.codec
-        codes = TensorSpec("codes", ("batch", "steps", len(self.sizes)), "int64")
-        body = TensorSpec("codes", ("batch", "steps", codec.groups), "int64")
-        frames = TensorSpec("frames", ("batch", "steps", codec.hop, codec.channels))
-        moves = TensorSpec("moves", ("batch", "steps", 3))
+        codes = id_rows("codes", "steps", len(self.sizes))
+        body = id_rows("codes", "steps", codec.groups)
+        frames = float_rows("frames", "steps", codec.hop, codec.channels)
+        moves = float_rows("moves", "steps", 3)
         return {
             "decoder": (Part(self, self.decode), GraphSpec((codes,), (frames, moves))),
             "tokens": (Part(self, self.to_codes), GraphSpec((frames,), (body,))),

@@ -10,9 +10,25 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.bundle.graph import GraphSpec
+from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.motion.rotations import Array
 from motet.representation.contract import Z_LIMIT
+
+Graphs = dict[str, tuple[nn.Module, GraphSpec]]
+"""For each role the module to export and the contract of its forward."""
+
+Tables = dict[str, NDArray[Any]]
+"""Plain arrays of a bundle by name."""
+
+
+def float_rows(name: str, *shape: str | int, dtype: str = "float32") -> TensorSpec:
+    """The contract of a tensor (B, ...) of some rows. shape: of a row, with the names of axes of any size."""
+    return TensorSpec(name, ("batch", *shape), dtype)
+
+
+def id_rows(name: str, *shape: str | int) -> TensorSpec:
+    """The contract of a tensor of whole numbers, see :func:`float_rows`."""
+    return float_rows(name, *shape, dtype="int64")
 
 
 class Net(nn.Module, ABC):
@@ -26,6 +42,7 @@ class Net(nn.Module, ABC):
 
     def __init__(self, channels: int) -> None:
         super().__init__()
+        self.register_load_state_dict_pre_hook(_rename)  # type: ignore[no-untyped-call]
         self.register_buffer("mean", torch.zeros(channels))
         self.register_buffer("scale", torch.ones(channels))
 
@@ -39,15 +56,24 @@ class Net(nn.Module, ABC):
         self.mean.copy_(torch.from_numpy(mean))
         self.scale.copy_(torch.from_numpy(scale))
 
+    def current_name(self, name: str) -> str:
+        """The name of a weight, from its name in an older run: parts are renamed by the OLD_NAMES of their modules."""
+        module: nn.Module | None = self
+        parts = []
+        for part in name.split("."):
+            parts.append(getattr(module, "OLD_NAMES", {}).get(part, part))
+            module = getattr(module, parts[-1], None)
+        return ".".join(parts)
+
     def matrices(self) -> list[Tensor]:
         """The weights that Muon may train: the matrices of linear layers."""
         return [module.weight for module in self.modules() if isinstance(module, nn.Linear)]
 
     @abstractmethod
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
-        """For each role the module to export and the contract of its forward."""
+    def graphs(self) -> Graphs:
+        """The graphs by role."""
 
-    def tables(self) -> dict[str, NDArray[Any]]:
+    def tables(self) -> Tables:
         """The plain arrays that a bundle holds beside the graphs, by name."""
         return {}
 
@@ -61,16 +87,11 @@ class Part(nn.Module):
         self.forward = function
 
 
-def renamed(module: nn.Module, names: Mapping[str, str]) -> None:
-    """Load weights of older runs, too. names: the old name of a part -> its name in ``module``."""
-
-    def rename(module: nn.Module, state: dict[str, Any], prefix: str, *details: Any) -> None:
-        for key in list(state):
-            old, dot, rest = key.removeprefix(prefix).partition(".")
-            if key.startswith(prefix) and old in names:
-                state[f"{prefix}{names[old]}{dot}{rest}"] = state.pop(key)
-
-    module.register_load_state_dict_pre_hook(rename)  # type: ignore[no-untyped-call]
+def _rename(net: Net, state: dict[str, Any], prefix: str, *details: Any) -> None:
+    """Give the weights of an older run the names of today, before they are loaded."""
+    for key in list(state):
+        if key.startswith(prefix):
+            state[prefix + net.current_name(key.removeprefix(prefix))] = state.pop(key)
 
 
 def tuples(value: Any) -> Any:

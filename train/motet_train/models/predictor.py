@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
-from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, Part, constants, gelu, normalised, zero_linear
+from motet.bundle.graph import GraphSpec
+from motet_train.models.net import Graphs, Net, Part, constants, float_rows, gelu, normalised, zero_linear
 
 GAIN = 3.0
 """Differences of normalised frames are multiplied by it, so that they vary about as much as poses do."""
@@ -263,17 +263,17 @@ class Predictor(Net):
         """(B, N, C) to the channels that move (B, N, M), in units of their scales."""
         return differences[..., self.kept[self.config.held :]] / self.scale[self.config.held :]
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder, the step and, where the net knows its errors, those: each with its contract."""
         channels = self.config.channels
         count = self.config.frames
-        frames = TensorSpec("frames", ("batch", self.config.seed_frames, channels))
-        coming, left = (TensorSpec(name, ("batch", count, channels)) for name in ("trajectory", "next_trajectory"))
-        frame = TensorSpec("frame", ("batch", channels))
+        frames = float_rows("frames", self.config.seed_frames, channels)
+        coming, left = (float_rows(name, count, channels) for name in ("trajectory", "next_trajectory"))
+        frame = float_rows("frame", channels)
         step = (Step(), GraphSpec((coming,), (frame, left), {coming.name: left.name}))
         if self.doubt is None:
             return {"encoder": (self, GraphSpec((frames,), (coming,))), "step": step}
-        apart, error = (TensorSpec(name, ("batch", count)) for name in ("disagreement", "error"))
+        apart, error = (float_rows(name, count) for name in ("disagreement", "error"))
         return {
             "encoder": (Part(self, self.with_disagreement), GraphSpec((frames,), (coming, apart))),
             "step": step,

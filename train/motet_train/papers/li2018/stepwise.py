@@ -11,8 +11,8 @@ from types import MappingProxyType
 import torch
 from torch import Tensor, nn
 
-from motet.bundle.graph import GraphSpec, TensorSpec
-from motet_train.models.net import Net, Part, normalised
+from motet.bundle.graph import GraphSpec
+from motet_train.models.net import Graphs, Net, Part, float_rows, normalised
 
 State = dict[str, Tensor]
 """The state of a system by name, each part (B, ...)."""
@@ -164,7 +164,7 @@ class Stepwise(Net):
         whole = self._whole(frame, context[:, : self.channels])
         return whole, torch.cat(_rows(after, system.carried), dim=1)
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder and the step, each with its contract.
 
         The carried parts of the state are one tensor, ``state``; those that depend on the seed alone are another,
@@ -172,11 +172,11 @@ class Stepwise(Net):
         """
         carried = sum(map(math.prod, self.system.carried.values()))
         constant = sum(map(math.prod, self.system.constant.values()))
-        frames = TensorSpec("frames", ("batch", self.seed_frames, self.channels))
-        frame = TensorSpec("frame", ("batch", self.channels))
-        context = TensorSpec("context", ("batch", self.channels + constant))
-        state = TensorSpec("state", ("batch", carried))
-        next_state = TensorSpec("next_state", ("batch", carried))
+        frames = float_rows("frames", self.seed_frames, self.channels)
+        frame = float_rows("frame", self.channels)
+        context = float_rows("context", self.channels + constant)
+        state = float_rows("state", carried)
+        next_state = float_rows("next_state", carried)
         step = GraphSpec((context, state), (frame, next_state), {"state": "next_state"})
         encoder = GraphSpec((frames,), (context, state))
         return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}

@@ -16,7 +16,7 @@ from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import LanguageNet, SummaryHead
-from motet_train.models.net import Part, before, normalised
+from motet_train.models.net import Graphs, Part, before, float_rows, id_rows, normalised
 from motet_train.models.recurrent import GATES, GRU, Decoder, Encoder, WordEmbedding, mask
 
 
@@ -243,22 +243,22 @@ class LanguageToMotion(LanguageNet):
         stds = mixture.variances.sqrt()
         return mixture.log_weights, mixture.means, stds, mixture.active.sigmoid(), next_state
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder and the step, each with its contract."""
         config = self.config
         units = sum(config.decoder_units)
         moments = ("batch", config.components, config.channels)
-        words = TensorSpec("words", ("batch", "words"), "int64")
-        lengths = TensorSpec("lengths", ("batch",), "int64")
-        context = TensorSpec("context", ("batch", 2 * config.encoder_units[-1]))
-        frame = TensorSpec("frame", ("batch", config.channels + 1))
-        state = TensorSpec("state", ("batch", units))
+        words = id_rows("words", "words")
+        lengths = id_rows("lengths")
+        context = float_rows("context", 2 * config.encoder_units[-1])
+        frame = float_rows("frame", config.channels + 1)
+        state = float_rows("state", units)
         outputs = (
-            TensorSpec("log_weights", ("batch", config.components)),
+            float_rows("log_weights", config.components),
             TensorSpec("means", moments),
             TensorSpec("stds", moments),
-            TensorSpec("active", ("batch",)),
-            TensorSpec("next_state", ("batch", units)),
+            float_rows("active"),
+            float_rows("next_state", units),
         )
         step = GraphSpec((frame, context, state), outputs, {"state": "next_state"})
         encoder = GraphSpec((words, lengths), (context,))
