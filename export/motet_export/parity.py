@@ -13,7 +13,9 @@ Every rung raises ExportError where its bound is exceeded, so a bundle that diff
 import json
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -32,6 +34,9 @@ from motet_export.exporter import ExportError
 
 CARRIED = 1e-4
 """Bound on the error after many carried steps or a whole run."""
+
+STEPS = 200
+"""Steps whose state is carried."""
 
 FAR_SHARE = 0.01
 """Of the numbers in frames that are drawn: those that are far from all data."""
@@ -53,13 +58,13 @@ Examples = Callable[[np.random.Generator, int], Arrays]
 """Draws all inputs of a graph for so many rows."""
 
 
-def error(found: Arrays, expected: Arrays) -> float:
+def error(computed: Arrays, expected: Arrays) -> float:
     """The largest |a - b| / max(1, RMS of b, |b|) over arrays of equal names.
 
     ExportError where shapes or dtypes differ, or a value is not finite.
     """
     try:
-        return difference(found, expected)
+        return difference(computed, expected)
     except BundleError as fault:
         raise ExportError(str(fault)) from fault
 
@@ -93,7 +98,10 @@ def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None =
     draw = draw or partial(example, torch.spec)
     rng = np.random.default_rng(1)
     batches = [1, 1000, *(int(batch) for batch in rng.integers(2, 100, 3))]
-    errors = [error(onnx(feeds), torch(feeds)) for feeds in (draw(rng, batch) for batch in batches)]
+    errors = []
+    for batch in batches:
+        feeds = draw(rng, batch)
+        errors.append(error(onnx(feeds), torch(feeds)))
     return _bounded(f"{name}.one_step", max(errors), 1e-5, batches=batches)
 
 
@@ -123,22 +131,33 @@ def check_carried(
     anew, and until then other inputs stay the same: so a predictor is used, whose encoder is asked again. "rounding" in
     the report is how far torch comes from itself when the last bits of the states change at every step.
     """
-    steps, draw, feedback = 200, draw or partial(example, torch.spec), torch.spec.feedback
-    rng, largest, rounding = np.random.default_rng(2), 0.0, 0.0
-    for n in range(steps):
+    draw = draw or partial(example, torch.spec)
+    rng = np.random.default_rng(2)
+    largest = 0.0
+    rounding = 0.0
+    for n in range(STEPS):
         if n % (horizon or 1) == 0:
             inputs = draw(rng, batch)
-        if n % (horizon or steps) == 0:
-            states = [{name: inputs[name] for name in feedback}] * 3
-        given = {name: value for name, value in inputs.items() if name not in feedback}
+        if n % (horizon or STEPS) == 0:
+            states = [_states(inputs, torch.spec)] * 3
+
+        # three runs: ONNX Runtime's, torch's, and torch's with other last bits
+        others = {name: value for name, value in inputs.items() if name not in torch.spec.feedback}
         states[2] = nudged(states[2], rng)
-        (found, states[0]), (expected, states[1]), (moved, states[2]) = (
-            advance(graph, state, given) for graph, state in zip((onnx, torch, torch), states, strict=True)
-        )
-        largest, rounding = max(largest, error(found, expected)), max(rounding, error(moved, expected))
+        computed, states[0] = advance(onnx, states[0], others)
+        expected, states[1] = advance(torch, states[1], others)
+        moved, states[2] = advance(torch, states[2], others)
+        largest = max(largest, error(computed, expected))
+        rounding = max(rounding, error(moved, expected))
+
     # a net that amplifies rounding is held to ten times its own; one that does so more cannot be compared
     bound = min(max(CARRIED, 10 * rounding), 1e-2)
-    return _bounded("step.carried", largest, bound, rounding=rounding, steps=steps, horizon=horizon, batch=batch)
+    return _bounded("step.carried", largest, bound, rounding=rounding, steps=STEPS, horizon=horizon, batch=batch)
+
+
+def _states(inputs: Arrays, spec: GraphSpec) -> dict[str, NDArray[Any]]:
+    """The inputs of a graph that are fed back."""
+    return {name: inputs[name] for name in spec.feedback}
 
 
 def nudged(state: Arrays, rng: np.random.Generator, of_zero: float = 0.0) -> dict[str, NDArray[Any]]:
@@ -172,37 +191,55 @@ def examples(manifest: Manifest, torch: Mapping[str, Graph], far: bool = False) 
     A history of codes is what the encoder makes of such frames in torch; and a predictor's other graphs get what its
     encoder gives: from numbers far from any frames a net that feeds its frames back can make much of a rounding.
     """
-    contract = manifest.motion
+    inputs = _Inputs(manifest, torch, far)
+    draws: dict[str, Examples] = {}
+    for role, graph in torch.items():
+        predicted = manifest.verb == "predict" and role != "encoder"
+        draws[role] = partial(inputs.from_encoder if predicted else inputs.draw, graph.spec)
+    return draws
 
-    def draw(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
-        found = example(spec, rng, rows, _below(manifest))
-        for name, value in found.items():
-            if name in FRAMES:
-                found[name] = _like(value, name, rng)
-            if far and value.dtype == np.float32 and name not in RANGED:
-                found[name] = extremes(found[name])
-        return found
 
-    def _like(value: NDArray[Any], name: str, rng: np.random.Generator) -> NDArray[Any]:
-        if name == "history":
-            frames = walks(contract, rng, *value.shape[:2])
-            return torch["encoder"]({"frames": frames.reshape(-1, frames.shape[2])})["codes"].reshape(value.shape)
-        walk = walks(contract, rng, len(value), math.prod(value.shape[1:-1]))
-        frames = (strained(walk, contract, rng) if far else walk).reshape(*value.shape[:-1], -1)
-        if value.shape[-1] == frames.shape[-1]:
+@dataclass(frozen=True)
+class _Inputs:
+    """Draws the inputs of the graphs of a model, see :func:`examples`."""
+
+    manifest: Manifest
+    graphs: Mapping[str, Graph]
+    far: bool
+
+    def draw(self, spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
+        """The inputs of a graph."""
+        inputs = example(spec, rng, rows, _below(self.manifest))
+        for name, value in inputs.items():
+            if name == "history":
+                inputs[name] = self._history(value.shape, rng)
+            elif name in FRAMES:
+                inputs[name] = self._frames(value.shape, rng)
+            if self.far and value.dtype == np.float32 and name not in RANGED:
+                inputs[name] = extremes(inputs[name])
+        return inputs
+
+    def _history(self, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[Any]:
+        """Codes as the encoder makes them of frames."""
+        frames = walks(self.manifest.motion, rng, *shape[:2])
+        feeds = {"frames": frames.reshape(-1, frames.shape[2])}
+        return self.graphs["encoder"](feeds)["codes"].reshape(shape)
+
+    def _frames(self, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[Any]:
+        """Frames of a shape; normalised and with a flag each, as generators take them, if the shape has one more."""
+        contract = self.manifest.motion
+        walk = walks(contract, rng, shape[0], math.prod(shape[1:-1]))
+        frames = (strained(walk, contract, rng) if self.far else walk).reshape(*shape[:-1], -1)
+        if frames.shape == shape:
             return frames
-        flags = np.ones((*value.shape[:-1], 1), dtype=np.float32)  # of frames as generators take them
+        flags = np.ones((*shape[:-1], 1), dtype=np.float32)
         return np.concatenate([contract.normalised(frames).astype(np.float32), flags], axis=-1)
 
-    def from_encoder(spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
-        given = draw(torch["encoder"].spec, rng, rows)
-        return {name: value for name, value in {**given, **torch["encoder"](given)}.items() if spec.takes(name)}
-
-    draws: dict[str, Examples] = {role: partial(draw, graph.spec) for role, graph in torch.items()}
-    if manifest.verb == "predict":
-        for role in draws.keys() - {"encoder"}:
-            draws[role] = partial(from_encoder, torch[role].spec)
-    return draws
+    def from_encoder(self, spec: GraphSpec, rng: np.random.Generator, rows: int) -> Arrays:
+        """The inputs of a graph that takes those of the encoder, and what this gives."""
+        inputs = self.draw(self.graphs["encoder"].spec, rng, rows)
+        tensors = {**inputs, **self.graphs["encoder"](inputs)}
+        return {name: value for name, value in tensors.items() if spec.takes(name)}
 
 
 def example(
@@ -212,19 +249,23 @@ def example(
 
     Every dynamic axis but "batch" gets a random size of up to 12, the same for all inputs.
     """
-    axes = [axis for tensor in spec.inputs for axis in tensor.shape[1:] if isinstance(axis, str)]
-    sizes = {axis: int(rng.integers(1, 13)) for axis in dict.fromkeys(axes)}
+    # the sizes of dynamic axes
+    axes = chain.from_iterable(tensor.shape[1:] for tensor in spec.inputs)
+    dynamic = list(dict.fromkeys(axis for axis in axes if isinstance(axis, str)))
+    sizes = {axis: int(rng.integers(1, 13)) for axis in dynamic}
     sizes["batch"] = batch
-    found: dict[str, NDArray[Any]] = {}
+
+    # numbers, lengths of the first of these axes, and ids
+    inputs: dict[str, NDArray[Any]] = {}
     for tensor in spec.inputs:
         shape = [sizes[axis] if isinstance(axis, str) else axis for axis in tensor.shape]
         if tensor.dtype == "float32":
-            found[tensor.name] = rng.uniform(0.05, 1.0, shape).astype(np.float32)
+            inputs[tensor.name] = rng.uniform(0.05, 1.0, shape).astype(np.float32)
         elif tensor.name == "lengths":
-            found[tensor.name] = rng.integers(1, sizes[axes[0]] + 1, shape)
+            inputs[tensor.name] = rng.integers(1, sizes[dynamic[0]] + 1, shape)
         else:
-            found[tensor.name] = rng.integers(0, (below or {}).get(tensor.name, 1), shape)
-    return found
+            inputs[tensor.name] = rng.integers(0, (below or {}).get(tensor.name, 1), shape)
+    return inputs
 
 
 def _below(manifest: Manifest) -> dict[str, int]:
@@ -241,16 +282,19 @@ def _below(manifest: Manifest) -> dict[str, int]:
 def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> NDArray[np.float32]:
     """Random walks (rows, frames, C) float32 from near the mean of the training data, in the contract's units."""
     steps = 0.1 * rng.normal(size=(rows, frames, len(contract.mean)))
-    found: Array = contract.mean + contract.std * steps.cumsum(axis=1)
-    return found.astype(np.float32)
+    walk: Array = contract.mean + contract.std * steps.cumsum(axis=1)
+    return walk.astype(np.float32)
 
 
 def strained(frames: NDArray[np.float32], contract: MotionContract, rng: np.random.Generator) -> NDArray[np.float32]:
     """Frames (..., C) of which single numbers, but one at least, are at ``FAR`` standard deviations from the mean."""
+    # which numbers, at least one of them
     far = rng.random(frames.shape) < FAR_SHARE
     far.flat[rng.integers(far.size)] = True
-    low, high = FAR
-    off = 10 ** rng.uniform(np.log10(low), np.log10(high), frames.shape) * rng.choice([-1.0, 1.0], frames.shape)
+
+    # to either side, and as often near as very far
+    low, high = np.log10(FAR)
+    off = 10 ** rng.uniform(low, high, frames.shape) * rng.choice([-1.0, 1.0], frames.shape)
     std = np.where(contract.std > 0, contract.std, 1.0)
     return np.where(far, contract.mean + std * off, frames).astype(np.float32)
 
