@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 import torch
@@ -215,15 +215,18 @@ def _parameter_groups(net: nn.Module, training: Training) -> list[dict[str, Any]
     return [group for group in groups if group["params"]]
 
 
+Trained = TypeVar("Trained", bound=nn.Module)
+
+
 @dataclass(eq=False)
-class GradientLearner:
+class GradientLearner(Generic[Trained]):
     """A net that learns by gradient descent, see :class:`motet_train.trainer.Learner`.
 
     loss: of some rows. batches: those of an epoch, or the batch of a step. validate: of the net that is kept. on_share:
     called before each step with the share of the training that is done. others: further parts with a state.
     """
 
-    net: nn.Module
+    net: Trained
     training: Training
     loss: Callable[[Any], Terms]
     batches: Callable[[np.random.Generator], Iterable[Batch]]
@@ -245,7 +248,7 @@ class GradientLearner:
         if training.average:
             multi_avg_fn = get_ema_multi_avg_fn(training.average)  # type: ignore[no-untyped-call]
             self.average = self.parts["average"] = AveragedModel(net, multi_avg_fn=multi_avg_fn)
-            self.kept = self.average.module
+            self.kept = cast(Trained, self.average.module)
         self.unit = training.unit
         self.keep = training.keep
         self.patience = training.patience

@@ -39,13 +39,12 @@ class Part(Protocol):
 class Learner(Protocol):
     """An object that the loop trains.
 
-    kept: the net whose weights are kept. parts: everything with a state, by the name under which it is saved. unit:
+    parts: everything with a state, by the name under which it is saved. unit:
     of the length of a training. ends: units done after each chunk. first: number of the first chunk. keep: the weights
     of the "best" validation, or the "last". patience: early stopping after this many validations without improvement.
     target: training ends when validation reaches it.
     """
 
-    kept: nn.Module
     parts: dict[str, Part]
     unit: Literal["epoch", "step"]
     ends: list[int]
@@ -53,6 +52,10 @@ class Learner(Protocol):
     keep: Literal["best", "last"]
     patience: int | None
     target: float
+
+    @property
+    def kept(self) -> nn.Module:
+        """The net whose weights are kept."""
 
     def chunk(self, start: int, stop: int, rng: np.random.Generator) -> Iterator[tuple[int, float, float]]:
         """Train from one unit to another; after each step the units done, the loss and how much it weighs."""

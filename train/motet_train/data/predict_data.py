@@ -70,10 +70,15 @@ def store_material(store: Store, name: str, by: str = "subject") -> Material:
         kept=tuple(int(column) for column in np.flatnonzero(contract.std)),
         mirrored=mirrored,
         signs=signs,
-        rates=tuple(column for column, unit in enumerate(contract.units) if unit.endswith("/s")),
+        rates=_rates(contract),
         about=about,
         validation=_sequences(store, parts.validation),
     )
+
+
+def _rates(contract: MotionContract) -> tuple[int, ...]:
+    """The columns of velocities."""
+    return tuple(column for column, unit in enumerate(contract.units) if unit.endswith("/s"))
 
 
 def _sequences(store: Store, records: Sequence[int]) -> list[NDArray[np.float32]]:

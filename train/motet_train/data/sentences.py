@@ -86,11 +86,11 @@ def actions_of(store: Store, records: tuple[int, ...]) -> Actions:
     for record, mirrored in product(records, (False, True)):
         entry = store.records[record]
         action = (entry.shows, mirrored and entry.shows in sided)
-        number = numbers.setdefault(action, len(numbers))
-        of[record, mirrored] = number
+        of[record, mirrored] = number = numbers.setdefault(action, len(numbers))
         sentences[number] |= _worded(entry.sentences, mirrored)
         unseen[number] |= _worded(entry.unseen, mirrored)
-    return Actions(of, tuple(map(tuple, sentences.values())), tuple(map(tuple, unseen.values())))
+    trained, measured = (tuple(map(tuple, by_number.values())) for by_number in (sentences, unseen))
+    return Actions(of, trained, measured)
 
 
 def _sided(store: Store, records: tuple[int, ...]) -> set[str]:

@@ -65,17 +65,14 @@ class SixdWindows:
 
     def sequences(self) -> list[Array]:
         """The poses of every span, to fit the book of root moves."""
-        return [poses_of(self._frames(start, stop), self.store.fps) for start, stop in self.spans]
+        return [poses_of(self.store.values(start, stop), self.store.fps) for start, stop in self.spans]
 
     def middles(self, book: Array) -> Iterator[Window]:
         """One window from the middle of every span, not mirrored."""
         for start, stop in self.spans:
             first = (start + stop - self.frames) // 2
-            frames = self._frames(first, first + self.frames + 1)
+            frames = self.store.values(first, first + self.frames + 1)
             yield window_of(frames[None], self.store.fps, book, self.hop)
-
-    def _frames(self, start: int, stop: int) -> Array:
-        return np.array(self.store.frames[start:stop], np.float64)
 
     def favour(self, times: Array) -> None:
         """Multiply the chance of each span by its entry in ``times``."""
@@ -97,7 +94,7 @@ def _root_durations(actions: Sequence[str | int], lengths: Array) -> Array:
 
 def _drawn(store: Store, starts: Sequence[int], count: int, mirror: FrameMirror, rng: np.random.Generator) -> Array:
     """``count`` frames from each start (B, count, D), half of the rows mirrored."""
-    rows = np.stack([np.array(store.frames[start : start + count], np.float64) for start in starts])
+    rows = np.stack([store.values(start, start + count) for start in starts])
     mirrored = rng.random(len(starts)) < 0.5
     rows[mirrored] = mirror(rows[mirrored])
     return rows

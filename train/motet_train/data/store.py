@@ -20,6 +20,7 @@ from motet.errors import MotetError, MotionError
 from motet.files import new_folder
 from motet.jobs import Shard
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.corpus import Record, Skipped
@@ -96,6 +97,10 @@ class Store:
         """The frames (T, D) float32 of one record at one down-sampling offset: a view."""
         start, stop = self.records[record].spans[offset]
         return self.frames[start:stop]
+
+    def values(self, start: int, stop: int) -> Array:
+        """Some of the frames (T, D) in float64: a copy."""
+        return np.array(self.frames[start:stop], np.float64)
 
     def motion(self, record: int, offset: int = 0) -> Motion:
         """The features of one record at one down-sampling offset, with its own figure."""

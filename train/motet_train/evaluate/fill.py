@@ -90,20 +90,25 @@ def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Wind
     for name, fill in systems.items():
         filled = [fill(window.past, window.after, len(window.truth)) for window in windows]
         places = _places(joints, windows, filled)
-        errors = length(places - recorded)[:, MARGIN:-MARGIN]
-        measured = {
-            "cm": 100 * errors.mean(),
-            "cm_going": 100 * errors[going].mean() if going.any() else np.nan,
-            "slide": _slide(places, stands, fps),
-            "jerk": jerk(places, fps) / figures["jerk_recorded"],
-        }
         suffix = f"_{name}" if name else ""
-        figures |= {f"{key}{suffix}": float(value) for key, value in measured.items()}
+        for key, value in _distances(length(places - recorded), going).items():
+            figures[f"{key}{suffix}"] = value
+        figures[f"slide{suffix}"] = _slide(places, stands, fps)
+        figures[f"jerk{suffix}"] = jerk(places, fps) / figures["jerk_recorded"]
 
     figures["slide_recorded"] = _slide(recorded, stands, fps)
     for key in ("", "_going"):
         figures[f"of_interpolation{key}"] = figures[f"cm{key}"] / figures[f"cm{key}_interpolation"]
     return figures
+
+
+def _distances(distances: Array, going: Flags) -> dict[str, float]:
+    """Mean distances (W, T, J) of joints in all gaps, and in those across which the figure travels, centimetres."""
+    inside = distances[:, MARGIN:-MARGIN]
+    return {
+        "cm": 100 * float(inside.mean()),
+        "cm_going": 100 * float(inside[going].mean()) if going.any() else np.nan,
+    }
 
 
 def _going(windows: list[Window], fps: float) -> Flags:

@@ -13,7 +13,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
 from motet.text.vocabulary import SPECIALS, UNK
-from motet_train.models.net import Net, before, float_rows, gelu, id_rows
+from motet_train.models.net import Net, before, constants, float_rows, gelu, id_rows
 
 UNKNOWN = SPECIALS.index(UNK)
 """The id of unknown words."""
@@ -48,7 +48,7 @@ class ActionNet(Net):
     def __init__(self, config: ActionsConfig) -> None:
         super().__init__(0)  # it takes words, no channels
         self.config = config
-        self.register_buffer("stems", torch.tensor(config.stems), persistent=False)
+        constants(self, stems=torch.tensor(config.stems))
         self.words = nn.Embedding(config.words, config.embedding)
         self.roots = nn.Embedding(max(config.stems) + 1, config.embedding)
         self.meant = nn.Linear(config.vector, config.embedding, bias=False) if config.vector else None

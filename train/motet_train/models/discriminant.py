@@ -7,6 +7,7 @@ they are, and among recordings of one action, therefore counts little. Nothing i
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from motet_train.data.batches import Views
@@ -30,8 +31,8 @@ def discriminate(net: JointEmbedding, seen: Views) -> None:
     mean = flat.mean(dim=0)
 
     # what does not matter: differences between views of a motion, and between recordings of an action
-    groups = torch.from_numpy(np.unique(seen.groups.reshape(-1), return_inverse=True)[1])
-    within = _covariance((views - motions[:, :, None]).flatten(0, 2)) + ACTIONS * _covariance(_around(flat, groups))
+    of_views = _covariance((views - motions[:, :, None]).flatten(0, 2))
+    within = of_views + ACTIONS * _covariance(_around(flat, seen.groups))
     within += RIDGE * within.diagonal().mean() * torch.eye(len(within))
 
     # the directions in which motions differ most, relative to that
@@ -48,8 +49,9 @@ def _covariance(rows: Tensor) -> Tensor:
     return rows.T @ rows / max(1, len(rows))
 
 
-def _around(rows: Tensor, groups: Tensor) -> Tensor:
-    """How far rows (N, S) are from the means of their groups (N,), of those that are not alone (N', S)."""
+def _around(rows: Tensor, group_table: NDArray[np.int64]) -> Tensor:
+    """How far rows (N, S) are from the means of their groups, N numbers, of those that are not alone (N', S)."""
+    groups = torch.from_numpy(np.unique(group_table.reshape(-1), return_inverse=True)[1])
     counts = groups.bincount()
     sums = torch.zeros(len(counts), rows.shape[1]).index_add(0, groups, rows)
     return (rows - (sums / counts[:, None])[groups])[counts[groups] > 1]

@@ -40,7 +40,7 @@ def forward_kinematics(parents: Sequence[int], offsets: Tensor, local: Tensor, b
 
         # the places of these children
         level = [joint for joint, parent in enumerate(parents) if parent in inner]
-        rows = _places_in(inner, [parents[joint] for joint in level])
+        rows = [inner.index(parents[joint]) for joint in level]
         turned = _at(turned, rows)
         place = _at(place, rows) + product(turned, offsets[level].T[:, None, :, None])
         joints = joints + level

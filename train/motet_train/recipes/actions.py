@@ -90,7 +90,7 @@ def _untrained(recipe: Recipe, words: Sequence[str], actions: int, table: WordTa
     return net
 
 
-def _learner(net: ActionNet, job: Job, sentences: "ActionSentences") -> GradientLearner:
+def _learner(net: ActionNet, job: Job, sentences: "ActionSentences") -> GradientLearner[ActionNet]:
     """Learns the actions of sentences."""
 
     def loss(batch: SentenceBatch) -> Terms:

@@ -92,7 +92,7 @@ def _untrained(config: CodecConfig, contract: MotionContract, windows: SixdWindo
 
 def _learner(
     net: MotionCodec, job: Job, contract: MotionContract, train: SixdWindows, validation: SixdWindows
-) -> GradientLearner:
+) -> GradientLearner[MotionCodec]:
     """Learns to decode windows to the frames that they were encoded from."""
     visits = job.recipe.visits
     book = net.book.numpy().astype(np.float64)

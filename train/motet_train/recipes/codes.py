@@ -96,7 +96,7 @@ def _untrained(config: CodeModelConfig, codec: MotionCodec, actions: ActionNet, 
     return net
 
 
-def _learner(net: MotionCodes, job: Job, motions: list[CodedMotion]) -> GradientLearner:
+def _learner(net: MotionCodes, job: Job, motions: list[CodedMotion]) -> GradientLearner[MotionCodes]:
     """Learns to write each step of coded motions by those before it and the action."""
     visits = job.recipe.visits
     windows = CodeWindows(motions, visits.window, net.end, visits.first)
@@ -167,7 +167,7 @@ def coded(
         parts = acts(store.motion(record))
         cut = parts[0][1] < len(store.sequence(record))  # a long take that repeats an act
         for (begin, end), (start, stop) in product(entry.spans, parts):
-            frames = np.array(store.frames[begin + start : min(begin + stop, end)], np.float64)
+            frames = store.values(begin + start, min(begin + stop, end))
             first = begin == entry.spans[0][0]
             for mirrored, seen in enumerate((frames, mirror(frames))):
                 codes = codes_of(codec, seen, store.fps)

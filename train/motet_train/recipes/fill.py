@@ -49,12 +49,8 @@ RECIPES = {"default": DEFAULT}
 
 def train_fill(store: Store, job: Job, data: str, by: str) -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`."""
+    _check_store(store)
     visits = job.recipe.visits
-    store.needs_sixd("gaps are filled in")
-    if store.skeleton != HUMANOID:
-        raise DataError(
-            "gaps are filled on the humanoid (motet prepare --for codes --figure humanoid), not on another figure"
-        )
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
     mirror = frame_mirror(contract)
@@ -66,13 +62,21 @@ def train_fill(store: Store, job: Job, data: str, by: str) -> Run:
     learner = _learner(net, job, contract, train, validation)
     about = data_of(store, data, by, parts)
     defaults = {"context": visits.context, "least": visits.least, "longest": visits.gaps[1]}
-    run_manifest = job.manifest(contract, asdict(net.config), defaults, None, about)
-    return job.run(_kept(learner), learner, run_manifest)
+    return job.run(learner.kept, learner, job.manifest(contract, asdict(net.config), defaults, None, about))
+
+
+def _check_store(store: Store) -> None:
+    """DataError for a store in which no gaps can be filled."""
+    store.needs_sixd("gaps are filled in")
+    if store.skeleton != HUMANOID:
+        raise DataError(
+            "gaps are filled on the humanoid (motet prepare --for codes --figure humanoid), not on another figure"
+        )
 
 
 def _learner(
     net: Filler, job: Job, contract: MotionContract, train: GapWindows, validation: list[GapWindow]
-) -> GradientLearner:
+) -> GradientLearner[Filler]:
     """Learns to fill the gaps of windows."""
     visits = job.recipe.visits
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
@@ -82,15 +86,9 @@ def _learner(
         job.training,
         lambda window: _loss(net, window, weights, contract.fps),
         partial(_batches, train, visits, job.training.batch),
-        lambda: _measured(_kept(learner), on_device),
+        lambda: _measured(learner.kept, on_device),
     )
     return learner
-
-
-def _kept(learner: GradientLearner) -> Filler:
-    """The net whose weights are kept."""
-    assert isinstance(learner.kept, Filler)
-    return learner.kept
 
 
 def _validation_windows(windows: GapWindows, visits: FillVisits) -> list[GapWindow]:
@@ -129,19 +127,20 @@ def _loss(net: Filler, window: GapWindow, weights: Tensor, fps: float) -> Terms:
     frames = net.once(window.past, window.plain, window.after).float()
     frame_error = functional.smooth_l1_loss(frames / net.scale, window.truth / net.scale, beta=0.2)
     with torch.autocast(frames.device.type, enabled=False):
-        # where joints are
+        # where joints are, how they move, and that feet that stand do not
         places = _joints_with_seams(net, window, frames)
         true_places = _joints_with_seams(net, window, window.truth)
         place_errors = smooth_length(places - true_places, 1e-8) * weights
-
-        # how they move, and that feet that stand do not
-        velocities = places.diff(dim=1) * fps
-        true_velocities = true_places.diff(dim=1) * fps
-        velocity_errors = smooth_length(velocities - true_velocities, 1e-4) * weights
-        stands = (true_velocities.norm(dim=-1) < 0.2) & (weights > 1)
-        slide = smooth_length(velocities, 1e-4) * stands
+        velocity_errors, slide = _motion_errors(places.diff(dim=1) * fps, true_places.diff(dim=1) * fps, weights)
     total = place_errors.mean() + 0.05 * frame_error + 0.1 * velocity_errors.mean() + 0.1 * slide.mean()
     return (Term(total, len(window)),)
+
+
+def _motion_errors(velocities: Tensor, true_velocities: Tensor, weights: Tensor) -> tuple[Tensor, Tensor]:
+    """The weighted errors (B, T, J) of velocities (B, T, J, 3), and the speeds of joints that stand."""
+    errors = smooth_length(velocities - true_velocities, 1e-4) * weights
+    stands = (true_velocities.norm(dim=-1) < 0.2) & (weights > 1)
+    return errors, smooth_length(velocities, 1e-4) * stands
 
 
 def _joints_with_seams(net: Filler, window: GapWindow, frames: Tensor) -> Tensor:

@@ -83,12 +83,11 @@ def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, gai
     return net
 
 
-def _learner(net: Matching, job: Job, contract: MotionContract, rows: MatchingRows) -> GradientLearner:
+def _learner(net: Matching, job: Job, contract: MotionContract, rows: MatchingRows) -> GradientLearner[Matching]:
     """Learns codes that reproduce the poses of rows and the points of their joints."""
     visits = job.recipe.visits
     poses = torch.from_numpy(rows.poses).float().to(job.device)
-    rotations = poses[:, :-1].reshape(len(poses), -1, 4)
-    true = poses, net.points(rotations, poses[:, -1:])
+    true = poses, net.points(_rotations(poses), poses[:, -1:])
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
     starts = torch.from_numpy(np.flatnonzero(rows.left >= visits.window))
 
@@ -217,6 +216,11 @@ def _fastest(row_speeds: Array, stride_speeds: Array, settings: SteeringSettings
     return round(float(min(np.percentile(row_speeds, 90.0), by_strides) * settings.fastest), 2)
 
 
+def _rotations(poses: Tensor) -> Tensor:
+    """The quaternions (N, J, 4) in poses (N, P)."""
+    return poses[:, :-1].reshape(len(poses), -1, 4)
+
+
 def _loss(net: Matching, rows: Tensor, true: tuple[Tensor, Tensor], weights: Tensor, fps: float) -> Terms:
     """Errors of positions (m) and speeds (m/s) of joints, and of quaternions, which positions do not determine, in
     windows of rows (B, W). true: poses (N, P) and the points (N, J', 3) of their joints."""
@@ -234,7 +238,6 @@ def _measured(net: Matching, true: tuple[Tensor, Tensor]) -> dict[str, Any]:
     poses, points = true
     rotations, height = net.poses(net.codes)
     distances = (net.points(rotations, height) - points).norm(dim=-1)
-    true_rotations = poses[:, :-1].reshape(rotations.shape)
-    cosines = (rotations * true_rotations).sum(dim=-1).abs().clamp(max=1)
+    cosines = (rotations * _rotations(poses)).sum(dim=-1).abs().clamp(max=1)
     degrees = torch.rad2deg(2 * torch.acos(cosines))
     return {"joints_cm": round(100 * float(distances.mean()), 3), "degrees": round(float(degrees.mean()), 3)}

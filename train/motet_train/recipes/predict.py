@@ -47,10 +47,10 @@ def train_predict(material: Material, job: Job) -> Run:
     about = {"data": material.about}
     manifest = job.manifest(material.contract, asdict(net.config), defaults, material.licence, about)
     learner = _learner(net.to(job.device), job, material)
-    return job.run(_kept(learner), learner, manifest)
+    return job.run(learner.kept, learner, manifest)
 
 
-def _learner(net: Predictor, job: Job, material: Material) -> GradientLearner:
+def _learner(net: Predictor, job: Job, material: Material) -> GradientLearner[Predictor]:
     """Learns the frames of windows after their seed, and from held-out ones its expected errors."""
     # windows of input and output; text files, which have no bones, are taken as they are
     config = net.config
@@ -66,15 +66,9 @@ def _learner(net: Predictor, job: Job, material: Material) -> GradientLearner:
         job.training,
         lambda drawn: _loss(net, drawn, weights, places),
         lambda rng: (windows.draw(job.training.batch, rng),),
-        lambda: {} if places is None or held_out is None else _error_head_fitted(_kept(learner), places, held_out),
+        lambda: {} if places is None or held_out is None else _error_head_fitted(learner.kept, places, held_out),
     )
     return learner
-
-
-def _kept(learner: GradientLearner) -> Predictor:
-    """The net whose weights are kept."""
-    assert isinstance(learner.kept, Predictor)
-    return learner.kept
 
 
 def _frame_weights(frames: int) -> Tensor:

@@ -91,7 +91,7 @@ def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed:
 
 def space_learner(
     net: JointEmbedding, training: Training, seen: Views, validate: Callable[[], dict[str, float]] = dict
-) -> GradientLearner:
+) -> GradientLearner[JointEmbedding]:
     """A learner of a net on views, whose statistics the net takes first."""
     net.see_by(seen.seen)
     return GradientLearner(

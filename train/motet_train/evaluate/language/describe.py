@@ -168,6 +168,11 @@ def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
     yield {"words": words_right(best, references), "likelihood": {"test": _log_probability(model, corpus, test)}}
 
     # what was chosen on validation motions
+    yield from _validated(model, corpus)
+
+
+def _validated(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
+    """Confidence and timelines on validation motions, if any has a sentence."""
     validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
     if validation:
         yield {"confidence": confidence(model, corpus, validation)}

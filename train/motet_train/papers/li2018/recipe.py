@@ -97,9 +97,7 @@ def train_system(material: Material, job: Job) -> Run:
     net = from_config(job.recipe.model, manifest["config"])
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
     learner = _learner(net.to(job.device), config, _windows(material, visits), job)
-    trained = learner.kept
-    assert isinstance(trained, Stepwise)
-    return job.run(trained, learner, manifest)
+    return job.run(learner.kept, learner, manifest)
 
 
 def _windows(material: Material, visits: Visits) -> Windows:
@@ -108,17 +106,14 @@ def _windows(material: Material, visits: Visits) -> Windows:
     return Windows(material, PROTOCOL_WINDOW, **asdict(visits), seed=anchor)
 
 
-def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> GradientLearner:
-    training = job.recipe.training
-    assert training is not None
+def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> GradientLearner[Stepwise]:
+    training = job.training
 
     def batches(rng: np.random.Generator) -> Iterator[Tensor]:
         yield windows.draw(training.batch, rng)
 
     def validated() -> dict[str, Any]:
-        kept = learner.kept
-        assert isinstance(kept, Stepwise)
-        return {"validation": round(validation_error(kept, windows.material), 6)}
+        return {"validation": round(validation_error(learner.kept, windows.material), 6)}
 
     def loss(windows: Tensor) -> Terms:
         return (Term(net.system.loss(net.normalised(windows), net.seed_frames), len(windows)),)

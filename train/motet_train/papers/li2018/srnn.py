@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from motet_train.data.errors import DataError
+from motet_train.models.net import constants
 from motet_train.papers.li2018.expmap import Layout
 from motet_train.papers.li2018.stepwise import State, Taught
 
@@ -144,10 +145,8 @@ class SRNN(Taught):
             "edges": (sum(EDGES.values()), 2 * config.units),
             "nodes": (sum(NODES.values()), 2 * config.units),
         }
-        for name, parts in channels.items():
-            self.register_buffer(name, torch.tensor(parts), persistent=False)
         order = torch.tensor(list(chain.from_iterable(config.parts)))
-        self.register_buffer("places", order.argsort(), persistent=False)
+        constants(self, places=order.argsort(), **{name: torch.tensor(parts) for name, parts in channels.items()})
 
     def begin(self, seed: Tensor) -> State:
         """The RNNs have seen all seed frames, of which there are at least two, but the last."""

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec
-from motet_train.models.net import Graphs, Net, Part, float_rows, normalised
+from motet_train.models.net import Graphs, Net, Part, constants, float_rows, normalised
 
 State = dict[str, Tensor]
 """The state of a system by name, each part (B, ...)."""
@@ -129,8 +129,7 @@ class Stepwise(Net):
         self.system = system
         self.channels = channels
         self.seed_frames = seed_frames
-        self.register_buffer("kept", torch.tensor(kept), persistent=False)
-        self.register_buffer("placing", torch.eye(channels)[list(kept)], persistent=False)
+        constants(self, kept=torch.tensor(kept), placing=torch.eye(channels)[list(kept)])
 
     def normalised(self, frames: Tensor) -> Tensor:
         """Frames (..., C) in the contract's units to (..., D)."""
