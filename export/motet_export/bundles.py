@@ -96,6 +96,7 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     """
     check_place(out)
     exact = kind_of(bundle.manifest).load(bundle)
+    # the same graphs with rounded weights
     files = {}
     for role, graph in bundle.manifest.graphs.items():
         files[f"{role}.onnx"] = halved(bundle.read(graph.file), rounded=True)
@@ -130,6 +131,7 @@ def _write(
     draws: Mapping[str, Examples],
 ) -> None:
     """Write the bundle of a model, with golden vectors and tables."""
+    # golden vectors, graphs and tables, each with its entry in the manifest
     vectors, golden = golden_vectors(model, draws)
     specs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in model.graphs.items()}
     tables = {}

@@ -66,6 +66,7 @@ def differences(small: BundleModel, exact: BundleModel) -> dict[str, float]:
     report: dict[str, float] = {}
     for name, run in whole_runs(small, exact).items():
         rounded, expected = run()
+        # sentences, likelihoods and frames, where a run has them
         if "words" in rounded and rounded["words"].shape == expected["words"].shape:
             report[f"{name}.equal"] = float((rounded["words"] == expected["words"]).all(axis=1).mean())
         if "scores" in rounded:
@@ -80,6 +81,7 @@ def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[b
     """The file of golden vectors of a bundle, and its entry in the manifest."""
     rng = np.random.default_rng(5)
     feeds = {}
+    # inputs of single calls, and of a whole run
     for role, graph in model.graphs.items():
         framed = any(graph.spec.takes(name) for name in FRAMES)
         feeds[role] = draws[role](rng, GOLDEN_ROWS if framed else FEW_ROWS)

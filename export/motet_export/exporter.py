@@ -188,6 +188,7 @@ def _replace_tensor(
 ) -> list[onnx.NodeProto]:
     """Store a tensor in a smaller type; the nodes that compute the original one from it."""
     name = tensor.name
+    # the smaller tensor, and nodes that make the old one of it
     tensor.CopyFrom(numpy_helper.from_array(small, f"{name}.small"))
     if scale is None:
         return [helper.make_node("Cast", [f"{name}.small"], [name], to=TensorProto.FLOAT)]

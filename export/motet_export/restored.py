@@ -32,6 +32,7 @@ def restored(bundle: Bundle) -> Run:
     manifest = bundle.manifest
     if "int8" in manifest.parity:
         raise ExportError(f"bundle {bundle.path} has 8-bit weights, which are not those that were trained")
+    # a net to fill, and one of random weights that tells where they are
     net = MODELS[manifest.model](manifest.config)
     other = MODELS[manifest.model](manifest.config)
     state = net.state_dict()
@@ -41,6 +42,7 @@ def restored(bundle: Bundle) -> Run:
         stored = _renamed(_tensors(bundle.read(manifest.graphs[role].file)), net)
         random = _tensors(export_graph(module, spec, {}))
         _restore(state, other.state_dict(), stored, random, weight_names)
+    # it must compute what the bundle does
     run = Run(manifest.source, net.eval())
     _check(run, bundle)
     return run

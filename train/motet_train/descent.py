@@ -259,6 +259,7 @@ class GradientLearner(Generic[Trained]):
         """Train from one epoch or step to another."""
         self.net.train()
         for done in range(start, stop):
+            # the learning rate of this epoch or step
             for group in self.descent.optimiser.param_groups:
                 group["lr"] = rate(self.training, done)
             self.on_share(done / self.training.length)

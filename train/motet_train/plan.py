@@ -98,6 +98,7 @@ class Plan:
         log.info("%d trainings into %s: %s", len(stages), self.out, ", ".join(stages))
         place = self.store()
         failed = set[str]()
+        # each after those that it needs
         for name, stage in stages.items():
             if is_finished(self.out / name):
                 log.info("%s is trained already", name)

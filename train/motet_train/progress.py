@@ -71,6 +71,7 @@ class Shown(Watcher):
         """Log the line of a chunk, or move the bar, and add its numbers to TensorBoard."""
         figures = {key: value for key, value in line.items() if isinstance(value, int | float) and key != unit}
         done = line[unit]
+        # TensorBoard, the log, and the bar
         if self.writer is not None:
             for key, value in figures.items():
                 self.writer.add_scalar(key, value, done)

@@ -73,6 +73,7 @@ def run_folder(out: Path, resume: bool) -> Iterator[None]:
     if distributed.rank() != 0:
         yield
         return
+    # refuse to write over another run
     if out.exists() and not _unborn(out) and not (resume and (out / CHECKPOINT).is_file()):
         reason = f"it has no {CHECKPOINT}; choose" if resume else "it exists; remove it first or choose"
         raise OutputError(f"cannot write the run {out}: {reason} another folder")

@@ -72,6 +72,7 @@ def changed(recipe: Recipe, tables: Mapping[str, Mapping[str, Any]], options: Ma
         names: set[str] = set()
         if current is not None:
             names = {field.name for field in fields(current)} - set(recipe.derived)
+        # tables first, options over them
         changes = dict(tables.get(table, {}))
         for name, value in options.items():
             if name in names and value is not None:
@@ -128,6 +129,7 @@ def _replaced(current: Any, changes: Mapping[str, Any], where: str) -> Any:
         if name not in hints:
             raise SettingsError(f"unknown setting {where}.{name}: expected one of {', '.join(hints)}")
         hint = hints[name]
+        # dataclasses inside, or a value that has to fit
         if is_dataclass(hint) and isinstance(value, dict):
             values[name] = _replaced(getattr(current, name), value, f"{where}.{name}")
             continue

@@ -73,6 +73,7 @@ def train(learner: Learner, seed: int, folder: Path, progress: Watcher = SILENT)
     """
     is_first = distributed.rank() == 0
     log = _resume(folder / CHECKPOINT, learner)
+    # chunk after chunk
     while not _done(log, learner):
         start = log[-1][learner.unit] if log else 0
         rng = _seeded(seed, learner.first + len(log))

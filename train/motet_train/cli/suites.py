@@ -148,6 +148,7 @@ def _language(models: Mapping[str, LanguageModel], inputs: Inputs) -> Results:
 def _language_report(name: str, models: Mapping[str, Any], corpora: Mapping[str, SplitStore]) -> Report:
     model = models[name]
     corpus = corpora[name]
+    # a describe model of the same split closes the chain
     same_split = (other for key, other in models.items() if corpora[key].parts == corpus.parts)
     partner = next((other for other in same_split if other.VERB == "describe"), None)
     if model.VERB == "describe":
@@ -201,10 +202,12 @@ def _mocap_drawings(
     models: Mapping[str, PredictModel], motions: Mapping[str, Motion], measured: mocap.Measured, fps: float
 ) -> Drawings:
     """Errors over time by measure, and strips of poses of about three trials."""
+    # how errors grow, by measure
     errors = {}
     for measure, title in mocap.TITLES.items():
         errors[title] = {name: system[measure].mean(axis=0) for name, system in measured.distances.items()}
     drawings: dict[str, Any] = {"predict-distance": partial(error_over_time, errors, fps, "cm")}
+    # and what predictions look like
     for name in islice(motions, 0, None, max(1, len(motions) // 3)):
         rows = mocap.shown(models, motions[name])
         drawings[f"predict-{name}"] = partial(strips, list(rows.values()), list(rows), name)
@@ -284,6 +287,7 @@ def suite_of(
         if wrong := [name for name, model in models.items() if model.VERB != "generate"]:
             raise click.UsageError(f"--says takes generate models, not {', '.join(wrong)}")
         return Suite("generate models", _says, data="")
+    # all others by their verb; models of one call share a suite
     first, *others = {SUITES["steered" if as_steered(model) else model.VERB] for model in models.values()}
     if others:
         raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")

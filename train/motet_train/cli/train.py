@@ -80,10 +80,12 @@ def _train_plan(verbs: tuple[str, ...], data: tuple[Path, ...], out: Path, **opt
     if distributed.launched():
         raise DataError("torchrun trains one stage at a time: use the command of the stage, such as motet train codec")
     about = begun("", options)
+    # what the stages share
     vectors = options["word_vectors"] and WordVectors(options["word_vectors"], options["vectors_from"])
     changes = read_stages(options["config"], STAGES) if options["config"] else {}
     source = {key: options[key] for key in ("sentences", "people", "gaits", "unit_in")}
     place = data[0] if len(data) == 1 and is_store(data[0]) else corpus_of(data, **source)
+    # train, then say how to go on
     Plan(place, out, verbs, options["by"], options["device"], vectors, changes, about).train()
     click.echo(f"next: motet export {out} -o bundles, then motet bundle verify bundles/NAME.zip")
     for verb in verbs:

@@ -142,6 +142,7 @@ class Examples:
         for i, sentences in enumerate(self.sentences):
             pairs += [(i, ids) for ids in sentences]
         pairs.sort(key=lambda pair: self._length(pair[0], 0))
+        # neighbours in length share a batch
         for start in range(0, len(pairs), batch):
             rows = []
             for i, ids in pairs[start : start + batch]:
@@ -155,8 +156,10 @@ class Examples:
 
     def _visit(self, rng: np.random.Generator, visit: Visit, longest: int) -> tuple[Floats, bool, Ids]:
         i, offset, sentence = visit
+        # a random excerpt
         start = int(rng.integers(max(0, self._length(i, offset) - longest) + 1))
         frames, ended = self._excerpt(i, offset, start, longest)
+        # with a sentence of its own, perhaps both mirrored
         if sentence is None:
             sentence = int(rng.integers(len(self.sentences[i])))
         if self.mirror is not None and rng.random() < 0.5:

@@ -120,6 +120,7 @@ def read_corpus(
     with Archive(*places) as archive:
         names = archive.names
         motions = motion_files(archive)
+    # KIT's data by the names of its files, else motion files with a table
     if any(name.endswith(KIT_SENTENCES) for name in names):
         kit_motions = tuple(name for name in names if name.endswith(KIT_MOTION))
         return Corpus(places, kit_motions, kit=True, gaits=gaits)

@@ -59,6 +59,7 @@ def _merge(places: Sequence[Path], folder: Path) -> None:
     for place, store in zip(places, stores, strict=True):
         if _kind(store) != _kind(stores[0]):
             raise DataError(f"{place} was prepared in another way than {places[0]}")
+    # copy record after record, one motion in memory at a time
     with (folder / FRAMES).open("wb") as file:
         writer = StoreWriter(file, stores[0].representation)
         names: set[str] = set()

@@ -51,6 +51,7 @@ def store_material(store: Store, name: str, by: str = "subject") -> Material:
         raise DataError(f"{name} is a store of {store.representation}: prepare it with --for predict")
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
+    # frames of training, longer motions more often
     sequences = _sequences(store, parts.train)
     lengths = np.array([len(frames) for frames in sequences], dtype=np.float64)
     mirrored, signs = _mirroring(contract)

@@ -43,6 +43,7 @@ class Preparation:
         if motion.duration < SHORTEST or not (self.cut or motion.duration < self.longest):
             limits = f"at least {SHORTEST:g} s" + ("" if self.cut else f" and less than {self.longest:g} s")
             raise MotionError(f"{motion.duration:.3g} s ({len(motion)} frames): a training motion has {limits}")
+        # equal pieces, as few as are short enough
         count = math.floor(motion.duration / self.longest) + 1
         bounds = np.linspace(0, len(motion), count + 1).round().astype(int).tolist()
         return [motion[start:stop] for start, stop in pairwise(bounds)]

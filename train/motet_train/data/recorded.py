@@ -52,6 +52,7 @@ def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list
     representation = named(store.representation)
     kept: list[Recording] = []
     for index, record in enumerate(store.records):
+        # recordings of gaits, in their usable parts
         names = frozenset(gait.name for gait in gaits if _shows(record, gait))
         if not names:
             continue
@@ -60,6 +61,7 @@ def recordings(store: Store, gaits: tuple[Gait, ...], held: bool = True) -> list
             features = _with_even_collars(_levelled(representation.planted(features)))
         pieces = _jumps(features) if names == {"jump"} else _sound(features)
         kept += [Recording(piece, names) for piece in pieces if len(piece) >= 1.5 * store.fps]
+    # every gait needs one
     recorded_gaits = frozenset[str]().union(*(recording.gaits for recording in kept))
     for gait in gaits:
         if gait.name not in recorded_gaits:

@@ -48,6 +48,7 @@ class SixdWindows:
         self.frames = frames
         self.hop = hop
         self.mirror = mirror
+        # spans that are longer than a window
         self.spans: list[tuple[int, int]] = []
         actions = []
         for record in records:
@@ -245,6 +246,7 @@ class CodeWindows:
             codes, before, age, weights = self._window(motion, self._start(motion, rng))
             action = nobody if rng.random() < unsaid else motion.action
             rows.append((codes, before, np.full_like(age, action), age, weights))
+        # one array for each field
         columns = [np.stack(column) for column in zip(*rows, strict=True)]
         return CodeBatch(*map(torch.from_numpy, columns))
 

@@ -344,6 +344,7 @@ def split(entries: Sequence[Entry], seed: int, by: str = "trial") -> Split:
         raise DataError(f"motions are split by trial, by subject, by none or by a pattern with a *, not by {by!r}")
     if by == "none":
         return replace(split(entries, seed), train=tuple(range(len(entries))))
+    # groups stay together
     groups = _groups(entries, by)
     wanted = max(1, round(0.1 * len(entries)))
     parts = _divided(groups, wanted, np.random.default_rng(seed))
@@ -394,6 +395,7 @@ def _without(entries: Sequence[Entry], seed: int, patterns: str) -> Split:
     rest = [index for index, entry in enumerate(entries) if not matches(entry.name, patterns)]
     if not test or not rest:
         raise DataError(f"{len(test)} of {len(entries)} motions match {patterns}: some must, and some must not")
+    # the rest by people, all but validation to train on
     parts = split([entries[index] for index in rest], seed, "subject")
     train = sorted(rest[place] for place in (*parts.train, *parts.test))
     validation = [rest[place] for place in parts.validation]

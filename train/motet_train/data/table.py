@@ -43,13 +43,16 @@ def _describe(described: Described, row: dict[str, str], place: str) -> None:
     pool = row.get("pool", "") or "train"
     if pool not in ("train", "test"):
         raise DataError(f"{place}: the pool is one of train, test, not {pool!r}")
+    # the sentence, to train on or to measure by
     if row["sentence"]:
         sentences = described.sentences if pool == "train" else described.unseen
         sentences.append(row["sentence"])
+    # who moves: once, or the same each time
     subject = row.get("subject", "")
     if subject and described.subject and subject != described.subject:
         raise DataError(f"{place}: the subject of {row['clip']} is {subject!r}, and {described.subject!r} above")
     described.subject = subject or described.subject
+    # later lines replace earlier ones
     described.action = row.get("description", "") or described.action
     gaits = [name.strip() for name in row.get("gait", "").split(",")]
     described.gaits = tuple(filter(None, gaits)) or described.gaits
@@ -99,6 +102,7 @@ def _rows(path: Path, *needed: str) -> Iterator[tuple[int, dict[str, str]]]:
         lines = [line.split("\t") for line in path.read_text(encoding="utf-8-sig").split("\n")]
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"the table {path} cannot be read: {error}") from error
+    # the columns
     header = [name.strip() for name in lines[0]]
     if not set(needed) <= set(header):
         raise DataError(

@@ -44,6 +44,7 @@ def nearest(vectors: Mapping[str, NDArray[np.float64]], words: Sequence[str]) ->
     others = [word for word in vectors if word not in set(words)]
     if not others or not known:
         return {}
+    # cosines between all pairs
     known_directions = np.stack([_unit(vectors[word]) for word in known])
     other_directions = np.stack([_unit(vectors[word]) for word in others])
     cosines = other_directions @ known_directions.T
@@ -127,6 +128,7 @@ def principal(
     Also returns which words have a vector; rows of others, and components beyond the number of axes, are 0.
     """
     known = np.array([word in vectors for word in words])
+    # principal axes of the words with a vector
     rows = np.stack([vectors[word] for word in words if word in vectors])
     rows = rows - rows.mean(axis=0)
     _, _, axes = np.linalg.svd(rows, full_matrices=False)

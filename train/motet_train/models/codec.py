@@ -131,9 +131,11 @@ class MotionCodec(Net):
         if not all(level % 2 for level in config.levels):
             raise DataError(f"levels of codes have to be odd numbers, not {', '.join(map(str, config.levels))}")
         self.config = config
+        # both nets, and the figure that they move
         self.encoder = CodecEncoder(config)
         self.decoder = CodecDecoder(config)
         self.places = SixdPlaces(config.tree)
+        # the book of root moves, and the levels of numbers
         self.register_buffer("book", torch.zeros(config.moves, 3))
         self.register_buffer("book_scale", torch.ones(3))
         steps = torch.tensor(config.levels * config.groups) // 2

@@ -60,12 +60,14 @@ class JointEmbedding(Net):
     def __init__(self, config: JointEmbeddingConfig) -> None:
         super().__init__(config.channels)
         self.config = config
+        # the statistics of a motion
         self.places = EulerPlaces(config.figure) if config.figure.parents else None
         joints = max(0, len(config.figure.parents) - 1)
         seen = 3 * joints + len(config.figure.root) if joints else config.channels
         statistics = of_frames(torch.zeros(1, 1, seen), torch.ones(1)).shape[1] + 2 * joints + 1 + 2 * config.travelled
         self.register_buffer("seen_mean", torch.zeros(statistics))
         self.register_buffer("seen_scale", torch.ones(statistics))
+        # the encoder of motions, and that of sentences
         self.motion = nn.Linear(statistics, config.vector)
         self.words = WordEmbedding(config.words, config.embedding, config.word_dropout)
         self.weight = nn.Linear(config.embedding, 1)

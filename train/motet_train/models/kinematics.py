@@ -194,6 +194,7 @@ def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
     angle = squared.sqrt()
     x, y, z = vectors
     zero = torch.zeros_like(x)
+    # the matrix of the cross product
     cross = torch.unflatten(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]), 0, (3, 3))
     eye = torch.eye(3, dtype=vectors.dtype, device=vectors.device).reshape(3, 3, *[1] * angle.dim())
     return eye + angle.sin() / angle * cross + (1 - angle.cos()) / squared * product(cross, cross)
@@ -300,6 +301,7 @@ class EulerPlaces(nn.Module):
         cos_xz = cos_x * cos_z
         sin_cos = sin_x * cos_z
         cos_sin = cos_x * sin_z
+        # row by row
         rows = [cos_y * cos_z, -cos_y * sin_z, sin_y]
         rows += [sin_y * sin_cos + cos_sin, cos_xz - sin_y * sin_xz, -sin_x * cos_y]
         rows += [sin_xz - sin_y * cos_xz, sin_y * cos_sin + sin_cos, cos_x * cos_y]

@@ -37,6 +37,7 @@ class KnownMotions(Net):
         self.config = config
         self.writer = MotionToLanguage(config.writer)
         self.space = JointEmbedding(config.space)
+        # what is known, by its shapes
         shapes: dict[str, tuple[tuple[int, ...], torch.dtype]] = {
             "vectors": ((config.motions, config.views, config.space.vector), torch.int8),
             "actions": ((config.motions,), torch.int16),
@@ -53,6 +54,7 @@ class KnownMotions(Net):
     @staticmethod
     def of(writer: MotionToLanguage, space: JointEmbedding, known: Known) -> "KnownMotions":
         """The net of two trained ones and what is known."""
+        # as many places as there are motions, sentences and letters
         letters = torch.frombuffer(bytearray("\n".join(known.sentences).encode()), dtype=torch.uint8)
         motions, views, _ = known.vectors.shape
         counts = (motions, views, *known.shown.shape, len(known.sentences), len(letters))
@@ -61,6 +63,7 @@ class KnownMotions(Net):
         net.space = space
         net.mean = writer.mean.clone()
         net.scale = writer.scale.clone()
+        # fill them
         for name in net.known_tables:
             table = letters if name == "sentences" else torch.from_numpy(getattr(known, name))
             getattr(net, f"known_{name}").copy_(table)

@@ -58,8 +58,10 @@ class Matching(Net):
         codes = config.even + config.odd
         poses = 4 * len(config.tree.bones) + 1
         rows = config.rows
+        # trained: the codes, and how they become poses
         self.codes = nn.Parameter(torch.zeros(rows, codes))
         self.pose_basis = nn.Parameter(torch.zeros(codes, poses))
+        # the rest of the table
         for name, width in {"moves": 6, "features": config.features, "shows": len(config.gaits)}.items():
             self.register_buffer(name, torch.zeros(rows, width))
         lengths = {"left": rows, "feature_mean": config.features, "feature_scale": config.features, "pose_mean": poses}

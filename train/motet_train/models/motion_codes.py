@@ -130,6 +130,7 @@ class CodeModel(nn.Module):
         which their codes stand. action: (B, N) int64. age: (B, N) int64 steps since the action began. past: of
         :meth:`start`.
         """
+        # the action and its age modulate every layer
         condition = self.actions(action) + self.ages(age.clamp_max(self.config.ages - 1))
         x = self.moves(moves) + self.seen(numbers)
         if self.training:
@@ -208,11 +209,13 @@ class MotionCodes(Net):
         codes, before: (B, N, P) int64 of the steps and of the steps before them. action, age: see the writer.
         """
         known, _ = self.writer(*self._seen(before), action, age, self.writer.start(len(codes)))
+        # each part knows those before it
         part_losses = []
         for part, logits in enumerate(self.writer.logits(known, codes)):
             target = codes[..., part].flatten()
             part_losses.append(functional.cross_entropy(logits.float().flatten(0, 1), target, reduction="none"))
         losses = torch.stack(part_losses, dim=-1).reshape(codes.shape)
+        # after an end there is no body
         real = torch.ones_like(losses)
         real[..., 1:] = (codes[..., :1] != self.end).float()
         return losses * real

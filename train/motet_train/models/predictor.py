@@ -120,6 +120,7 @@ def error_signs(seed: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     All in units of the channels' scales. seed: (B, L, M) frames. steps: (B, N, M) predicted, from the last frame.
     disagreement: (B, N), how far the steps are from those predicted for the mirrored seed and mirrored back.
     """
+    # how the figure moves before, and how it is predicted to
     velocity = seed.diff(dim=1)
     shared = [size(velocity[:, -1]), size(velocity).mean(1), size(velocity.diff(dim=1)[:, -2:]).mean(1)]
     by_frame = [size(steps), disagreement, size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1])))]
@@ -268,6 +269,7 @@ class Predictor(Net):
         channels = self.config.channels
         count = self.config.frames
         frames = float_rows("frames", self.config.seed_frames, channels)
+        # frames in, frames to come
         coming, left = (float_rows(name, count, channels) for name in ("trajectory", "next_trajectory"))
         frame = float_rows("frame", channels)
         step = (Step(), GraphSpec((coming,), (frame, left), {coming.name: left.name}))

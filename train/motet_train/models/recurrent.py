@@ -60,6 +60,7 @@ class GRU(nn.Module):
         self.bias = nn.Parameter(torch.zeros(directions, 1, 3 * units))
         self.gate_recurrence = nn.Parameter(torch.empty(directions, units, 2 * units))
         self.candidate_recurrence = nn.Parameter(torch.empty(directions, units, units))
+        # each gate is initialised as a matrix of its own
         for weight in (self.weight, self.gate_recurrence, self.candidate_recurrence):
             for direction in weight.detach():
                 for gate in direction.split(units, dim=-1):
@@ -74,9 +75,11 @@ class GRU(nn.Module):
         active: (G, T, B, 1); the state stays the same where this is False.
         """
         directions, steps, rows, inputs = x.shape
+        # one mask for all steps of the inputs
         keep = mask(self, self.dropout, x, directions, 1, rows, inputs)
         x = x if keep is None else x * keep
         projected = [y.reshape(directions, steps, rows, -1) for y in self.project(x.flatten(1, 2))]
+        # and one of the state
         keep = mask(self, self.dropout, x, directions, rows, self.units)
 
         def advance(state: Tensor, inputs: list[Tensor]) -> Tensor:
@@ -91,6 +94,7 @@ class GRU(nn.Module):
 
         The states (T, B, 2 N) after each step, zeros where a row has ended, and the last ones (B, 2 N).
         """
+        # ONNX has its gates in one matrix, and two biases
         weight = torch.cat([self.gate_recurrence, self.candidate_recurrence], dim=-1).mT
         bias = functional.pad(self.bias[:, 0], (0, 3 * self.units))
         states, last = torch.onnx.ops.symbolic_multi_out(
@@ -160,6 +164,7 @@ class Encoder(nn.Module):
 
     def states(self, x: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """The states (B, T, C) of the last layer, any finite numbers after a row's end; and the contexts (B, C)."""
+        # forwards and backwards, side by side
         active = before(lengths, x.shape[1]).T[..., None]
         active = torch.stack([active, active.flip(0)])
         x = x.transpose(0, 1)

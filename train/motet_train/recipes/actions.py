@@ -64,9 +64,11 @@ def train_actions(store: Store, job: Job, data: str, by: str, vectors: WordVecto
     table = word_table(vectors.file, words, job.recipe.config.vector) if vectors else None
     common = table.common if table else {}
 
+    # the net, with the vectors of words if there are any
     torch.manual_seed(job.about.seed)
     net = _untrained(job.recipe, words, len(actions), table)
     learner = _learner(net, job, ActionSentences(actions, replace(corpus.vocabulary, common=common)))
+    # what the manifest says of actions and vectors
     about = manifest(job, corpus, asdict(net.config), data, by)
     about["actions"] = described(actions)
     if vectors and table:
@@ -164,6 +166,7 @@ class ActionSentences:
         if self.unseen is None:
             return {}
         words, lengths = (torch.from_numpy(part).to(net.mean.device) for part in self.unseen)
+        # each sentence may be about several actions
         log_probabilities = net(words, lengths).cpu()
         best = log_probabilities.argmax(dim=1)
         right = log_probabilities.masked_fill(~self.alike, -torch.inf).logsumexp(dim=1)

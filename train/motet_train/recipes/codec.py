@@ -181,10 +181,12 @@ def _sharpness(places: Tensor) -> Tensor:
 def _measured(net: MotionCodec, validation: Window) -> dict[str, float]:
     """On validation windows: the mean error of joints in cm, the sharpness of movement relative to the true one, and
     the share of codes in use."""
+    # how far decoded joints are from the true ones
     window = validation.to(net.mean.device)
     values = net.encode(window.inputs)
     places = places_in_world(net, net.decode(window.moves, values), window.way)
     true_places = places_in_world(net, window.frames, window.way)
+    # how many of the codes occur
     codes = net.to_codes(values).cpu().numpy()
     used = [len(np.unique(codes[..., group])) / net.config.codes for group in range(net.config.groups)]
     return {

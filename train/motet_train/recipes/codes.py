@@ -127,6 +127,7 @@ def memory_settings(tables: Mapping[str, NDArray[Any]], actions: int) -> MemoryS
 def alike_distance(memory: Memory) -> float:
     """The squared distance, to three digits, within which the share :data:`ALIKE_PAIRS` of the pairs of steps in long
     recordings lies; the memory's own setting if it has no recording longer than an act."""
+    # recordings longer than an act
     lengthy = []
     for action in memory.rows:
         for recording in memory.recordings(action):
@@ -134,6 +135,7 @@ def alike_distance(memory: Memory) -> float:
                 lengthy.append(memory.keys[action][recording.places])
     if not lengthy:
         return memory.settings.alike_distance
+    # distances of all pairs of steps in some of them
     distances = []
     for keys in lengthy[:: -(-len(lengthy) // MEASURED_RECORDINGS)]:
         distances.append(squared_distances(keys)[np.triu_indices(len(keys), 1)])

@@ -51,12 +51,14 @@ def train_fill(store: Store, job: Job, data: str, by: str) -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`."""
     _check_store(store)
     visits = job.recipe.visits
+    # windows with gaps, half of them mirrored
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
     mirror = frame_mirror(contract)
     longest = 2 * visits.context + visits.gaps[1]
     train = GapWindows(store, parts.train, longest, mirror)
     validation = _validation_windows(GapWindows(store, parts.validation, longest, mirror), visits)
+    # the net and its training
     torch.manual_seed(job.about.seed)
     net = _untrained(job.recipe, contract, train).to(job.device)
     learner = _learner(net, job, contract, train, validation)
@@ -155,6 +157,7 @@ def _measured(net: Filler, windows: list[GapWindow]) -> dict[str, float]:
     net_errors = []
     for window in windows:
         frames = window.truth.shape[1]
+        # the net, and the plain way that it improves
         true_places = net.joints(window.truth)
         for name, filled in (("", net(window.past, window.plain, window.after)), ("plain_", window.plain)):
             distances = (net.joints(filled) - true_places).norm(dim=-1)

@@ -149,10 +149,12 @@ def _components(offsets: Array, count: int) -> Array:
 def _reach(tree: Tree) -> Array:
     """The weight (P,) of each number of a pose: for a bone's quaternion the metres to the farthest joint that it
     carries, at least 5 cm."""
+    # places of joints at rest
     places = np.zeros((len(tree.parents), 3))
     for joint, parent in enumerate(tree.parents):
         if parent >= 0:
             places[joint] = places[parent] + tree.offsets[joint]
+    # the farthest joint that each bone carries
     reach = []
     for bone in tree.bones:
         carried = [bone]
@@ -224,6 +226,7 @@ def _rotations(poses: Tensor) -> Tensor:
 def _loss(net: Matching, rows: Tensor, true: tuple[Tensor, Tensor], weights: Tensor, fps: float) -> Terms:
     """Errors of positions (m) and speeds (m/s) of joints, and of quaternions, which positions do not determine, in
     windows of rows (B, W). true: poses (N, P) and the points (N, J', 3) of their joints."""
+    # positions, their speeds, and the quaternions themselves
     poses, points = true
     codes = net.codes[rows]
     errors = (net.points(*net.poses(codes)) - points[rows]) * weights[:, None]

@@ -121,6 +121,7 @@ def _loss(net: Predictor, windows: Tensor, weights: Tensor, places: VectorPlaces
 def _error_head_fitted(net: Predictor, places: VectorPlaces, held_out: Tensor) -> dict[str, float]:
     """Fit a net's expected errors to windows that it was not trained on; their mean joint error in centimetres."""
     net.eval()
+    # the net's errors on windows that it was not trained on
     windows = torch.cat([held_out, net.mirror(held_out)])
     seed = windows[:, : net.config.seed_frames]
     truth = windows[:, net.config.seed_frames :]

@@ -57,6 +57,7 @@ def train_search(store: Store, job: Job, data: str, by: str) -> Run:
     torch.manual_seed(job.about.seed)
     net = JointEmbedding(config)
     net.measure_by(corpus.contract.mean, corpus.contract.std)
+    # validate by sentences that are not in training
     queries = _UnseenSentences(corpus, corpus.parts.validation)
     train_views = seen_by(net, corpus.examples(corpus.parts.train), visits, job.about.seed)
     learner = space_learner(net.to(job.device), job.training, train_views, lambda: queries.measures(net))
@@ -130,10 +131,12 @@ class _UnseenSentences:
     def measures(self, net: JointEmbedding) -> dict[str, float]:
         """The mean cross-entropy of the motions that a sentence describes, and how often one is among the best 5."""
         device = net.mean.device
+        # scores of all pairs
         motions = net.embed_motion(*(part.to(device) for part in self.motions)).cpu()
         texts = net.embed_text(*(part.to(device) for part in self.texts)).cpu()
         scores = texts @ motions.T
         right = self.groups[self.rows][:, None] == self.groups
+        # the likelihood of the right ones, and their ranks
         log_probabilities = functional.log_softmax(scores / net.config.temperature, dim=1)
         losses = -log_probabilities.masked_fill(~right, -torch.inf).logsumexp(dim=1)
         best = scores.topk(min(5, scores.shape[1]), dim=1).indices

@@ -62,6 +62,7 @@ def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeMode
 def _nearest(model: SearchModel, looks: Looks, groups: Numbers, test_motions: Sequence[Motion]) -> dict[str, float]:
     """How often the training motion nearest to a test motion is described like it, by the model and by features."""
     corpus = looks.corpus
+    # by the model, and by features
     train = corpus.parts.train
     index = _index(model, corpus, train)
     by_model = [_places(index.search(motion, 1))[0] for motion in test_motions]

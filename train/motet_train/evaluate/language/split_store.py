@@ -112,6 +112,7 @@ def split_as(manifest: Manifest, store: Store) -> SplitStore:
     train = _matching(store, lambda name: name not in held_out)
     validation = _matching(store, lambda name: name in validation_names)
     test = _matching(store, lambda name: name in test_names)
+    # the store has these motions, and no others
     complete = len(store.records) == train_count + len(validation_names) + len(test_names)
     all_present = held_out <= {entry.name for entry in store.records}
     if not all_present or not complete or len(train) != train_count:

@@ -170,6 +170,7 @@ def _rank_correlations(expected: Array, true: Array) -> Array:
 
 def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
     """Rows of a table, after a head with the frames."""
+    # ratios by kind, quarters by the expected error, and ranks
     rows = [["measured mean error over the expected one, joints in the world"]]
     for kind, ratio in figures["ratio"].items():
         rows.append([f"  {kind}", *cells(ratio, 2)])
@@ -204,6 +205,7 @@ def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
     """The rows of a kind of motions; floors and counts are the same for all models."""
     first = next(iter(parts.values()))
     counts = ", ".join(f"{first[count]} {count}" for count in COUNTS)
+    # measure after measure: floors, then models
     rows = [[f"{kind}: {counts}"]]
     for measure in TITLES if kind == "all" else (PLACE,):
         rows.append([TITLES[measure]])

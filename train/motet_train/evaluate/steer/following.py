@@ -144,6 +144,7 @@ def tracks_of(recordings: Sequence[Recording], rows: MatchingRows) -> list[Track
     for recording in recordings:
         features = recording.features
         stop = start + len(features)
+        # the rows of this recording
         poses = rows.poses[start:stop].astype(np.float32)
         start = stop
         ground = poses_of(features.select(ROOT_SIXD).values, features.fps)[:, None]
@@ -179,6 +180,7 @@ def standing(tracks: Sequence[Track]) -> dict[str, float]:
     speeds = []
     accelerations = []
     frames = []
+    # figure after figure
     for places, soles, fps in _figures(tracks):
         root = places[:, 0]
         ball_stances += stances(places[:, BALLS], root, fps)
@@ -186,6 +188,7 @@ def standing(tracks: Sequence[Track]) -> dict[str, float]:
         speeds.append(speed(places[:, BALLS], root, fps))
         accelerations.append(acceleration(places, root, fps))
         frames.append(len(places))
+    # over all figures
     mean, tail = mean_and_tail(100 * slides(ball_stances))
     return {
         "slide_cm": mean,

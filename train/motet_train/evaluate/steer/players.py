@@ -57,6 +57,7 @@ def _steered(model: SteerModel, commands: Iterator[tuple[Array, Array]]) -> Trac
     poses = []
     for _ in range(first + round(SECONDS * model.fps)):
         speed, direction = next(commands)
+        # a new command only where it changes
         command = np.array([speed, direction])
         if (command != before).any():
             session.control(speed=speed, direction=direction)

@@ -158,6 +158,7 @@ class _RandomPlayer:
         self.fps = model.fps
         self.names = np.array(model.gaits)
         self.ranges = np.array([model.speeds[name] for name in model.gaits])
+        # the figures and their commands
         self.session = model.start(characters=characters)
         self.ticks_left = np.zeros(characters, dtype=np.int64)
         self.since = np.zeros(characters, dtype=np.int64)
@@ -295,6 +296,7 @@ def wandering(model: SteerModel, limits: Limits, seconds: float, characters: int
     """Counts over all ticks and figures: broken poses, freezes, leaps (a joint moves a tenth farther in a tick, in the
     figure's own space, than in any recording), and soles 3 cm or more under the ground; and the largest of each.
     direction: errors in degrees (:func:`astray`), their mean and 95th percentile; NaN without any."""
+    # watch figures, and count
     watch = watched(model, limits, seconds, characters)
     direction, direction_p95 = mean_and_tail(astray(watch, model.fps))
     return {
@@ -386,6 +388,7 @@ def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Meas
         measures[f"ways_{gait}"] = partial(ways_errors, gait=gait)
     measures["reversals"] = reversal_figures
     measures["stick"] = stick_figures
+    # for the minutes that a user waits longest
     measures["random"] = partial(wandering, limits=limits, seconds=60 * minutes, characters=characters)
     return measures
 

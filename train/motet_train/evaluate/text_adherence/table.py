@@ -244,6 +244,7 @@ def space_report(
         shows; the same for the look-up; and between two random halves of these trials. "_motions" are the numbers of
         motions in each.
     """
+    # prompts, trials and generated motions in one space
     with unknown_words_allowed():
         texts = model.embed_text([prompt.text for prompt in candidates])
     trial_vectors = embedded(model, [trial.motion for trial in trials])
@@ -251,6 +252,7 @@ def space_report(
     sets = dict(made)
     if shown:
         sets["_real"] = {text: trial_vectors[rows] for text, rows in shown.items()}
+    # both measures
     report = {f"r_precision{kind}": _precisions(vectors, candidates, texts) for kind, vectors in sets.items()}
     if shown:
         all_rows = sorted(set(chain.from_iterable(shown.values())))

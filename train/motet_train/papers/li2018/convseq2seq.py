@@ -89,6 +89,7 @@ class EncodingModule(nn.Module):
         size = (frames, config.dimensions)
         inputs = 1
         layers: list[nn.Module] = []
+        # each convolution shrinks the image
         for outputs, rate in zip(filters, config.dropout, strict=True):
             layer = Convolution(inputs, outputs, config.kernel, config.padding)
             layers += [layer, nn.Dropout(rate)]
@@ -125,12 +126,14 @@ class ConvSeq2Seq(System):
         super().__init__()
         self.config = config
         self.carried = {"window": (config.window, config.dimensions)}
+        # the encoder of the seed, if there is one
         self.long_term: nn.Module | None = None
         if config.long_term == "recurrent":
             self.long_term = RecurrentEncoder(config)
         elif config.long_term == "convolutional":
             self.long_term = EncodingModule(config.seed_frames - 1, config, config.filters)
         self.constant = {} if self.long_term is None else {"long_term": (config.units,)}
+        # the encoder of the window, and the decoder of both
         self.short_term = EncodingModule(config.window, config, config.filters)
         hidden = nn.Linear(config.units * (1 + len(self.constant)), config.units)
         outward = nn.Linear(config.units, config.dimensions)

@@ -254,12 +254,14 @@ def expmap_material(corpus: ExpmapCorpus, kept_back: Sequence[str] = ()) -> Expm
     """
     layout = corpus.layout
     scaling = scaling_of(corpus.train)
+    # the files to train on, and those kept back
     groups = _training_groups(corpus, kept_back)
     sequences = [_sequence(frames) for frames in _all_frames(groups)]
     validation = []
     for files in corpus.train.values():
         validation += [_sequence(files[name]) for name in files if name in kept_back]
     mirrored, signs = _mirrored_columns(layout)
+    # what the manifest says of them
     about: dict[str, Any] = {"name": layout.name, "files": len(sequences), "missing": list(corpus.missing)}
     if kept_back:
         about["validation"] = list(kept_back)

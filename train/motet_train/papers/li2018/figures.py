@@ -88,6 +88,7 @@ def strips(
     """
     window = windows(list(corpus.test[action].values()), 1, corpus.layout)
     seed = window[:, :SEED_FRAMES]
+    # the truth and each prediction after the same seed
     frames = {"truth": window}
     for name, model in models.items():
         predicted = predictor(name, model, corpus)(seed)
@@ -106,6 +107,7 @@ def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton) -> Figure:
     width = 13
     height = 0.4 + 1.1 * width / (SPACING * (len(truth) + 1))
     figure, axes = panels(len(strips), 1, (width, height * len(strips)))
+    # each strip over the truth
     for axis, (title, points) in zip(axes, strips.items(), strict=True):
         if points is not truth:
             stick_figures(axis, in_profile(truth, skeleton), bones, ["0.75"] * len(truth))

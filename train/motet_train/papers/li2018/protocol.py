@@ -54,6 +54,7 @@ def rotmat_to_protocol_euler(matrix: Array) -> Array:
     They are the negative angles of order "xyz" of :func:`motet.motion.rotations.rotmat_to_euler`. At gimbal lock, where
     the last angle is 0 and the first follows from the matrix, the first is 0 or pi, as in the papers' code.
     """
+    # at gimbal lock the formula divides by 0
     sin = np.clip(matrix[..., 0, 2], -1.0, 1.0)
     locked = np.abs(sin) >= 1.0
     cos = np.where(locked, 1.0, np.sqrt(1.0 - sin**2))

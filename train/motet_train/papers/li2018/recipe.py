@@ -86,6 +86,7 @@ def train_system(material: Material, job: Job) -> Run:
     job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
     config = sized(job.recipe, material)
+    # the manifest, from which the net is built
     sizes = {"channels": len(material.contract.channels), "kept": kept, "seed_frames": SEED_FRAMES}
     manifest = job.manifest(
         material.contract,
@@ -96,6 +97,7 @@ def train_system(material: Material, job: Job) -> Run:
     )
     net = from_config(job.recipe.model, manifest["config"])
     net.measure_by(material.contract.mean[kept], material.contract.std[kept])
+    # train it on windows
     learner = _learner(net.to(job.device), config, _windows(material, visits), job)
     return job.run(learner.kept, learner, manifest)
 
@@ -118,6 +120,7 @@ def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> Gradient
     def loss(windows: Tensor) -> Terms:
         return (Term(net.system.loss(net.normalised(windows), net.seed_frames), len(windows)),)
 
+    # an adversary beside it, if the recipe has one
     parts: dict[str, Part] = {}
     if training.adversary:
         if not isinstance(config, convseq2seq.Config):

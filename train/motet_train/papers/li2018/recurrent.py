@@ -36,6 +36,7 @@ class RRNN(System):
         super().__init__()
         self.units = config.units
         self.carried = {"hidden": (config.units,), "last": (config.dimensions,)}
+        # the GRU, and the map to a step
         self.inward = Reused(config.dimensions, 3 * config.units)
         self.bias = nn.Parameter(torch.cat([torch.ones(2 * config.units), torch.zeros(config.units)]))
         self.gates = Reused(config.units, 2 * config.units)
@@ -132,6 +133,7 @@ class EncoderRecurrentDecoder(Taught):
     def __init__(self, config: LSTM3LRConfig) -> None:
         super().__init__()
         self.carried = {"states": (config.layers, 2 * config.units)}
+        # layers, LSTMs, layers
         self.encoder = _connected((config.dimensions, *config.encoder), config.rectified)
         inputs = [(config.dimensions, *config.encoder)[-1], *[config.units] * (config.layers - 1)]
         self.recurrent = nn.ModuleList(LSTM(size, config.units) for size in inputs)

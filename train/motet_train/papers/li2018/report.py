@@ -111,6 +111,7 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
     if not corpus.test:
         raise DataError("none of the test files was found")
     systems = text_floors(corpus) | {name: predictor(name, model, corpus) for name, model in models.items()}
+    # windows of the test files
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
     measured: dict[str, Mapping[tuple[str, str], Array]] = {}
@@ -144,6 +145,7 @@ def seed_groups(models: Models) -> Groups:
 
     Runs of equal model, config, recipe and data form a group; further ones with a seed that it has form another.
     """
+    # by system, and by how often its seed has been seen
     groups: dict[tuple[str, int], list[str]] = {}
     seen: Counter[tuple[str, Any]] = Counter()
     for name, model in models.items():

@@ -53,6 +53,7 @@ def parts_of(layout: Layout, kept: Sequence[int]) -> tuple[tuple[int, ...], ...]
     """
     if len(layout.pairs) != 2:
         raise DataError(f"{layout.name} does not say which columns are legs and arms: its layout needs two pairs")
+    # legs and arms
     limbs: list[tuple[int, ...]] = []
     for left, right, width in reversed(layout.pairs):
         left_limb = _within(kept, left, width)
@@ -60,6 +61,7 @@ def parts_of(layout: Layout, kept: Sequence[int]) -> tuple[tuple[int, ...], ...]
         if [kept[n] - left for n in left_limb] != [kept[n] - right for n in right_limb]:
             raise DataError(f"{layout.name}: columns kept from {left} and from {right} on are not the same ones")
         limbs += [left_limb, right_limb]
+    # and the spine, which is all else
     of_limbs = set(chain.from_iterable(limbs))
     spine = tuple(n for n in range(len(kept)) if n not in of_limbs)
     return (spine, *limbs)
@@ -134,11 +136,13 @@ class SRNN(Taught):
     def __init__(self, config: Config) -> None:
         super().__init__()
         self.config = config
+        # the channels of each type
         spine, *limbs = config.parts
         channels = {"spine": [spine], "arm": limbs[:2], "leg": limbs[2:]}
         widths = {name: len(parts[0]) for name, parts in channels.items()}
         self.edges = nn.ModuleDict({name: Edge(_edge_width(name, widths), config) for name in EDGES})
         self.nodes = nn.ModuleDict({name: Node(widths[name], config) for name in NODES})
+        # the state, and where the channels are
         self.carried = {
             "previous": (config.dimensions,),
             "last": (config.dimensions,),
@@ -185,6 +189,7 @@ class SRNN(Taught):
 
 def _each(rnns: nn.ModuleDict, inputs: Tensors, state: Tensor) -> tuple[Tensors, Tensor]:
     """The outputs of each RNN for its inputs, and the states of all after them, from those before them (B, K, 2 U)."""
+    # split the states, run each, and join them
     members = [inputs[name].shape[2] for name in rnns]
     hidden, memory = (torch.split_with_sizes(half, members, dim=1) for half in state.chunk(2, dim=-1))
     outputs = {}

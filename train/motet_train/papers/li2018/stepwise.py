@@ -169,8 +169,10 @@ class Stepwise(Net):
         The carried parts of the state are one tensor, ``state``; those that depend on the seed alone are another,
         ``context``, which begins with the constant channels.
         """
+        # the widths of state and context
         carried = sum(map(math.prod, self.system.carried.values()))
         constant = sum(map(math.prod, self.system.constant.values()))
+        # their tensors
         frames = float_rows("frames", self.seed_frames, self.channels)
         frame = float_rows("frame", self.channels)
         context = float_rows("context", self.channels + constant)
