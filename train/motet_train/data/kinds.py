@@ -1,16 +1,15 @@
 """Kinds of action: those that a sentence names, and those that a motion shows according to its sentences."""
 
 import re
-import tomllib
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
 from motet.text.vocabulary import RULES
+from motet_train.data.table import read_toml
 
-KINDS = tomllib.loads((files("motet_train.data") / "kinds.toml").read_text(encoding="utf-8"))
+KINDS: Mapping[str, str] = read_toml(__file__, "kinds.toml")
 """Name of a kind -> the regular expression of the words that name it."""
 
 _WORDS = {kind: re.compile(rf"\b(?:{words})\b") for kind, words in KINDS.items()}

@@ -10,6 +10,11 @@ from typing import Any
 from motet_train.data.errors import DataError
 
 
+def read_toml(file: str, name: str) -> dict[str, Any]:
+    """The TOML file ``name`` beside the file of a module."""
+    return tomllib.loads(Path(file).with_name(name).read_text(encoding="utf-8"))
+
+
 @dataclass
 class Described:
     """The entries of a table about a clip; for the fields see :class:`motet_train.data.corpus.Record`."""

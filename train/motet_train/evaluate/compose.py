@@ -15,11 +15,11 @@ from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet_train.evaluate.positions import BALLS, acceleration, leap, speed
-from motet_train.evaluate.tables import Goals, Report
+from motet_train.evaluate.tables import Report, read_goals
 
 FOLDER = Path(__file__).parent
 
-COMPOSE_GOALS: Goals = {"place.worst": (None, 10.0), "pose.worst": (None, 5.0), "late.worst": (None, 0.1)}
+COMPOSE_GOALS = read_goals("compose")
 
 
 def compositions() -> list[list[Moment]]:

@@ -16,7 +16,7 @@ from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, strai
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store, split
 from motet_train.evaluate.positions import Flags, jerk, length
-from motet_train.evaluate.tables import Goals, Report, gathered
+from motet_train.evaluate.tables import Report, gathered, read_goals
 from motet_train.models.kinematics import SixdPlaces, tree_of
 
 FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side, part in product(LEFT_RIGHT, ("Foot", "Toes"))]
@@ -24,8 +24,7 @@ FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side, part in product(LEFT_
 MARGIN = 3
 """Frames before and after a gap that are measured with it, so that the seams count."""
 
-FILL_GOALS: Goals = {"gap_1.of_interpolation": (None, 0.5)}
-"""Figure -> (least, most): the goals of the bundle that ships with motet."""
+FILL_GOALS = read_goals("fill")
 
 PLAIN_WAYS: Mapping[str, "Fill"] = {
     "hermite": bridge,

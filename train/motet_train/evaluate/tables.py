@@ -8,11 +8,21 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from motet_train.data.table import read_toml
+
 Report = dict[str, dict[str, float]]
 """Group -> key -> figure. A measure is a function of a model and data that returns a report, or yields its parts."""
 
 Goals = Mapping[str, tuple[float | None, float | None]]
 """Name of a figure, "GROUP.KEY" -> the lowest and highest value that meet the goal, None for no bound."""
+
+
+def read_goals(kind: str) -> Goals:
+    """The goals of a kind of models in goals.toml."""
+    goals = {}
+    for name, bounds in read_toml(__file__, "goals.toml")[kind].items():
+        goals[name] = (bounds.get("least"), bounds.get("most"))
+    return goals
 
 
 def gathered(parts: Iterable[Report], name: str) -> Report:

@@ -15,22 +15,9 @@ from motet_train.evaluate.language.attributes import common_side, common_turning
 from motet_train.evaluate.language.describe import RANKS, bleu, ranked, ranks, retrieved
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
-from motet_train.evaluate.tables import Goals, Report, gathered
+from motet_train.evaluate.tables import Report, gathered, read_goals
 
-LANGUAGE_GOALS: Goals = {
-    "gain.nearest": (0.10, None),
-    "gain.frequent": (0.10, None),
-    "words.verbs": (0.9, None),
-    "words.sides": (0.8, None),
-    "relative_test.1": (0.65, None),
-    "asked.walks": (0.9, None),
-    "asked.runs": (0.9, None),
-    "asked.left": (0.9, None),
-    "asked.right": (0.9, None),
-    "asked.jumps": (0.9, None),
-    "motion.frozen": (None, 0.1),
-}
-"""Figure -> (least, most): the goals of the default recipes of describe and generate."""
+LANGUAGE_GOALS = read_goals("language")
 
 
 def generate_report(model: GenerateModel, corpus: SplitStore, describe: DescribeModel | None = None) -> Report:

@@ -16,9 +16,9 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, description_groups, unknown_words_allowed
-from motet_train.evaluate.tables import Goals, Report, gathered
+from motet_train.evaluate.tables import Report, gathered, read_goals
 
-SEARCH_GOALS: Goals = {"text.first_5": (0.8, None)}
+SEARCH_GOALS = read_goals("search")
 
 Numbers = NDArray[np.int64]
 

@@ -43,40 +43,9 @@ from motet_train.evaluate.steer.following import (
     ways_errors,
 )
 from motet_train.evaluate.steer.players import SEED, reversal_figures, stick_figures
-from motet_train.evaluate.tables import Goals, Report, gathered, report_table
+from motet_train.evaluate.tables import Report, gathered, read_goals, report_table
 
-STEER_GOALS: Goals = {
-    "walk.slide_cm": (None, 2.5),
-    "walk.toe_speed": (None, 0.15),
-    "walk.acceleration": (None, 6),
-    "run.slide_cm": (None, 6),
-    "speed.mean": (None, 0.1),
-    "turn_walk.s_90": (None, 1.2),
-    "turn_walk.direction_90": (None, 5),
-    "turn_walk.facing_90": (None, 5),
-    "ways_walk.direction": (None, 2),
-    "ways_walk.direction_worst": (None, 6),
-    "ways_run.direction": (None, 3),
-    "ways_run.direction_worst": (None, 8),
-    "creep.speed_worst": (None, 0.05),
-    "creep.slide_cm": (None, 2),
-    "stick.slide_p95_cm": (None, 5),
-    "reversals.slide_p95_cm": (None, 6),
-    "act_standing.begun_worst": (None, 0.4),
-    "act_walk.begun_worst": (None, 0.4),
-    "act_standing.leaps": (None, 0),
-    "act_walk.leaps": (None, 0),
-    "act_run.leaps": (None, 0),
-    "going_walk.never": (None, 0),
-    "going_walk.off_worst_cm": (None, 8),
-    "going_run.never": (None, 0),
-    "going_run.off_worst_cm": (None, 8),
-    "random.broken": (None, 0),
-    "random.frozen": (None, 0),
-    "random.leaps": (None, 0),
-    "random.under_ground": (None, 0),
-}
-"""Figure -> (least, most): the goals of the bundle that ships with motet."""
+STEER_GOALS = read_goals("steer")
 
 BESIDE_COLUMNS = {"recorded": "as recorded", "held": "feet held", "seldom": "seldom searched"}
 """Suffix of a group in a report -> the head of its column: recordings as they are; with their feet held, as they are

@@ -1,15 +1,14 @@
 """Sentences that ask for several actions in a row: whether they are split correctly, and each part is shown in turn."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import combinations, pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from motet.generate.model import CodesModel, Story
+from motet_train.data.table import read_toml
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import Track, track_of
@@ -18,7 +17,7 @@ from motet_train.evaluate.text_adherence.track import Track, track_of
 @cache
 def table() -> Mapping[str, Any]:
     """composed.toml: "composed", texts with the rules of each of their parts; "whole", texts that have no parts."""
-    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    return read_toml(__file__, "composed.toml")
 
 
 def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:

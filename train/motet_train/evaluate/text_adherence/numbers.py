@@ -1,16 +1,14 @@
 """Sentences with numbers: whether a motion turns, goes, steps, repeats and lasts as much as the sentence says."""
 
-import tomllib
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from motet.errors import TextWarning
 from motet.generate.base import GenerateModel
+from motet_train.data.table import read_toml
+from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import length, spells
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.rules import HANDS
@@ -24,8 +22,7 @@ BARS = {"degrees": (0.1, 0.0), "metres": (0.1, 0.0), "steps": (0.0, 1.0), "times
 @cache
 def table() -> Sequence[Mapping[str, Any]]:
     """The rows of numbers.toml."""
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    rows: Sequence[Mapping[str, Any]] = tomllib.loads(text)["number"]
+    rows: Sequence[Mapping[str, Any]] = read_toml(__file__, "numbers.toml")["number"]
     return rows
 
 
@@ -52,8 +49,7 @@ def numbers_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
 
 
 def _tracks(model: GenerateModel, text: str, seeds: Sequence[int]) -> list[Track]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TextWarning)
+    with unknown_words_allowed():
         return [track_of(model.generate(text, seed=seed)[0].motion) for seed in seeds]
 
 

@@ -1,7 +1,6 @@
 """The table of prompts, with the rules that a motion has to pass; and recorded trials, with the prompts they show."""
 
 import inspect
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -17,6 +16,7 @@ from motet.text.vocabulary import RULES as TEXT_RULES
 from motet_train.data.corpus import Record, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, Store
+from motet_train.data.table import read_toml
 from motet_train.evaluate.text_adherence import rules
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
@@ -78,7 +78,7 @@ def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
 
 @cache
 def _table() -> Mapping[str, Any]:
-    return tomllib.loads((Path(__file__).parent / "prompts.toml").read_text(encoding="utf-8"))
+    return read_toml(__file__, "prompts.toml")
 
 
 @cache

@@ -21,21 +21,11 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import BALLS, jerk, length, skate
-from motet_train.evaluate.tables import Goals, Report, aligned, report_table, short_names
+from motet_train.evaluate.tables import Report, aligned, read_goals, report_table, short_names
 from motet_train.evaluate.text_adherence.prompts import SHORTEST_MOTION, LookUp, Prompt, Trial, actions, prompts
 from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
-SAYS_GOALS: Goals = {
-    "says.all": (0.8, None),
-    "says.locomotion": (0.95, None),
-    "says.rest": (0.7, None),
-    "turn.a person walks forward and turns left 90 degrees": (80, 100),
-    "turn.a person walks forward and turns right 90 degrees": (-100, -80),
-    "quality.slide": (None, 0.2),
-    "quality.jerk_ratio": (0.85, 1.15),
-    "quality.spread_ratio": (0.7, None),
-}
-"""Figure -> (least, most): the goals of the bundles that ship with motet."""
+SAYS_GOALS = read_goals("says")
 
 CHOICES = 32
 """Prompts among which a motion has to find its own."""

@@ -4,11 +4,11 @@ They are those of Li et al. 2018, tables 1 to 4, with their own measurement of R
 Mao et al. 2019.
 """
 
-import tomllib
 from collections.abc import Iterable, Mapping
-from importlib.resources import files
 
 import numpy as np
+
+from motet_train.data.table import read_toml
 
 PUBLISHED_FRAMES = (1, 3, 7, 9, 24)
 
@@ -17,7 +17,7 @@ Rows = Mapping[str, tuple[float, ...]]
 
 Actions = Mapping[str, Rows]
 
-TABLES = tomllib.loads((files("motet_train.papers.li2018") / "published.toml").read_text(encoding="utf-8"))
+TABLES = read_toml(__file__, "published.toml")
 
 BY_ACTION: Mapping[str, Actions] = TABLES["actions"]
 """Name of a layout -> the published rows of each action: tables 3, 1 and 2; NaN where they state none."""
