@@ -89,8 +89,11 @@ def actions_of(store: Store, records: tuple[int, ...]) -> Actions:
         of[record, mirrored] = number = numbers.setdefault(action, len(numbers))
         sentences[number] |= _worded(entry.sentences, mirrored)
         unseen[number] |= _worded(entry.unseen, mirrored)
-    trained, measured = (tuple(map(tuple, by_number.values())) for by_number in (sentences, unseen))
-    return Actions(of, trained, measured)
+    return Actions(of, _listed(sentences), _listed(unseen))
+
+
+def _listed(sentences: Mapping[int, Iterable[str]]) -> tuple[tuple[str, ...], ...]:
+    return tuple(map(tuple, sentences.values()))
 
 
 def _sided(store: Store, records: tuple[int, ...]) -> set[str]:

@@ -37,9 +37,8 @@ def discriminate(net: JointEmbedding, seen: Views) -> None:
 
     # the directions in which motions differ most, relative to that
     whitened = torch.linalg.cholesky(torch.linalg.inv(within))
-    weight = net.motion.weight
+    weight = net.motion.weight.zero_()
     axes = torch.linalg.svd((flat - mean) @ whitened, full_matrices=False).Vh[: len(weight)]
-    weight.zero_()
     weight[: len(axes)] = axes @ whitened.T
     net.motion.bias.copy_(-weight @ mean)
 

@@ -164,11 +164,16 @@ def _loss(net: MotionCodec, window: Window, weights: Tensor, sharp: float) -> Te
     with torch.autocast(frames.device.type, enabled=False):
         places = places_in_world(net, frames, window.way)
         true_places = places_in_world(net, window.frames, window.way)
-        errors = (places - true_places).abs() * weights[:, None]
-        speed_errors = (places.diff(dim=1) - true_places.diff(dim=1)).abs() * 30 * weights[:, None]
-        jerk_errors = (_sharpness(places) / _sharpness(true_places)).log().abs()
-    total = frame_errors.mean() + 5.0 * errors.mean() + 0.5 * speed_errors.mean() + sharp * jerk_errors.mean()
-    return (Term(total, len(window)),)
+        place, speed, jerk = _joint_errors(places, true_places, weights[:, None])
+    return (Term(frame_errors.mean() + 5.0 * place + 0.5 * speed + sharp * jerk, len(window)),)
+
+
+def _joint_errors(places: Tensor, true_places: Tensor, weights: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Mean errors of joints (B, T, J, 3) in place (m), speed (m/s) and the logarithm of the jerk. weights: (J, 1)."""
+    errors = (places - true_places).abs() * weights
+    speed_errors = (places.diff(dim=1) - true_places.diff(dim=1)).abs() * 30 * weights
+    jerk_errors = (_sharpness(places) / _sharpness(true_places)).log().abs()
+    return errors.mean(), speed_errors.mean(), jerk_errors.mean()
 
 
 def _sharpness(places: Tensor) -> Tensor:

@@ -171,23 +171,16 @@ def coded(
         for (begin, end), (start, stop) in product(entry.spans, parts):
             frames = store.values(begin + start, min(begin + stop, end))
             first = begin == entry.spans[0][0]
-            for mirrored, seen in enumerate((frames, mirror(frames))):
-                codes = codes_of(codec, seen, store.fps)
+            for mirrored, seen in ((False, frames), (True, mirror(frames))):
+                codes = codes_of(codec, seen, store.fps, entry.ends or cut)
                 if len(codes):
-                    whole = _ended(codes, codec.config.moves) if entry.ends or cut else codes
-                    motions.append(CodedMotion(whole, actions.of[record, bool(mirrored)], entry.starts or cut, first))
+                    motions.append(CodedMotion(codes, actions.of[record, mirrored], entry.starts or cut, first))
     return motions
 
 
-def _ended(codes: Codes, end: int) -> Codes:
-    """Codes (N, P) with the move that ends a motion after them."""
-    ended = np.pad(codes, ((0, 1), (0, 0)))
-    ended[-1, 0] = end
-    return ended
-
-
-def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float) -> Codes:
-    """Frames (T, D) to codes (N, P), without the frames of an incomplete last step."""
+def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float, ended: bool = False) -> Codes:
+    """Frames (T, D) to codes (N, P), without the frames of an incomplete last step. ended: with the move that ends a
+    motion after them, if there are any."""
     hop = codec.config.hop
     frames = frames[: len(frames) // hop * hop]
     if not len(frames):
@@ -196,4 +189,8 @@ def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float) -> Cod
     poses = np.concatenate([poses, 2 * poses[-1:] - poses[-2:-1]])  # the root keeps its pace after the end
     _, moves, _ = with_way(frames, poses, codec.book.numpy().astype(np.float64), hop)
     body = codec.to_codes(codec.encode(torch.from_numpy(frames).float()[None]))[0].numpy()
-    return np.concatenate([moves[:, None], body], axis=1)
+    codes = np.concatenate([moves[:, None], body], axis=1)
+    if ended:
+        codes = np.pad(codes, ((0, 1), (0, 0)))
+        codes[-1, 0] = codec.config.moves
+    return codes

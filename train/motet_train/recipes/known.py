@@ -5,11 +5,11 @@ fitted without them answer about their motions. The final space is then fitted w
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from itertools import compress, product
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -83,9 +83,10 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
     # the manifest is the writer's where the model is
     about = manifest(job, corpus, asdict(net.config), data, by)
     about |= {key: writer.manifest[key] for key in ("motion", "text", "vocabulary")}
+    epochs = job.training.epochs
     about["training"] |= {
-        "epochs": job.training.epochs,
-        "kept_epoch": job.training.epochs,
+        "epochs": epochs,
+        "kept_epoch": epochs,
         "seconds": round(perf_counter() - began, 1),
         "parameters": parameter_count(net),
         "writer": origin(writer.manifest["training"]),
@@ -133,12 +134,17 @@ def _known(corpus: Divided, examples: Examples, space: JointEmbedding, views: Vi
     return Known(
         np.rint(vectors * 127).astype(np.int8),
         np.array(motion_actions, dtype=np.int16),
-        np.array(list(map(_kind_row, shown)), dtype=np.uint8),
+        _rows(_kind_row, shown, np.uint8),
         sentences,
         np.array(sentence_actions, dtype=np.int16),
-        np.array(list(map(_named_row, sentences)), dtype=np.uint8),
-        np.array(list(map(way_of, sentences)), dtype=np.int16),
+        _rows(_named_row, sentences, np.uint8),
+        _rows(way_of, sentences, np.int16),
     )
+
+
+def _rows(row: Callable[[Any], Sequence[int]], things: Iterable[Any], dtype: type[np.integer[Any]]) -> NDArray[Any]:
+    """A table with a row for each thing."""
+    return np.array(list(map(row, things)), dtype=dtype)
 
 
 def _shown_by_actions(store: Store, actions: Actions) -> list[Shown]:
@@ -219,15 +225,16 @@ def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Vi
     shown = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
     groups = grouped([entry.subject for entry in entries], visits.folds)
     answers = []
-    for fold in range(groups.max() + 1):
+    for fold in np.unique(groups):
+        # what a space of the others knows
         others = np.flatnonzero(groups != fold).tolist()
-        held_out = np.flatnonzero(groups == fold).tolist()
-        if not others or not held_out:
+        if not others:
             continue
-
-        # what a space of the others knows, and how it answers about the held-out motions
         part = corpus.examples(tuple(examples.records[row] for row in others))
         known = _known(corpus, part, space, views.only(others), visits.kept)
+
+        # how it answers about the held-out motions
+        held_out = np.flatnonzero(groups == fold).tolist()
         for view in (-1, 0, 1):
             vectors = _embedded(space, views.seen[0, held_out, view])
             answers.append(_answered(known, vectors, fold, [shown[row] for row in held_out]))
@@ -274,19 +281,21 @@ def learned(tried: Tried, sure: float) -> AnswerSettings:
     sizes = np.bincount(tried.group)[tried.group]
     weights = np.sqrt(len(sizes) / sizes)
     regression = LogisticRegression(C=10.0, max_iter=1000).fit(odds, tried.right, sample_weight=weights)
-    probabilities = regression.predict_proba(odds)[:, 1]
+    return AnswerSettings(
+        bias=round(float(regression.intercept_[0]), 4),
+        share=round(float(regression.coef_[0, 0]), 4),
+        sure=round(_sure_from(tried, regression.predict_proba(odds)[:, 1], sure), 4),
+        outside=round(float(np.percentile(tried.similarity, 1)), 4),
+    )
 
-    # the bound of each group that has one
+
+def _sure_from(tried: Tried, probabilities: NDArray[np.float64], sure: float) -> float:
+    """The probability from which a share of ``sure`` is right in every group that has such; 1 if none has."""
     bounds = []
     for group in set(tried.group):
         rows = tried.group == group
         bounds += _lowest(probabilities[rows], tried.right[rows], sure)
-    return AnswerSettings(
-        bias=round(float(regression.intercept_[0]), 4),
-        share=round(float(regression.coef_[0, 0]), 4),
-        sure=round(max(bounds, default=1.0), 4),
-        outside=round(float(np.percentile(tried.similarity, 1)), 4),
-    )
+    return max(bounds, default=1.0)
 
 
 def _lowest(probabilities: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> list[float]:

@@ -59,10 +59,7 @@ def says_table(
         the mean over the prompts whose action a training trial shows.
     search: a model in whose space motions and prompts are compared (:func:`space_report`); None for no comparison.
     """
-    names = None if training is None else set(training)
-    train_trials = [trial for trial in trials if names is None or trial.name in names]
-    if trials and not train_trials:
-        raise DataError("none of the trials is one of the training motions to be looked up")
+    train_trials = _training_trials(trials, training)
     sources = {"": (generator, seeds)}
     if train_trials:
         sources["_lookup"] = (LookUp(train_trials).generate, 1)
@@ -83,6 +80,15 @@ def says_table(
     if search is not None:
         report |= space_report(search, prompts(), vectors, trials)
     return report
+
+
+def _training_trials(trials: Sequence[Trial], training: Iterable[str] | None) -> list[Trial]:
+    """The trials of some names, or all; DataError if none of several trials is left."""
+    names = {trial.name for trial in trials} if training is None else set(training)
+    train_trials = [trial for trial in trials if trial.name in names]
+    if trials and not train_trials:
+        raise DataError("none of the trials is one of the training motions to be looked up")
+    return train_trials
 
 
 def _measured(
@@ -183,23 +189,28 @@ def spread(tracks: Sequence[Track]) -> float:
 def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
     """The means over groups of prompts, the mean quality, and the turns and shares of each prompt."""
     # the prompts of each group
-    shares = {text: row["share"] for text, row in rows.items()}
     groups: dict[str, list[str]] = {"all": [], "locomotion": [], "rest": []}
-    turns = {}
     for prompt in prompts():
         groups["all"].append(prompt.text)
         groups[prompt.group].append(prompt.text)
-        if prompt.turns:
-            turns[prompt.text] = rows[prompt.text]["turn"]
     if known:
         groups["known"] = known
+
+    # means over these, and figures of single prompts
+    shares = {text: row["share"] for text, row in rows.items()}
+    turns = {prompt.text: rows[prompt.text]["turn"] for prompt in prompts() if prompt.turns}
     says = {}
     for name, texts in groups.items():
         says[name] = _mean([shares[text] for text in texts])
+    return {f"says{kind}": says, f"quality{kind}": _quality(rows), f"turn{kind}": turns, f"prompt{kind}": shares}
+
+
+def _quality(rows: Mapping[str, Figures]) -> Figures:
+    """The mean quality of the motions of all prompts."""
     quality = {}
     for key in ("slide", "jerk", "depth", "spread", "seconds"):
         quality[key] = _mean([row[key] for row in rows.values()])
-    return {f"says{kind}": says, f"quality{kind}": quality, f"turn{kind}": turns, f"prompt{kind}": shares}
+    return quality
 
 
 def _ratios(generated: Mapping[str, Figures], recorded: Mapping[str, Figures]) -> Figures:

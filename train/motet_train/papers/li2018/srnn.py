@@ -150,7 +150,9 @@ class SRNN(Taught):
             "nodes": (sum(NODES.values()), 2 * config.units),
         }
         order = torch.tensor(list(chain.from_iterable(config.parts)))
-        constants(self, places=order.argsort(), **{name: torch.tensor(parts) for name, parts in channels.items()})
+        constants(
+            self, places=order.argsort(), **dict(zip(channels, map(torch.tensor, channels.values()), strict=True))
+        )
 
     def begin(self, seed: Tensor) -> State:
         """The RNNs have seen all seed frames, of which there are at least two, but the last."""
