@@ -106,25 +106,14 @@ class Windows:
         """From motions that end with the ``frames`` to predict; DataError without a motion."""
         if not windows:
             raise DataError("no motion is long enough for a window")
-        rotations = []
-        translations = []
-        last_two = []
-        truth = []
+        rows = []
         for motion in windows:
             # the input's last two frames; the truth begins at ``first``
             first = len(motion) - frames
             last = motion[:first][-2:]
-            rotations.append(local_rotations(last))
-            translations.append(local_translations(last) * skeleton_of(last).unit_factor(0.01))
-            last_two.append(places(last))
-            truth.append(places(motion[first:]))
-        return Windows(
-            skeleton_of(windows[0]),
-            np.stack(rotations),
-            np.stack(translations),
-            np.stack(last_two),
-            np.stack(truth),
-        )
+            translations = local_translations(last) * skeleton_of(last).unit_factor(0.01)
+            rows.append((local_rotations(last), translations, places(last), places(motion[first:])))
+        return Windows(skeleton_of(windows[0]), *map(np.stack, zip(*rows, strict=True)))
 
     @property
     def frames(self) -> int:
