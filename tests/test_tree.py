@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 178
+MOST_LARGE_FUNCTIONS = 166
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 47
-MOST_TUPLE_ASSIGNMENTS = 15
-MOST_NESTED_COMPREHENSIONS = 40
+MOST_BANNED_NAMES = 40
+MOST_TUPLE_ASSIGNMENTS = 12
+MOST_NESTED_COMPREHENSIONS = 38
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -107,9 +107,9 @@ CEILINGS = {
     "motet_train": 9_500,
     "motet_train.cli": 8_500,
     "motet_train.data": 21_900,
-    "motet_train.evaluate": 45_100,
-    "motet_train.models": 21_300,
-    "motet_train.papers": 41_400,
+    "motet_train.evaluate": 44_900,
+    "motet_train.models": 21_100,
+    "motet_train.papers": 40_600,
     "motet_train.recipes": 15_500,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
