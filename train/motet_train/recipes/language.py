@@ -129,7 +129,7 @@ def _config(recipe: Recipe, corpus: Divided) -> dict[str, Any]:
     return config
 
 
-def _learner(job: Job, corpus: Divided, net: LanguageNet) -> GradientLearner:
+def _learner(job: Job, corpus: Divided, net: LanguageNet) -> GradientLearner[LanguageNet]:
     """What trains a net on the training part of a corpus, and validates it on the validation part."""
     visits = job.recipe.visits
     batch_size = job.training.batch
