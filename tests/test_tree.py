@@ -91,7 +91,7 @@ CEILINGS = {
     "motet.decode": 4_000,
     "motet.draw": 12_000,
     "motet.figures": 32_000,
-    "motet.formats": 37_000,
+    "motet.formats": 37_400,
     "motet.generate": 25_900,
     "motet.live": 5_700,
     "motet.models": 9_900,

@@ -167,15 +167,20 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     file, named_clip, named_figure = split_part(file, format)
     kind = _format(file, format, READABLE, "read")
     path = place_of(file)
-    clip = named_clip if clip is None else clip
-    figure = named_figure if figure is None else figure
-    settings = {"fps": fps, "asf": asf, "partial": partial or None, "clip": clip, "figure": figure, "rest": rest}
+    settings = {
+        "fps": fps,
+        "asf": asf,
+        "partial": partial or None,
+        "clip": named_clip if clip is None else clip,
+        "figure": named_figure if figure is None else figure,
+        "rest": rest,
+    }
     options = _options_for(path, kind, settings)
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
             motion: Motion = kind.module().read(file, **options)
         log.debug("read %s: %r", path, motion)
-        return motion if unit is None else _in_unit(path, motion, metres(unit), kind.loose)
+        return motion if unit is None else _in_unit(path, motion, unit, kind.loose)
     except MotionError as error:
         raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
 
@@ -200,8 +205,9 @@ def split_part(file: File, format: str | None = None) -> tuple[File, str | None,
     return (file, None, named) if has_only_figures else (file, named, None)
 
 
-def _in_unit(path: Path, motion: Motion, unit: float, loose: bool) -> Motion:
+def _in_unit(path: Path, motion: Motion, unit_name: str | float, loose: bool) -> Motion:
     """The motion with the length unit that its file leaves out or, if ``loose``, states only by convention."""
+    unit = metres(unit_name)
     if motion.skeleton is None:
         raise FormatError(path, "a file without a skeleton has no length unit")
     stated_unit = motion.skeleton.metres_per_unit
@@ -350,8 +356,7 @@ def _moving(moving: Any) -> Motion:
 
 def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:
     """Write a motion like :func:`write_motion`; if a character is given, the motion is already on its skeleton."""
-    check_writable(file, format)
-    kind = _format(file, format, WRITABLE, "write")
+    kind = check_writable(file, format)
     with np.errstate(over="ignore", invalid="ignore"):  # writers refuse values that are too large
         if character and character.nodes and kind.writer == "formats.glb.write":
             from motet.formats import gltf_character
@@ -371,14 +376,15 @@ def write_all_on(file: File, motions: Mapping[str, Motion], character: Character
         gltf_character.write_onto(file, motions, character.nodes)
 
 
-def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> None:
-    """Refuse an unwritable path or a disallowed extension before long work starts."""
+def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> Format:
+    """The format; an unwritable path or a disallowed extension is refused before long work starts."""
     kind = _format(file, format, allowed, "write")
     if kind.needs and find_spec(kind.needs) is None:
         remedy = f"files need the package {kind.needs}: install the extra with  pip install 'motet[plot]'"
         raise OutputError(f"cannot write {place_of(file)}: {kind.extension} {remedy}")
     if isinstance(file, str | Path):
         check_place(file)
+    return kind
 
 
 def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str) -> Format:

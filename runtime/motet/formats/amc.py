@@ -12,7 +12,7 @@ import numpy as np
 from motet.errors import FormatError, quoted
 from motet.files import File, check_place, place_of, write_whole
 from motet.formats import text
-from motet.formats.asf import CMU_METRES, Asf, Dofs, asf_text, read_skeleton, words_of
+from motet.formats.asf import CMU_METRES, Asf, Dofs, Line, asf_text, read_skeleton, words_of
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -90,7 +90,7 @@ def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | N
     return len(lines), unit, fps
 
 
-def _layout(path: Path, lines: Iterator[tuple[int, list[str]]], dofs: Dofs) -> Layout:
+def _layout(path: Path, lines: Iterator[Line], dofs: Dofs) -> Layout:
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
     line, words = next(lines, (0, []))
     if not words:

@@ -24,8 +24,10 @@ CMU_METRES = 0.0254 / 0.45
 Dofs = Mapping[str, tuple[str, ...]]
 """Of each joint with channels their names, such as "rx"."""
 
-Lines = list[tuple[int, list[str]]]
-"""Numbers of lines, and their words."""
+Line = tuple[int, list[str]]
+"""The number of a line, and its words."""
+
+Lines = list[Line]
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,7 @@ def _root(path: Path, lines: Lines, factor: float) -> _Bone:
     return _Bone("root", reach, axis, dofs)
 
 
-def _entries(lines: Lines) -> dict[str, tuple[int, list[str]]]:
+def _entries(lines: Lines) -> dict[str, Line]:
     """The number and the words of each line by its keyword, which is the first of them."""
     return {words[0].lower(): (line, words) for line, words in lines}
 
@@ -227,7 +229,7 @@ def _joints(bones: dict[str, _Bone]) -> list[Joint]:
     return joints
 
 
-def words_of(lines: list[str], header: int = 0) -> Iterator[tuple[int, list[str]]]:
+def words_of(lines: list[str], header: int = 0) -> Iterator[Line]:
     """Every non-empty line after the header: its number, and its words without a comment."""
     for line in range(header, len(lines)):
         if words := lines[line].partition("#")[0].split():
@@ -287,8 +289,7 @@ def _bones(asf: Asf) -> list[_Bone]:
     for i, joint in enumerate(joints):
         if i in tips:
             continue
-        bone = _Bone(joint.name, NOWHERE, _written_axis(joint), asf.dofs.get(joint.name, ()))
-        bone.order = joint.order[::-1].upper()
+        bone = _bone_at(joint, asf.dofs.get(joint.name, ()))
         bones[joint.name] = bone
         # a bone ends where its children start, if that is one place; the root has no length, but a position
         children = asf.skeleton.children[i]
@@ -316,12 +317,14 @@ def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: Names)
     return bases
 
 
-def _written_axis(joint: Joint) -> Triple:
-    """The joint's axis in the order of its own rotation: some readers take one for the other."""
-    if joint.order == "zyx" or not any(joint.axis):
-        return joint.axis
-    c, b, a = np.degrees(rotmat_to_euler(joint.frame, joint.order)).tolist()
-    return a, b, c
+def _bone_at(joint: Joint, dofs: tuple[str, ...]) -> _Bone:
+    """The bone of a joint, without reach and children."""
+    axis = joint.axis
+    # in the order of the joint's own rotation: some readers take one for the other
+    if joint.order != "zyx" and any(axis):
+        c, b, a = np.degrees(rotmat_to_euler(joint.frame, joint.order)).tolist()
+        axis = (a, b, c)
+    return _Bone(joint.name, NOWHERE, axis, dofs, [], joint.order[::-1].upper())
 
 
 def _tips(asf: Asf) -> set[int]:

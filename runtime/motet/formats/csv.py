@@ -10,6 +10,7 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,18 +23,23 @@ from motet.motion.rotations import Array
 COMMENT = "# motet motion, fps "
 
 
+class Channels(NamedTuple):
+    """The channels of a table, each with its unit."""
+
+    names: list[str]
+    units: list[str]
+
+
 def read(file: File) -> Motion:
     """Read a table: values unchanged, no skeleton. FormatError names the file and line at fault."""
     path = place_of(file)
     fps: float | None = None
     header: list[str] = []
-    channels: list[re.Match[str]] = []
+    channels = Channels([], [])
     values = array("d")  # row after row
     for line, row in _rows(file):
         if row[0].startswith("#"):
-            comment = ",".join(row)
-            if comment.startswith(COMMENT):
-                fps = frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
+            fps = _stated_rate(path, ",".join(row), line) or fps
         elif not header:
             header = row
             channels = _channels(path, header)
@@ -44,10 +50,15 @@ def read(file: File) -> Motion:
     if not header:
         raise _no_header(path)
     table = np.array(values).reshape(-1, len(header))
-    fps = _rate_of_times(path, table[:, 0]) if fps is None else fps
-    names = tuple(channel[1] for channel in channels)
-    units = tuple(channel[2] for channel in channels)
-    return Motion(table[:, 1:], names, units, fps)
+    fps = fps or _rate_of_times(path, table[:, 0])
+    return Motion(table[:, 1:], tuple(channels.names), tuple(channels.units), fps)
+
+
+def _stated_rate(path: Path, comment: str, line: int) -> float | None:
+    """The frame rate that a comment states, if it does."""
+    if not comment.startswith(COMMENT):
+        return None
+    return frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
 
 
 def _rows(file: File) -> Iterator[tuple[int, list[str]]]:
@@ -69,14 +80,18 @@ def _rate_of_times(path: Path, times: Array) -> float:
     return frame_rate(float(1 / steps.mean()), path)
 
 
-def _channels(path: Path, header: Sequence[str]) -> list[re.Match[str]]:
-    """The channels of a header, each with its unit; FormatError for another header."""
-    channels = [channel for title in header[1:] if (channel := re.fullmatch(r"(.+) \[(.+)\]", title))]
+def _channels(path: Path, header: Sequence[str]) -> Channels:
+    """The channels of a header; FormatError for another header."""
     if header[0] == "Format Version":
         raise FormatError(path, "this is a table of Motive, which has no skeleton: export BVH or FBX there")
     if len(header) == 1 and ";" in header[0]:
         raise FormatError(path, "its columns are separated by semicolons: expected commas, and decimals with a point")
-    if header[0] != "time" or len(channels) < len(header) - 1:
+    channels = Channels([], [])
+    for title in header[1:]:
+        if channel := re.fullmatch(r"(.+) \[(.+)\]", title):
+            channels.names.append(channel[1])
+            channels.units.append(channel[2])
+    if header[0] != "time" or len(channels.names) < len(header) - 1:
         raise _no_header(path)
     return channels
 

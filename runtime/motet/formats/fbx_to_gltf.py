@@ -21,8 +21,8 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, TypeVar
+from itertools import chain, pairwise
+from typing import Any
 
 import ufbx
 
@@ -36,18 +36,16 @@ Matrix = Sequence[Vector]
 Json = dict[str, Any]
 """A JSON object."""
 
-Thing = TypeVar("Thing")
-
 KEPT: list[Any] = []
 
 
-def keep(thing: Thing) -> Thing:
+def keep(thing: Any) -> Any:
     """An object of ufbx, which must not be freed."""
     KEPT.append(thing)
     return thing
 
 
-def each(things: Iterable[Thing]) -> list[Thing]:
+def each(things: Iterable[Any]) -> list[Any]:
     """The objects of one of ufbx's lists."""
     return [keep(thing) for thing in things]
 
@@ -62,19 +60,24 @@ def product(a: Matrix, b: Matrix) -> Matrix:
     return columns
 
 
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector at right angles to both."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
 def inverse(matrix: Matrix) -> Matrix:
     """The inverse; ValueError if singular."""
     x, y, z, origin = matrix
-    rows = [
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-        for a, b in ((y, z), (z, x), (x, y))
-    ]
+    # the rows of the inverse, but for their length (Cramer's rule)
+    rows = [cross(y, z), cross(z, x), cross(x, y)]
     volume = sum(a * b for a, b in zip(x, rows[0], strict=True))
     if not volume:
         raise ValueError("a bone's parent has a singular bind pose")
-    x_column, y_column, z_column = ([row[i] / volume for row in rows] for i in range(3))
+    linear = []
+    for column in zip(*rows, strict=True):
+        linear.append([number / volume for number in column])
     back = [*ufbx.identity_matrix[:3], [-number for number in origin]]
-    return product([x_column, y_column, z_column, [0.0, 0.0, 0.0]], back)
+    return product([*linear, [0.0, 0.0, 0.0]], back)
 
 
 def matrix_of(transform: Any) -> Matrix:
@@ -91,6 +94,20 @@ def matrix_of(transform: Any) -> Matrix:
     return [*columns, transform.translation]
 
 
+def _load(content: bytes) -> Any:
+    """The scene of a file, in metres, y up."""
+    return ufbx.load_memory(
+        content,
+        file_format=ufbx.FileFormat.FBX,
+        ignore_geometry=True,
+        ignore_embedded=True,
+        target_axes=ufbx.axes_right_handed_y_up,
+        target_unit_meters=1.0,
+        space_conversion=ufbx.SpaceConversion.ADJUST_TRANSFORMS,
+        inherit_mode_handling=ufbx.InheritModeHandling.COMPENSATE,
+    )
+
+
 class Scene:
     """A file's nodes without the root, parents first, and which of them are joints.
 
@@ -101,28 +118,22 @@ class Scene:
 
     def __init__(self, content: bytes) -> None:
         self.size = len(content)
-        self.scene = ufbx.load_memory(
-            content,
-            file_format=ufbx.FileFormat.FBX,
-            ignore_geometry=True,
-            ignore_embedded=True,
-            target_axes=ufbx.axes_right_handed_y_up,
-            target_unit_meters=1.0,
-            space_conversion=ufbx.SpaceConversion.ADJUST_TRANSFORMS,
-            inherit_mode_handling=ufbx.InheritModeHandling.COMPENSATE,
-        )
-        keep(self.scene)
+        self.scene = keep(_load(content))
         self.nodes = [node for node in each(self.scene.nodes) if not node.is_root]
         self.at = {node.typed_id: i for i, node in enumerate(self.nodes)}
         self.parents = [self.at.get(keep(node.parent).typed_id, -1) for node in self.nodes]
         self.bound: dict[int, Any] = {}
         self.skins = [self._skin(skin) for skin in each(self.scene.skin_deformers)]
         self.skins += self._bare(set().union(*self.skins))
-        self.near: set[int] = set().union(*self.skins)
+        self.near = self._above(set().union(*self.skins)) or set(self.at.values())
+
+    def _above(self, nodes: set[int]) -> set[int]:
+        """The nodes and all their ancestors."""
+        # children come after their parents, so from the last node on all ancestors are reached
         for i in reversed(range(len(self.parents))):
-            if i in self.near and self.parents[i] >= 0:
-                self.near.add(self.parents[i])
-        self.near = self.near or set(self.at.values())
+            if i in nodes and self.parents[i] >= 0:
+                nodes.add(self.parents[i])
+        return nodes
 
     def _skin(self, skin: Any) -> set[int]:
         bones = set()
@@ -223,13 +234,7 @@ def key_rate(curve: Any, highest: float) -> float:
 def as_gltf(scene: Scene, take: Take | None) -> Json:
     """The skeleton and a take of it, as a glTF document with its buffer embedded."""
     rest = scene.rest()
-    nodes: list[Json] = [{"name": node.name} for node in scene.nodes]
-    for i, node in enumerate(scene.nodes):
-        if i in scene.bound:
-            columns = zip(rest[i], (0, 0, 0, 1), strict=True)
-            nodes[i]["matrix"] = [number for column, last in columns for number in (*column, last)]
-        else:
-            nodes[i] |= {name: getattr(node.local_transform, name) for name in TRACK_TYPES}
+    nodes = [_node(scene, i, rest[i]) for i in range(len(scene.nodes))]
     for i, parent in enumerate(scene.parents):
         if parent >= 0:
             nodes[parent].setdefault("children", []).append(i)
@@ -239,35 +244,61 @@ def as_gltf(scene: Scene, take: Take | None) -> Json:
     return document if take is None else document | _animation(scene, take, rest)
 
 
+def _node(scene: Scene, i: int, rest: Matrix) -> Json:
+    """A node at rest: by its matrix, if a skin binds it there, or else by its own parts."""
+    node: Json = {"name": scene.nodes[i].name}
+    if i in scene.bound:
+        node["matrix"] = []
+        for column, last in zip(rest, (0, 0, 0, 1), strict=True):
+            node["matrix"] += [*column, last]
+        return node
+    transform = scene.nodes[i].local_transform
+    return node | {name: getattr(transform, name) for name in TRACK_TYPES}
+
+
 def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> Json:
+    """The parts of a document with a take's tracks, a key for each frame."""
     times = frame_times(scene, take)
     values = array("f", [time - times[0] for time in times])
     accessors = [{"bufferView": 0, "componentType": 5126, "count": len(times), "type": "SCALAR"}]
     channels: list[Json] = []
-    for node in sorted(scene.near):
-        poses = [ufbx.evaluate_transform(take.stack.anim, scene.nodes[node], time) for time in times]
-        if node not in take.moved and not any(_differ(matrix_of(pose), rest[node]) for pose in poses):
-            continue
+    for node, poses in _poses(scene, take, times, rest):
         for name, kind in TRACK_TYPES.items():
             channels.append({"sampler": len(channels), "target": {"node": node, "path": name}})
             accessors.append({**accessors[0], "byteOffset": 4 * len(values), "type": kind})
-            values.extend(number for pose in poses for number in getattr(pose, name))
+            for pose in poses:
+                values.extend(getattr(pose, name))
+    # the first accessor has the times, which all tracks share
+    samplers = [{"input": 0, "output": i} for i in range(1, len(accessors))]
+    animation = {"name": take.stack.name, "channels": channels, "samplers": samplers}
+    return {"animations": [animation], "accessors": accessors} | _embedded(values)
+
+
+def _poses(scene: Scene, take: Take, times: list[float], rest: list[Matrix]) -> Iterator[tuple[int, list[Any]]]:
+    """The nodes that a take moves, each with its transforms at the times of frames."""
+    for node in sorted(scene.near):
+        poses = [ufbx.evaluate_transform(take.stack.anim, scene.nodes[node], time) for time in times]
+        if node in take.moved or not _is_still(poses, rest[node]):
+            yield node, poses
+
+
+def _embedded(values: "array[float]") -> Json:
+    """The parts of a document with the values of its accessors."""
     if sys.byteorder == "big":
         values.byteswap()
-    data = base64.b64encode(values.tobytes()).decode()
-    samplers = [{"input": 0, "output": i} for i in range(1, len(accessors))]
-    return {
-        "animations": [{"name": take.stack.name, "channels": channels, "samplers": samplers}],
-        "accessors": accessors,
-        "bufferViews": [{"buffer": 0, "byteLength": 4 * len(values)}],
-        "buffers": [{"byteLength": 4 * len(values), "uri": f"data:application/octet-stream;base64,{data}"}],
-    }
+    content = values.tobytes()
+    uri = f"data:application/octet-stream;base64,{base64.b64encode(content).decode()}"
+    length = len(content)
+    return {"bufferViews": [{"buffer": 0, "byteLength": length}], "buffers": [{"byteLength": length, "uri": uri}]}
 
 
-def _differ(a: Matrix, b: Matrix) -> bool:
-    pairs = ((x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True))
-    # a node without curves gets samples if it is further than this from its rest
-    return any(abs(x - y) > 1e-5 * max(1.0, abs(y)) for x, y in pairs)
+def _is_still(poses: list[Any], rest: Matrix) -> bool:
+    """Whether a node without curves stays so near its rest that it needs no samples."""
+    for pose in poses:
+        numbers = zip(chain(*matrix_of(pose)), chain(*rest), strict=True)
+        if any(abs(x - y) > 1e-5 * max(1.0, abs(y)) for x, y in numbers):
+            return False
+    return True
 
 
 def main(number: int) -> Json:

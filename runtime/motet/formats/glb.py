@@ -32,6 +32,10 @@ VERTICES = 34962
 INDICES = 34963
 """glTF's buffer targets."""
 
+CODES = {dtype: code for code, dtype in COMPONENTS.items()}
+TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+"""glTF's numbers for dtypes, and its names for the shapes of an accessor's elements."""
+
 Track = tuple[int, str, Array]
 """A node's index, "rotation" or "translation", and quaternions (T, 4) or positions (T, 3); T = 1 if constant."""
 
@@ -56,9 +60,12 @@ class Buffer:
         view = {"buffer": 0, "byteOffset": len(self.content), "byteLength": content.nbytes}
         self.views.append(view | ({"target": target} if target else {}))
         self.content += content.tobytes() + bytes(-content.nbytes % 4)
-        kind = next(kind for kind, known in COMPONENTS.items() if known == dtype)
-        shape = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}[content.shape[1:]]
-        accessor = {"bufferView": len(self.views) - 1, "componentType": kind, "count": len(content), "type": shape}
+        accessor = {
+            "bufferView": len(self.views) - 1,
+            "componentType": CODES[dtype],
+            "count": len(content),
+            "type": TYPES[content.shape[1:]],
+        }
         if bounded:
             rows = content.reshape(len(content), -1)
             accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
@@ -82,7 +89,7 @@ def write(file: File, motion: Motion) -> None:
     inverse[:, :3, 3] = -_rest(skeleton)
     skin = {"joints": list(range(len(skeleton.joints))), "skeleton": 0}
     document = with_body(buffer, motion, skeleton, joint_nodes(skeleton), made, skin, inverse)
-    write_whole(file, container(document, bytes(buffer.content)))
+    write_whole(file, container(document, buffer.content))
 
 
 def with_body(
@@ -111,7 +118,7 @@ def with_body(
     }
 
 
-def container(document: Json, content: bytes) -> bytes:
+def container(document: Json, content: bytes | bytearray) -> bytes:
     """A GLB file of a JSON object and the binary part."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
@@ -169,21 +176,18 @@ def _rest(skeleton: Skeleton) -> Array:
     return rest
 
 
-def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> Json:
-    """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers.
+CORNERS = 10
+"""Of a bone's prism, around the bone."""
 
-    corners: how many each prism has around its bone.
-    """
+
+def _body(buffer: Buffer, skeleton: Skeleton) -> Json:
+    """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers."""
     body = Body(skeleton)
     points = body.points(_rest(skeleton) / body.height)
-    prisms = [_prism(bone, points[bone.start], points[bone.end], corners) for bone in body.bones]
+    prisms = [_prism(bone, points[bone.start], points[bone.end]) for bone in body.bones]
     places = np.concatenate([places for places, _ in prisms])
     normals = np.concatenate([normals for _, normals in prisms])
-    joints = np.zeros((len(places), 4))
-    joints[:, 0] = np.repeat([bone.carriers for bone in body.bones], corners + 1)
-    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * corners + 2, axis=0)
-    first_corners = (2 * corners + 2) * np.arange(len(body.bones))
-    triangles = _prism_triangles(corners) + first_corners[:, None]
+    joints, colours = _joints_and_colours(body)
     attributes = {
         "POSITION": buffer.add(places * body.height, target=VERTICES, bounded=True),
         "NORMAL": buffer.add(normals, target=VERTICES),
@@ -191,31 +195,42 @@ def _body(buffer: Buffer, skeleton: Skeleton, corners: int = 10) -> Json:
         "JOINTS_0": buffer.add(joints, "<u2", VERTICES),
         "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(places), 1)), target=VERTICES),
     }
-    return {"attributes": attributes, "indices": buffer.add(triangles.reshape(-1), "<u4", INDICES), "material": 0}
+    triangles = buffer.add(_triangles(len(prisms)), "<u4", INDICES)
+    return {"attributes": attributes, "indices": triangles, "material": 0}
 
 
-def _prism_triangles(corners: int) -> NDArray[np.int64]:
-    """The corners of a prism's triangles, counterclockwise from outside, three after three."""
-    near = np.arange(1, corners + 1)  # of the ring at the start
-    near_next = near % corners + 1
-    far = near + corners  # of the ring at the end
-    far_next = near_next + corners
+def _joints_and_colours(body: Body) -> tuple[Array, Array]:
+    """Of all prisms' corners the joints (N, 4) that move them, the first alone, and their colours (N, 3), 0 to 255."""
+    carriers = np.repeat([bone.carriers for bone in body.bones], CORNERS + 1)
+    joints = np.zeros((len(carriers), 4))
+    joints[:, 0] = carriers
+    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * CORNERS + 2, axis=0)
+    return joints, colours
+
+
+def _triangles(prisms: int) -> NDArray[Any]:
+    """The corners of all prisms' triangles, counterclockwise from outside, three after three."""
+    near = np.arange(1, CORNERS + 1)  # of the ring at the start
+    near_next = near % CORNERS + 1
+    far = near + CORNERS  # of the ring at the end
+    far_next = near_next + CORNERS
     first_tip = 0 * near
-    last_tip = first_tip + 2 * corners + 1
+    last_tip = first_tip + 2 * CORNERS + 1
     first_cap = (first_tip, near_next, near)
     side = ((near, near_next, far), (near_next, far_next, far))
     last_cap = (last_tip, far, far_next)
-    # from (part, corner, triangle) to triangle after triangle
-    triangles: NDArray[np.int64] = np.array([first_cap, *side, last_cap]).swapaxes(1, 2).reshape(-1)
-    return triangles
+    # from (part, corner, triangle) to triangle after triangle, and from one prism to all
+    triangles = np.array([first_cap, *side, last_cap]).swapaxes(1, 2).reshape(-1)
+    first_corners = (2 * CORNERS + 2) * np.arange(prisms)[:, None]
+    return (triangles + first_corners).reshape(-1)
 
 
-def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, Array]:
-    """Corners and normals (2 * corners + 2, 3): tip and ring at the start, ring and tip at the end."""
+def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
+    """Corners and normals (2 * CORNERS + 2, 3): tip and ring at the start, ring and tip at the end."""
     axis = end - start
     length = float(np.linalg.norm(axis))
     axis = axis / length if length else np.array([0.0, 1.0, 0.0])
-    ring = _ring(axis, corners)
+    ring = _ring(axis)
     near = start + bone.start_radius * ring
     far = end + bone.end_radius * ring
     near_tip = start - 0.7 * bone.start_radius * axis
@@ -223,12 +238,12 @@ def _prism(bone: Bone, start: Array, end: Array, corners: int) -> tuple[Array, A
     return np.array([near_tip, *near, *far, far_tip]), np.array([-axis, *ring, *ring, axis])
 
 
-def _ring(axis: Array, corners: int) -> Array:
-    """Points (corners, 3) of a circle of radius 1 about an axis."""
+def _ring(axis: Array) -> Array:
+    """Points (CORNERS, 3) of a circle of radius 1 about an axis."""
     # any direction across the axis: from the coordinate along which it is shortest
     side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     side /= np.linalg.norm(side)
-    angles = np.arange(corners)[:, None] * 2 * np.pi / corners
+    angles = np.arange(CORNERS)[:, None] * 2 * np.pi / CORNERS
     ring: Array = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
     return ring
 
@@ -256,12 +271,8 @@ def write_vrma(file: File, motion: Motion) -> None:
     motion = grounded(on_humanoid(motion))
     buffer = Buffer()
     extension = "VRMC_vrm_animation"
-    fingers = range(len(HUMANOID.names), len(VRMA_SKELETON.names))
-    still = np.broadcast_to(np.eye(3), (len(VRMA_SKELETON.names), 3, 3))
-    turned = relaxed(VRMA_SKELETON, still, VRMA_SKELETON.places)
-    hands = ((joint, "rotation", rotmat_to_quat(turned[joint : joint + 1])) for joint in fingers)
-    named = (*BONES, *(VRMA_SKELETON.names[joint] for joint in fingers))
-    bones = {bone: {"node": VRMA_SKELETON.index(bone)} for bone in named}
+    fingers = VRMA_SKELETON.names[len(HUMANOID.names) :]
+    bones = {bone: {"node": VRMA_SKELETON.index(bone)} for bone in (*BONES, *fingers)}
     document: Json = {
         "asset": {"version": "2.0", "generator": "motet"},
         "extensionsUsed": [extension],
@@ -269,7 +280,16 @@ def write_vrma(file: File, motion: Motion) -> None:
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": joint_nodes(VRMA_SKELETON),
-        "animations": [animation(buffer, "motion", motion, (*joint_tracks(motion, HUMANOID), *hands))],
+        "animations": [animation(buffer, "motion", motion, (*joint_tracks(motion, HUMANOID), *_hand_tracks()))],
         **buffer.parts(),
     }
-    write_whole(file, container(document, bytes(buffer.content)))
+    write_whole(file, container(document, buffer.content))
+
+
+def _hand_tracks() -> Iterator[Track]:
+    """The tracks of the fingers, relaxed and still."""
+    joints = len(VRMA_SKELETON.names)
+    still = np.broadcast_to(np.eye(3), (joints, 3, 3))
+    turned = relaxed(VRMA_SKELETON, still, VRMA_SKELETON.places)
+    for joint in range(len(HUMANOID.names), joints):
+        yield joint, "rotation", rotmat_to_quat(turned[joint : joint + 1])

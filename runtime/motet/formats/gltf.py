@@ -9,11 +9,12 @@ pose of the file's nodes, with all rotations removed: every angle 0 is that pose
 """
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motet.errors import FormatError, MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
@@ -242,6 +243,11 @@ def skeleton_at(names: Sequence[str], parents: Sequence[int], places: Array) -> 
     return Skeleton(joints, metres_per_unit=1.0)
 
 
+def at_rest(skeleton: Skeleton) -> Motion:
+    """One frame with every angle 0."""
+    return Motion(np.zeros((1, 0)), (), (), 30.0, skeleton)
+
+
 def _moving(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]:
     """Translations (T, 3) in their parents' frames: of the root, and of joints that leave their offset."""
     moving = {0: places[:, 0]}
@@ -262,9 +268,9 @@ def figures(gltf: Gltf, moved: NodeSet) -> list[NodeSet]:
     humanoid = set(gltf.humanoid().values())
     sets = [humanoid, *_skins(gltf)]
     joints_of_all = set().union(*sets)
-    if unknown := joints_of_all - set(range(len(gltf.parents))):
+    if unknown := joints_of_all.difference(range(len(gltf.parents))):
         raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, unknown)))}")
-    roots = _heads(gltf, {node for node, parent in enumerate(gltf.parents) if parent < 0})
+    roots = _roots(gltf)
     animated = _animated(gltf, moved, roots)
     if not joints_of_all:
         if not animated:
@@ -274,8 +280,7 @@ def figures(gltf: Gltf, moved: NodeSet) -> list[NodeSet]:
     if humanoid:
         return [joints for joints in groups if joints & humanoid]
     # animated nodes beyond the skins' count where only both together are a human's
-    all_are_skinned = not animated - above(gltf, set().union(*groups))
-    if all_are_skinned or _humans(gltf, groups):
+    if animated <= above(gltf, set().union(*groups)) or _humans(gltf, groups):
         return groups
     return _humans(gltf, _grouped(gltf, [*sets, animated], moved, roots)) or groups
 
@@ -323,7 +328,7 @@ def _humans(gltf: Gltf, groups: list[NodeSet]) -> list[NodeSet]:
         try:
             figure = figure_of(gltf, joints)
             skeleton = skeleton_at(figure.names, figure.parents, places[0, list(figure.nodes)])
-            map_of(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton))
+            map_of(at_rest(skeleton))
         except (FormatError, MotionError):
             continue
         humans.append(joints)
@@ -357,6 +362,11 @@ def _heads(gltf: Gltf, among: NodeSet) -> dict[int, int]:
         elif node in among:
             heads[node] = node
     return heads
+
+
+def _roots(gltf: Gltf) -> dict[int, int]:
+    """The root of the tree that each node is in."""
+    return _heads(gltf, {node for node, parent in enumerate(gltf.parents) if parent < 0})
 
 
 def _top(gltf: Gltf, part: NodeSet) -> int:
@@ -394,12 +404,7 @@ def figure_of(gltf: Gltf, joints: NodeSet) -> Figure:
     """The joints and the nodes between them, with the ends attached to them, by motet's and Blender's naming."""
     over = above(gltf, [gltf.parents[_top(gltf, joints)]])
     inside = above(gltf, joints) - over
-    ends = set()
-    for node, properties in enumerate(gltf.objects("nodes")):
-        is_end = str(properties.get("name", "")).endswith(END_SUFFIX) and not properties.get("children")
-        if is_end and gltf.parents[node] in inside:
-            ends.add(node)
-    nodes = tuple(node for node in gltf.order if node in inside or node in ends)
+    nodes = tuple(node for node in gltf.order if node in inside or _is_end(gltf, node, inside))
     if len(nodes) > MAX_JOINTS:
         raise FormatError(gltf.path, f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
     index_of = {node: i for i, node in enumerate(nodes)}
@@ -409,16 +414,39 @@ def figure_of(gltf: Gltf, joints: NodeSet) -> Figure:
     return Figure(nodes, parents, names)
 
 
+def _is_end(gltf: Gltf, node: int, inside: NodeSet) -> bool:
+    """Whether a node marks the end of one of a skeleton's nodes, by its name."""
+    properties = gltf.objects("nodes")[node]
+    is_named = str(properties.get("name", "")).endswith(END_SUFFIX)
+    return is_named and not properties.get("children") and gltf.parents[node] in inside
+
+
 def moved(animation: Json) -> NodeSet:
     """The nodes that an animation moves."""
-    targets = [channel["target"] for channel in animation.get("channels", [])]
-    return {target["node"] for target in targets if target.get("path") in REST and target.get("node") is not None}
+    return {node for _, node, _ in _channels(animation)}
+
+
+def _channels(animation: Json) -> Iterator[tuple[Json, int, str]]:
+    """The channels of an animation that move nodes, each with the node and the part of its transform."""
+    for channel in animation.get("channels", []):
+        node = channel["target"].get("node")
+        path = channel["target"].get("path")
+        if path in REST and node is not None:
+            yield channel, node, path
 
 
 def _tracks(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> tuple[Tracks, float]:
     """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
     keys = _keys(gltf, animation, name, nodes)
-    times_of_tracks = [times for times, _, _ in keys.values()]
+    frame_times, fps = _frame_times(gltf, name, [times for times, _, _ in keys.values()])
+    tracks = {}
+    for (node, path), (times, values, interpolation) in keys.items():
+        tracks[node, path] = _sampled(times, values, interpolation, frame_times, path)
+    return tracks, fps
+
+
+def _frame_times(gltf: Gltf, name: str, times_of_tracks: list[Array]) -> tuple[Array, float]:
+    """The times (T,) of an animation's frames by the times (K,) of its tracks' keys, and its frame rate."""
     if not all(map(len, times_of_tracks)):
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
     start = min(times[0] for times in times_of_tracks)
@@ -429,11 +457,7 @@ def _tracks(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> tuple[Tra
     count = (end - start) * fps + 1
     if not count * len(gltf.objects("nodes")) < most_poses(gltf.size):
         raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
-    frame_times = start + np.arange(round(count)) / fps
-    tracks = {}
-    for (node, path), (times, values, interpolation) in keys.items():
-        tracks[node, path] = _sampled(times, values, interpolation, frame_times, path)
-    return tracks, fps
+    return start + np.arange(round(count)) / fps, fps
 
 
 Keys = dict[tuple[int, str], tuple[Array, Array, str]]
@@ -444,10 +468,8 @@ def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
     """The keys of some nodes; FormatError where times and values differ in number."""
     samplers = animation.get("samplers", [])
     keys: Keys = {}
-    for channel in animation.get("channels", []):
-        node = channel["target"].get("node")
-        path = channel["target"].get("path")
-        if node not in nodes or path not in REST:
+    for channel, node, path in _channels(animation):
+        if node not in nodes:
             continue
         sampler = samplers[channel["sampler"]]
         times = gltf.array(sampler["input"])
@@ -497,10 +519,7 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
     Beyond the first and last key the value stays (glTF 2.0, section 3.11 and appendix C).
     """
     values = values.reshape(len(times), -1, len(REST[name]))  # a key of a spline: in-tangent, value, out-tangent
-    # the keys around each frame, and how far between them it is
-    before = np.searchsorted(times, frames + 1e-6, side="right") - 1
-    before = np.clip(before, 0, max(len(times) - 2, 0))
-    after = np.minimum(before + 1, len(times) - 1)
+    before, after = _keys_around(times, frames)
     span = np.maximum(times[after] - times[before], 1e-9)[:, None]
     share = np.clip((frames - times[before])[:, None] / span, 0, 1)
     if kind == "CUBICSPLINE":
@@ -514,6 +533,13 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
         return _on_great_circle(low, high, share)
     between: Array = low + share * (high - low)
     return between
+
+
+def _keys_around(times: Array, frames: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The keys (T,) at or before the times of frames (T,), and those after them; of a single key this one."""
+    before = np.searchsorted(times, frames + 1e-6, side="right") - 1
+    before = np.clip(before, 0, max(len(times) - 2, 0))
+    return before, np.minimum(before + 1, len(times) - 1)
 
 
 def _on_spline(before: Array, after: Array, span: Array, share: Array) -> Array:

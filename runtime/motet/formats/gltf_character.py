@@ -18,7 +18,7 @@ from motet.figures.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.files import File, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
-from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
+from motet.formats.gltf import at_rest, figure_of, figures, likeliest, moved, skeleton_at
 from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, Json, broken, parse, read_beside
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion
@@ -36,6 +36,13 @@ MAX_PRIMITIVES = 50_000
 
 PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp", b"\xabKTX": "image/ktx2"}
 """How the pictures of glTF begin, and their media types."""
+
+
+Primitive = tuple[int, dict[str, int], int | None]
+"""The node of a primitive of a mesh, its attributes, and its skin if it has one."""
+
+Skinned = tuple[Array, NDArray[np.intp]]
+"""Points (P, 3) in the world at rest, and the joint (P,) of each, -1 for none."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +126,7 @@ def read_character(file: File) -> Character:
         if not np.abs(np.linalg.det(linear[joints])).min() > 0:
             raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
         nodes = Nodes(gltf, figure.nodes, skeleton, linear, places)
-        return Character(Motion(np.zeros((1, 0)), (), (), 30.0, skeleton), _joint_map(nodes), nodes, _skin(nodes))
+        return Character(at_rest(skeleton), _joint_map(nodes), nodes, _skin(nodes))
 
 
 def _joint_map(nodes: Nodes) -> JointMap | None:
@@ -149,19 +156,24 @@ def _skin(nodes: Nodes) -> dict[int, Array]:
         return {}
     points = np.concatenate([points for points, _ in parts])
     owners = np.concatenate([owners for _, owners in parts])
-    # 200 directions, spread evenly by the golden angle; the outermost point in each is kept
+    hulls = {}
+    for joint in np.unique(owners[owners >= 0]).tolist():
+        hulls[joint] = _outermost(points[owners == joint] - nodes.places[nodes.joints[joint]])
+    return hulls
+
+
+def _outermost(points: Array) -> Array:
+    """Those of points (P, 3) that are furthest out in some direction."""
+    # 200 directions, spread evenly by the golden angle
     height = 1 - (2 * np.arange(200) + 1) / 200
     angle = np.arange(200) * np.pi * (3 - 5**0.5)
     radius = np.sqrt(1 - height**2)
     directions = np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
-    hulls = {}
-    for joint in np.unique(owners[owners >= 0]).tolist():
-        from_joint = points[owners == joint] - nodes.places[nodes.joints[joint]]
-        hulls[joint] = from_joint[np.unique(np.argmax(from_joint @ directions.T, axis=0))]
-    return hulls
+    outermost: Array = points[np.unique(np.argmax(points @ directions.T, axis=0))]
+    return outermost
 
 
-def _meshes(nodes: Nodes) -> Iterator[tuple[Array, NDArray[np.intp]]]:
+def _meshes(nodes: Nodes) -> Iterator[Skinned]:
     """The points (P, 3) of all meshes in the world at rest, and the joint of each, -1 for none."""
     gltf = nodes.gltf
     for node, attributes, skin in _primitives(gltf):
@@ -174,22 +186,15 @@ def _meshes(nodes: Nodes) -> Iterator[tuple[Array, NDArray[np.intp]]]:
             yield _skinned(nodes, gltf.objects("skins")[skin], points, joints, weights)
 
 
-def _primitives(gltf: Gltf) -> list[tuple[int, dict[str, int], int | None]]:
-    """The node, attributes and skin of all primitives of meshes, each that a skin moves once, since it is where its
-    joints are, whatever node has it. FormatError, before anything is computed, where these are too many points."""
-    primitives: dict[tuple[object, ...], tuple[int, dict[str, int], int | None]] = {}
-    visited = 0
-    for node in gltf.order:
-        properties = gltf.objects("nodes")[node]
-        listed = gltf.objects("meshes")[properties["mesh"]]["primitives"] if "mesh" in properties else []
-        visited += len(listed)
-        if visited > MAX_PRIMITIVES:
-            raise FormatError(gltf.path, f"its nodes have more than {MAX_PRIMITIVES} primitives of meshes")
-        for primitive in listed:
-            attributes = primitive["attributes"]
-            skin = properties.get("skin") if "JOINTS_0" in attributes else None
-            place = node if skin is None else (skin, attributes["JOINTS_0"], attributes["WEIGHTS_0"])
-            primitives[place, attributes["POSITION"]] = (node, attributes, skin)
+def _primitives(gltf: Gltf) -> list[Primitive]:
+    """All primitives of meshes, each that a skin moves once, since it is where its joints are, whatever node has it.
+    FormatError, before anything is computed, where these are too many points."""
+    primitives: dict[tuple[object, ...], Primitive] = {}
+    for node, primitive in _placed_primitives(gltf):
+        attributes = primitive["attributes"]
+        skin = gltf.objects("nodes")[node].get("skin") if "JOINTS_0" in attributes else None
+        place = node if skin is None else (skin, attributes["JOINTS_0"], attributes["WEIGHTS_0"])
+        primitives[place, attributes["POSITION"]] = (node, attributes, skin)
     accessors = gltf.objects("accessors")
     points = sum(accessors[attributes["POSITION"]]["count"] for _, attributes, _ in primitives.values())
     if points > MAX_POINTS:
@@ -197,22 +202,43 @@ def _primitives(gltf: Gltf) -> list[tuple[int, dict[str, int], int | None]]:
     return list(primitives.values())
 
 
-def _skinned(
-    nodes: Nodes, skin: Json, points: Array, joints: NDArray[np.intp], weights: Array
-) -> tuple[Array, NDArray[np.intp]]:
+def _placed_primitives(gltf: Gltf) -> Iterator[tuple[int, Json]]:
+    """The nodes with meshes, with each primitive of these; FormatError for too many."""
+    visited = 0
+    for node in gltf.order:
+        properties = gltf.objects("nodes")[node]
+        if "mesh" not in properties:
+            continue
+        primitives = gltf.objects("meshes")[properties["mesh"]]["primitives"]
+        visited += len(primitives)
+        if visited > MAX_PRIMITIVES:
+            raise FormatError(gltf.path, f"its nodes have more than {MAX_PRIMITIVES} primitives of meshes")
+        for primitive in primitives:
+            yield node, primitive
+
+
+def _skinned(nodes: Nodes, skin: Json, points: Array, joints: NDArray[np.intp], weights: Array) -> Skinned:
     """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
+    linear, places = _bound(nodes, skin)
+    moved = np.zeros(points.shape)
+    for joint, weight in zip(joints.T, weights.T, strict=True):
+        moved += weight[:, None] * (rotated(linear[joint], points) + places[joint])
+    moved /= np.maximum(weights.sum(axis=1), 1e-9)[:, None]
+    owners = np.array([nodes.carrier(node) for node in skin["joints"]])
+    heaviest = joints[np.arange(len(joints)), np.argmax(weights, axis=1)]
+    return moved, owners[heaviest]
+
+
+def _bound(nodes: Nodes, skin: Json) -> tuple[Array, Array]:
+    """The linear maps (J, 3, 3) and translations (J, 3) by which a skin's joints move points from where they were
+    bound."""
     linear = nodes.linear[skin["joints"]]
     places = nodes.places[skin["joints"]]
     if "inverseBindMatrices" in skin:
         bind = np.swapaxes(nodes.gltf.array(skin["inverseBindMatrices"]).reshape(-1, 4, 4), 1, 2)[: len(linear)]
         places = rotated(linear, bind[:, :3, 3]) + places
         linear = linear @ bind[:, :3, :3]
-    moved = np.zeros(points.shape)
-    for joint, weight in zip(joints.T, weights.T, strict=True):
-        moved += weight[:, None] * (rotated(linear[joint], points) + places[joint])
-    moved /= np.maximum(weights.sum(axis=1), 1e-9)[:, None]
-    owners = np.array([nodes.carrier(node) for node in skin["joints"]])
-    return moved, owners[joints[np.arange(len(joints)), np.argmax(weights, axis=1)]]
+    return linear, places
 
 
 def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
@@ -227,19 +253,26 @@ def write_onto(file: File, clips: Mapping[str, Motion], nodes: Nodes) -> None:
     if place_of(file).suffix.lower() == ".vrm" and not gltf.humanoid():
         raise FormatError(gltf.path, "not a VRM avatar: write it to a .glb")
     with broken(gltf.path):
-        buffers = _embedded_buffers(gltf)
-        images = _embedded_images(gltf)
-        buffer = Buffer(gltf.document, gltf.buffers[0] if buffers else b"")
-        made = [animation(buffer, name, motion, nodes.tracks(motion)) for name, motion in clips.items()]
-        kept = [old for old in gltf.objects("animations") if old.get("name") not in clips]
-        first = {**(buffers[0] if buffers else {}), "byteLength": len(buffer.content)}
-        document = {**gltf.document, **buffer.parts(), "buffers": [first, *buffers[1:]]}
-        document["nodes"] = _turnable_nodes(nodes, made)
-        document["animations"] = made + kept
-        if images:
-            document["images"] = images
-        content = container(document, bytes(buffer.content))
+        content = _with_animations(nodes, clips)
     write_whole(file, content)
+
+
+def _with_animations(nodes: Nodes, clips: Mapping[str, Motion]) -> bytes:
+    """The character's file with an animation for each motion."""
+    gltf = nodes.gltf
+    first, *others = _embedded_buffers(gltf) or [{}]
+    images = _embedded_images(gltf)
+    # the arrays of the animations go behind what is in the first buffer
+    buffer = Buffer(gltf.document, gltf.buffers[0] if gltf.buffers else b"")
+    made = [animation(buffer, name, motion, nodes.tracks(motion)) for name, motion in clips.items()]
+    kept = [old for old in gltf.objects("animations") if old.get("name") not in clips]
+    first["byteLength"] = len(buffer.content)
+    document = {**gltf.document, **buffer.parts(), "buffers": [first, *others]}
+    document["nodes"] = _turnable_nodes(nodes, made)
+    document["animations"] = made + kept
+    if images:
+        document["images"] = images
+    return container(document, buffer.content)
 
 
 def _turnable_nodes(nodes: Nodes, animations: Sequence[Json]) -> list[Json]:
@@ -296,24 +329,27 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
     MotionError and OutputError like :func:`write_onto`.
     """
     gltf = nodes.gltf
-    buffer = Buffer()
-    if not any(gltf.objects("nodes")[node].get("name") for node in nodes.joints):
+    joints = list(nodes.joints)
+    if not any(gltf.objects("nodes")[node].get("name") for node in joints):
         remedy = "which writes the character itself"
         log.warning("%s: its nodes have no names, by which a clip plays: use --onto (onto=), %s", gltf.path, remedy)
-    # the joints and what they hang on, by their new numbers
-    kept = list(nodes.joints)
-    while gltf.parents[kept[0]] >= 0:
-        kept.insert(0, gltf.parents[kept[0]])
-    number_of = {node: number for number, node in enumerate(kept)}
-    clip = animation(buffer, "motion", motion, nodes.tracks(motion))
-    for channel in clip["channels"]:
-        channel["target"]["node"] = number_of[channel["target"]["node"]]
-    joints = list(nodes.joints)
+    number_of = _numbers_in_clip(nodes)
+    buffer = Buffer()
+    tracks = ((number_of[node], path, values) for node, path, values in nodes.tracks(motion))
+    clip = animation(buffer, "motion", motion, tracks)
     skin = {"joints": [number_of[node] for node in joints]}
     inverse_bind = _inverse_bind(nodes.linear[joints], nodes.places[joints])
     bare = _bare_nodes(nodes, number_of)
     document = with_body(buffer, motion, nodes.skeleton, bare, clip, skin, inverse_bind)
-    write_whole(file, container(document, bytes(buffer.content)))
+    write_whole(file, container(document, buffer.content))
+
+
+def _numbers_in_clip(nodes: Nodes) -> dict[int, int]:
+    """The numbers in the clip's file of the joints' nodes and of what they hang on, which comes first."""
+    kept = list(nodes.joints)
+    while (parent := nodes.gltf.parents[kept[0]]) >= 0:
+        kept.insert(0, parent)
+    return {node: number for number, node in enumerate(kept)}
 
 
 def _bare_nodes(nodes: Nodes, number_of: Mapping[int, int]) -> list[Json]:
