@@ -1,17 +1,19 @@
 """What representations offer, and what they share: mirroring by columns, down-sampling in phases, rest."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError
-from motet.motion.kinematics import AXES, skeleton_of
+from motet.motion.kinematics import channels_of, skeleton_of
 from motet.motion.mirroring import lateral_axis
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, is_whole
+from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, partners_of
 
 
@@ -64,15 +66,24 @@ def phases(motion: Motion, fps: float) -> Iterator[Motion]:
     gives one. The first one begins with the motion.
     """
     ratio = motion.fps / fps
-    count = round(ratio) if abs(ratio - round(ratio)) < 1e-9 else 1
     smooth = motion.continuous()
-    return (smooth[offset:].resample(fps) for offset in range(max(1, count)))
+    return (smooth[offset:].resample(fps) for offset in range(round(ratio) if is_whole(ratio) else 1))
 
 
 def root_signs(channels: Sequence[str]) -> NDArray[np.float32]:
     """The signs (D,) by which channels of the root change in a mirror image; 1 for all others."""
     turned = ("root.left", "root.turn", "root.roll")
     return np.array([-1.0 if name in turned else 1.0 for name in channels], dtype=np.float32)
+
+
+def joint_channels(joints: Iterable[str], kinds: Sequence[str]) -> tuple[str, ...]:
+    """The channels of these kinds of joints, one joint after the other."""
+    return tuple(f"{joint}.{kind}" for joint, kind in product(joints, kinds))
+
+
+def root_places(motion: Motion) -> Array:
+    """The places (T, 3) in metres of the root; MotionError where its channels or the unit of length are missing."""
+    return motion.select(channels_of(skeleton_of(motion).names[0], "t"), ("m",) * 3).values
 
 
 def joints_with(channels: Sequence[str], kind: str) -> tuple[str, ...]:
@@ -105,9 +116,9 @@ def lateral_x(features: Motion) -> Skeleton:
 def at_rest(features: Motion, joints: Sequence[str]) -> Motion:
     """One frame of the features' figure at rest at the origin: the root's place and Euler angles of some joints."""
     skeleton = skeleton_of(features)
-    channels = [f"{skeleton.names[0]}.t{axis}" for axis in AXES] + [f"{name}.r{a}" for name in joints for a in AXES]
+    channels = channels_of(skeleton.names[0], "t") + joint_channels(joints, ("rx", "ry", "rz"))
     units = ("length",) * 3 + ("deg",) * (3 * len(joints))
-    return Motion(np.zeros((1, len(channels))), tuple(channels), units, features.fps, skeleton)
+    return Motion(np.zeros((1, len(channels))), channels, units, features.fps, skeleton)
 
 
 def in_units(motion: Motion, change: Callable[[str], str]) -> Motion:

@@ -10,7 +10,7 @@ x and its y axis point in its parent's frame (:mod:`motet.representation.root_si
 import numpy as np
 
 from motet.figures.humanoid import BONES
-from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
+from motet.motion.kinematics import channels_of, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.motion.skeleton import partners_of
@@ -28,7 +28,7 @@ def placed(motion: Motion) -> Array:
     """A motion on the humanoid as placed frames (T, E); MotionError where it does not say where the hips are."""
     skeleton = skeleton_of(motion)
     turned = local_rotations(motion, [skeleton.index(name) for name in BONES])
-    root = motion.select(tuple(f"{BONES[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
+    root = motion.select(channels_of(BONES[0], "t"), ("m",) * 3).values
     return np.column_stack([root, rotmat_to_sixd(np.ascontiguousarray(turned)).reshape(len(motion), -1)])
 
 
@@ -38,15 +38,15 @@ def placed_by_way(frames: Array, fps: float) -> Array:
     steps[..., :1, :] = 0
     forward, left, turn = np.moveaxis(steps, -1, 0)
 
-    # each step is taken in the facing before it
+    # each step is taken in the facing before it: they add up to the path, and the height is as it is
     facing = np.cumsum(turn, axis=-1)
-    sin = np.sin(facing - turn)
-    cos = np.cos(facing - turn)
-    placed_frames = np.empty((*frames.shape[:-1], frames.shape[-1] - 1))
-    placed_frames[..., 0] = np.cumsum(forward * sin + left * cos, axis=-1)
-    placed_frames[..., 1] = frames[..., ROOT_PLACE]
-    placed_frames[..., 2] = np.cumsum(forward * cos - left * sin, axis=-1)
-    placed_frames[..., ROOT_PLACE:] = frames[..., len(ROOT_SIXD) :]
+    moves = np.stack([left, np.zeros(left.shape), forward], axis=-1)
+    _turn(moves, facing - turn)
+    path = np.cumsum(moves, axis=-2)
+    path[..., 1] = frames[..., ROOT_PLACE]
+
+    # the hips are turned from the facing to the world; all other bones are seen from their parents
+    placed_frames = np.concatenate([path, frames[..., len(ROOT_SIXD) :]], axis=-1)
     _turn(placed_frames[..., ROOT_PLACE : ROOT_PLACE + 6], facing)
     return placed_frames
 
@@ -84,28 +84,32 @@ def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
     Joints turn the shortest way at an even speed (slerp); the root goes on a cubic Hermite curve that leaves and
     arrives with the velocities it has there. pace: frames of the gap per frame of the past.
     """
-    part = (np.arange(1, count + 1) / (count + 1))[:, None]
-    start = past[..., -1:, :]
-    end = after[..., :1, :]
-    frames = np.empty((*past.shape[:-2], count, past.shape[-1]))
-
-    # the root's place: a Hermite curve between the velocities at both ends
+    part = _parts(count)
+    start = past[..., -1:, :ROOT_PLACE]
+    end = after[..., :1, :ROOT_PLACE]
     leaves = _root_velocity(past[..., -4:, :ROOT_PLACE])
     arrives = _root_velocity(after[..., :4, :ROOT_PLACE])
     span = (count + 1) * pace
-    frames[..., :ROOT_PLACE] = (
-        (1 + 2 * part) * (1 - part) ** 2 * start[..., :ROOT_PLACE]
+    path = (
+        (1 + 2 * part) * (1 - part) ** 2 * start
         + part * (1 - part) ** 2 * span * leaves
-        + part**2 * (3 - 2 * part) * end[..., :ROOT_PLACE]
+        + part**2 * (3 - 2 * part) * end
         - part**2 * (1 - part) * span * arrives
     )
+    return np.concatenate([path, _axes_between(past, after, part)], axis=-1)
 
-    # the joints: the shortest turn from one end to the other
-    rotations = _rotations(start)
-    turns = rotmat_to_rotvec(product(inverse(rotations), _rotations(end))) * part[..., None]
-    axes = rotmat_to_sixd(np.matmul(rotations, rotvec_to_rotmat(turns)))
-    frames[..., ROOT_PLACE:] = axes.reshape(*frames.shape[:-1], frames.shape[-1] - ROOT_PLACE)
-    return frames
+
+def straight(past: Array, after: Array, count: int) -> Array:
+    """As :func:`bridge`, the root on a line at an even speed: the plainest interpolation."""
+    part = _parts(count)
+    start = past[..., -1:, :ROOT_PLACE]
+    path = start + part * (after[..., :1, :ROOT_PLACE] - start)
+    return np.concatenate([path, _axes_between(past, after, part)], axis=-1)
+
+
+def _parts(count: int) -> Array:
+    """Which part of the way (count, 1) each of the frames between two has behind it."""
+    return np.asarray((np.arange(1, count + 1) / (count + 1))[:, None])
 
 
 def _root_velocity(places: Array) -> Array:
@@ -113,14 +117,13 @@ def _root_velocity(places: Array) -> Array:
     return np.asarray((places[..., -1:, :] - places[..., :1, :]) / max(1, places.shape[-2] - 1))
 
 
-def straight(past: Array, after: Array, count: int) -> Array:
-    """As :func:`bridge`, the root on a line at an even speed: the plainest interpolation."""
-    part = (np.arange(1, count + 1) / (count + 1))[:, None]
-    frames = bridge(past, after, count)
-    start = past[..., -1:, :ROOT_PLACE]
-    end = after[..., :1, :ROOT_PLACE]
-    frames[..., :ROOT_PLACE] = start + part * (end - start)
-    return frames
+def _axes_between(past: Array, after: Array, part: Array) -> Array:
+    """Axes (..., T, 6 K) of bones that turn the shortest way from the last of frames (..., P, E) to the first of
+    (..., A, E), of which they have parts (T, 1) behind them (slerp)."""
+    rotations = _rotations(past[..., -1:, :])
+    turns = rotmat_to_rotvec(product(inverse(rotations), _rotations(after[..., :1, :]))) * part[..., None]
+    axes = rotmat_to_sixd(np.matmul(rotations, rotvec_to_rotmat(turns)))
+    return axes.reshape(*axes.shape[:-2], -1)
 
 
 def unplaced(frames: Array, after: Motion) -> Motion:

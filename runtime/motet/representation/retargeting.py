@@ -10,10 +10,12 @@ import numpy as np
 from motet.errors import MotionError, UnitError, listed
 from motet.figures.humanoid import HUMANOID, Figure, from_humanoid, is_mmm, map_of, on_humanoid, unit_by_legs
 from motet.motion.kinematics import (
-    AXES,
+    by_name,
+    channels_of,
     continued,
     euler_of,
     eulers_of,
+    has_channels,
     local_rotations,
     local_translations,
     skeleton_of,
@@ -125,14 +127,21 @@ def to_model_figure(motion: Motion, pose: Motion, reason: str, figure: Figure | 
         raise
     except MotionError as error:
         raise MotionError(f"{error}; and it cannot be used as it is: {reason}") from error
+    # joints that the humanoid says nothing of stay at rest on the way, but for rounding
     for name in frozenset(on_model.rotation_columns()).difference(skeleton.names[:1], *bones):
-        if np.abs(on_model.values[:, on_model.rotation_columns()[name]]).max(initial=0) > 1e-6:  # degrees, of rounding
-            continue
-        place = skeleton.index(name)
-        angles = np.degrees(euler_of(local_rotations(pose, [place])[:, 0], skeleton.joints[place]))
-        channels = tuple(f"{name}.r{axis}" for axis in AXES)
-        on_model = with_channels(on_model, channels, np.repeat(angles, len(on_model), axis=0), ("deg",) * 3)
+        degrees = on_model.values[:, on_model.rotation_columns()[name]]
+        if np.abs(degrees).max(initial=0) <= 1e-6:
+            angles = _angles_of(pose, name)
+            held = np.repeat(angles, len(on_model), axis=0)
+            on_model = with_channels(on_model, channels_of(name, "r"), held, ("deg",) * 3)
     return on_model
+
+
+def _angles_of(pose: Motion, name: str) -> Array:
+    """The angles (1, 3) in degrees of a joint in a pose of one frame."""
+    skeleton = skeleton_of(pose)
+    place = skeleton.index(name)
+    return np.degrees(euler_of(local_rotations(pose, [place])[:, 0], skeleton.joints[place]))
 
 
 def from_model_figure(generated: Motion, motion: Motion, ends: Motion, figure: Figure | None = None) -> Motion | None:
@@ -149,31 +158,43 @@ def from_model_figure(generated: Motion, motion: Motion, ends: Motion, figure: F
     if motion.skeleton is None:
         log.info("the new frames use the model's figure: the file has no skeleton")
         return None
-    skeleton = motion.skeleton
     back = generated
-    if generated.skeleton != skeleton:
+    if generated.skeleton != motion.skeleton:
         back = from_humanoid(on_humanoid(generated), figure or motion)
 
-    # what each joint's rotation and translation lack at the ends
-    at_ends = [0, -1][: len(ends)]
+    # what each joint's rotation lacks at the ends
     rotations = local_rotations(back)
-    translations = local_translations(back)
-    turns = product(inverse(rotations[at_ends]), local_rotations(ends))
-    offsets = local_translations(ends) - translations[at_ends]
+    turns = product(inverse(_ends_of(rotations, ends)), local_rotations(ends))
     if not _same_world(back, motion, turns):
         log.info("the new frames use the model's figure: the file's own turns or moves its hips in another way")
         return None
 
-    # is added to all frames, from one end to the other
+    # is added to all frames, from one end to the other, and so is what its translation lacks
     part = np.linspace(0, 1, len(generated))[:, None]
+    followed = continued(
+        ends[:1],
+        by_name(motion.skeleton, product(rotations, _turns_between(turns, part))),
+        by_name(motion.skeleton, _translations_between(back, ends, part)),
+    )
+    return _with_others_between(followed, ends, part)[1 : len(generated) + 1 - len(ends)]
+
+
+def _ends_of(values: Array, ends: Motion) -> Array:
+    """The first, or the first and the last of values (T, ...), one for each end."""
+    return values[[0, -1][: len(ends)]]
+
+
+def _translations_between(back: Motion, ends: Motion, part: Array) -> Array:
+    """Translations (T, J, 3) of a motion moved to those at the ends, by parts (T, 1) of the way between them."""
+    translations = local_translations(back)
+    offsets = local_translations(ends) - _ends_of(translations, ends)
+    return np.asarray(translations + offsets[:1] + part[..., None] * (offsets[-1:] - offsets[:1]))
+
+
+def _turns_between(turns: Array, part: Array) -> Array:
+    """Turns (T, J, 3, 3) from the first to the last of turns (E, J, 3, 3), the shortest way, by parts (T, 1) of it."""
     between = rotmat_to_rotvec(product(inverse(turns[:1]), turns[-1:])) * part[..., None]
-    start_turns = np.repeat(turns[:1], len(generated), axis=0)
-    rotations = product(rotations, product(start_turns, rotvec_to_rotmat(between)))
-    translations = translations + offsets[:1] + part[..., None] * (offsets[-1:] - offsets[:1])
-    rotations_by_name = {name: rotations[:, joint] for joint, name in enumerate(skeleton.names)}
-    translations_by_name = {name: translations[:, joint] for joint, name in enumerate(skeleton.names)}
-    whole = _with_others_between(continued(ends[:1], rotations_by_name, translations_by_name), ends, part)
-    return whole[1 : len(generated) + 1 - len(ends)]
+    return product(np.repeat(turns[:1], len(part), axis=0), rotvec_to_rotmat(between))
 
 
 def _same_world(back: Motion, motion: Motion, turns: Array) -> bool:
@@ -183,8 +204,7 @@ def _same_world(back: Motion, motion: Motion, turns: Array) -> bool:
     carrier = next(name.rpartition(".")[0] for name in back.channels if name.endswith(".tx"))
     above = skeleton.ancestors(skeleton.index(carrier))
     angles = np.degrees(np.linalg.norm(rotmat_to_rotvec(turns[:, above]), axis=-1))
-    has_path = {f"{carrier}.t{axis}" for axis in AXES} <= set(motion.channels)
-    return bool((angles < 1.0).all()) and has_path
+    return bool((angles < 1.0).all()) and has_channels(motion, carrier, "t")
 
 
 def _with_others_between(motion: Motion, ends: Motion, part: Array) -> Motion:
@@ -213,20 +233,26 @@ def in_joints_of(motion: Motion, skeleton: Skeleton | None) -> Motion:
 
 def _converted(motion: Motion, skeleton: Skeleton, names: list[str]) -> Motion:
     """The motion with the named joints in the order and axes of another skeleton's."""
-    before = skeleton_of(motion)
-    columns = motion.rotation_columns()
-    places = [before.places[name] for name in names]
-    wanted = [skeleton.joints[skeleton.places[name]] for name in names]
-    units = [motion.units[columns[name][0]] for name in names]
-    turns = np.array([TURN[unit] for unit in units])[:, None]
-    angles = eulers_of(local_rotations(motion, places), wanted) * turns / (2 * np.pi)
-    joints = list(before.joints)
-    for place, like in zip(places, wanted, strict=True):
+    # units of angles; the last joint comes first, as its channels come to stand first
+    units: dict[str, str] = {}
+    for name in reversed(names):
+        unit = motion.units[motion.rotation_columns()[name][0]]
+        units |= dict.fromkeys(channels_of(name, "r"), unit)
+
+    # the same rotations in the other order and axes
+    figure = _with_axes_of(skeleton_of(motion), skeleton, names)
+    places = [figure.places[name] for name in reversed(names)]
+    angles = eulers_of(local_rotations(motion, places), [figure.joints[place] for place in places])
+    turns = [TURN[unit] for unit in units.values()]
+    values = angles.reshape(len(motion), len(units)) * turns / (2 * np.pi)
+    return replace(with_channels(motion, tuple(units), values, tuple(units.values())), skeleton=figure)
+
+
+def _with_axes_of(skeleton: Skeleton, other: Skeleton, names: list[str]) -> Skeleton:
+    """A skeleton whose named joints have the order and axes of another skeleton's."""
+    joints = list(skeleton.joints)
+    for name in names:
+        place = skeleton.places[name]
+        like = other.joints[other.places[name]]
         joints[place] = replace(joints[place], order=like.order, axis=like.axis)
-    # a joint's new channels stand before all others, as where the joints are taken individually
-    channels = []
-    for name in names[::-1]:
-        channels += [f"{name}.r{axis}" for axis in AXES]
-    values = angles[:, ::-1].reshape(len(motion), len(channels))
-    converted = with_channels(motion, tuple(channels), values, tuple(np.repeat(units[::-1], 3).tolist()))
-    return replace(converted, skeleton=replace(before, joints=tuple(joints)))
+    return replace(skeleton, joints=tuple(joints))

@@ -21,7 +21,7 @@ from motet.errors import MotionError, listed
 from motet.figures.feet.contacts import feet_of, ground_of, has_feet, lay_root_path, led_along, velocity_by_feet
 from motet.figures.feet.hold import hold_feet
 from motet.motion.kinematics import (
-    AXES,
+    channels_of,
     continued,
     euler_of,
     heading,
@@ -40,9 +40,11 @@ from motet.representation.base import (
     Representation,
     at_rest,
     in_units,
+    joint_channels,
     joints_with,
     lateral_x,
     mirror_by_joints,
+    root_places,
     root_signs,
 )
 
@@ -103,11 +105,14 @@ def to_root_block(motion: Motion) -> Motion:
     missing = [name for name in names if name not in motion.channels]
     if missing:
         raise MotionError(f"the root's path and rotation are needed, but this motion lacks {', '.join(missing)}")
+    # R = Ry(heading) Rx(pitch) Rz(roll)
     angles = rotmats_to_euler(local_rotations(motion, [0])[:, 0], "yxz")
-    places = motion.select(names[:3], ("m",) * 3).values
+    places = root_places(motion)
     velocities = ground_velocities(places, angles[:, 0], motion.fps)
     velocities[:, 2] = np.degrees(velocities[:, 2])
     block = np.column_stack([velocities, places[:, 1], np.degrees(angles[:, 1:])])
+
+    # the block stands before all other channels
     rest = motion.select(tuple(name for name in motion.channels if name not in names))
     return with_channels(rest, ROOT_BLOCK, block, ROOT_BLOCK_UNITS)
 
@@ -116,6 +121,7 @@ def ground_velocities(places: Array, heading: Array, fps: float) -> Array:
     """Forward, left (m/s) and turn (rad/s): (T, 3) from places (T, 3) in metres and headings (T,) in radians."""
     if len(places) < 2:
         return np.zeros((len(places), 3))
+    # displacements are seen from the facing before them
     x, z = np.diff(places[:, [0, 2]], axis=0).T
     sin = np.sin(heading[:-1])
     cos = np.cos(heading[:-1])
@@ -159,18 +165,18 @@ def way(steps: Array, start: ArrayLike = (0.0, 0.0, 0.0), facing: float = 0.0) -
     """
     origin = np.asarray(start, dtype=np.float64)
     # summed from the start on: a way that is continued later is the same to the bit
-    now = np.cumsum(np.append(facing, steps[:, 2]))
-    sin = np.sin(now[:-1])
-    cos = np.cos(now[:-1])
+    facings = np.cumsum(np.append(facing, steps[:, 2]))
+    # each step is taken in the facing before it
+    sin = np.sin(facings[:-1])
+    cos = np.cos(facings[:-1])
     x = np.cumsum(np.append(origin[0], steps[:, 0] * sin + steps[:, 1] * cos))
     z = np.cumsum(np.append(origin[2], steps[:, 0] * cos - steps[:, 1] * sin))
-    return now[1:], x[1:], z[1:]
+    return facings[1:], x[1:], z[1:]
 
 
 def last_place(motion: Motion) -> Array:
     """The root's place (3,) in a motion's last frame, in metres."""
-    place: Array = local_translations(motion[-1])[0, 0] * skeleton_of(motion).unit_factor(1.0)
-    return place
+    return np.asarray(local_translations(motion[-1])[0, 0] * skeleton_of(motion).unit_factor(1.0))
 
 
 def plant_feet(motion: Motion) -> Motion:
@@ -187,10 +193,13 @@ def plant_feet(motion: Motion) -> Motion:
     metres = skeleton.unit_factor(1.0)
     if len(motion) < 2:
         return motion
+    # where the feet are, from the root and over the ground
     places = positions(placed) * metres
     root = places[:, 0]
     feet = places[:, joints]
     above = feet[..., 1] - ground_of(feet[..., 1])
+
+    # the root moves against the feet that stand; how it moved before is one more vote
     was = np.diff(root[:, [0, 2]], axis=0) * motion.fps
     velocity = velocity_by_feet((feet - root[:, None])[..., [0, 2]], above, motion.fps, was, trust=0.1)
     block = to_root_block(led_along(placed, velocity, root[:, 1], metres)).select(ROOT_BLOCK[:2])
@@ -199,7 +208,7 @@ def plant_feet(motion: Motion) -> Motion:
 
 def _root_channels(motion: Motion) -> tuple[str, ...]:
     root = skeleton_of(motion).names[0]
-    return tuple(f"{root}.{kind}{axis}" for kind in "tr" for axis in AXES)
+    return channels_of(root, "t") + channels_of(root, "r")
 
 
 class RootAngles(Representation):
@@ -264,7 +273,7 @@ class RootVectors(Representation):
         joints = joints_of(features.channels)
         last = at_rest(features, (name, *joints)) if after is None else after[-1]
         root, places = root_in_world(features, after)
-        vectors = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in VECTOR_KINDS)).values
+        vectors = features.select(joint_channels(joints, VECTOR_KINDS)).values
         matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
         rotations = {joint: matrices[:, n] for n, joint in enumerate(joints)}
         return continued(last, {name: root, **rotations}, {name: places / skeleton_of(last).unit_factor(1.0)})
@@ -295,7 +304,10 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
     root_units = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
     block = to_root_block(motion).select(ROOT_BLOCK, root_units)
     vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))
-    channels = (*ROOT_BLOCK, *(f"{name}.{kind}" for name in joints for kind in VECTOR_KINDS))
-    units = (*root_units, *["rad"] * (3 * len(joints)))
-    values = np.concatenate([block.values, vectors.reshape(len(motion), 3 * len(joints))], axis=1)
-    return replace(motion, values=values, channels=channels, units=units)
+    channels = joint_channels(joints, VECTOR_KINDS)
+    return replace(
+        motion,
+        values=np.concatenate([block.values, vectors.reshape(len(motion), len(channels))], axis=1),
+        channels=ROOT_BLOCK + channels,
+        units=root_units + ("rad",) * len(channels),
+    )

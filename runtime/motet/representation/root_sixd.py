@@ -14,11 +14,19 @@ import numpy as np
 
 from motet.figures.feet.hold import hold_feet
 from motet.figures.humanoid import HUMANOID
-from motet.motion.kinematics import AXES, continued, local_rotations, skeleton_of
+from motet.motion.kinematics import continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, axis_to_rotmat, product, rotmat_to_quat
 from motet.motion.skeleton import END_SUFFIX
-from motet.representation.base import FrameMirror, Representation, at_rest, joints_with, mirror_by_joints
+from motet.representation.base import (
+    FrameMirror,
+    Representation,
+    at_rest,
+    joint_channels,
+    joints_with,
+    mirror_by_joints,
+    root_places,
+)
 from motet.representation.root_block import ground_velocities, last_place, way
 
 ROOT_SIXD = ("root.forward", "root.left", "root.turn", "root.height")
@@ -40,17 +48,7 @@ class RootSixd(Representation):
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
         """Root and two axes of the joints of ``like``, or of all that are no tips."""
         if not set(ROOT_SIXD) <= set(motion.channels):
-            skeleton = skeleton_of(motion)
-            joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
-            rotations = np.ascontiguousarray(local_rotations(motion, joints))
-            angles = facing(motion)
-            rotations[:, 0] = product(axis_to_rotmat("y", -angles), rotations[:, 0])
-            places = motion.select(tuple(f"{skeleton.names[0]}.t{axis}" for axis in AXES), ("m",) * 3).values
-            axes = rotmat_to_sixd(rotations).reshape(len(motion), -1)
-            values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
-            names = tuple(f"{skeleton.names[joint]}.{kind}" for joint in joints for kind in SIXD_KINDS)
-            units = ROOT_SIXD_UNITS + ("1",) * len(names)
-            motion = replace(motion, values=values, channels=ROOT_SIXD + names, units=units)
+            motion = to_root_sixd(motion)
         return motion if like is None else motion.select(like.channels, like.units)
 
     def planted(self, features: Motion) -> Motion:
@@ -68,6 +66,25 @@ class RootSixd(Representation):
         return mirror_by_joints(features, dict(zip(SIXD_KINDS, SIXD_SIGNS, strict=True)))
 
 
+def to_root_sixd(motion: Motion) -> Motion:
+    """The motion in channels of ``root_sixd``: root, and two axes of all joints that are no tips. MotionError where the
+    root's translation is missing, or a skeleton that knows its unit of length."""
+    skeleton = skeleton_of(motion)
+    joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
+    # the root's rotation is seen from the facing, all others from their parents
+    rotations = np.ascontiguousarray(local_rotations(motion, joints))
+    angles = facing(motion)
+    rotations[:, 0] = product(axis_to_rotmat("y", -angles), rotations[:, 0])
+    axes = rotmat_to_sixd(rotations).reshape(len(motion), -1)
+
+    # the path is how the root moves over the ground, and its height
+    places = root_places(motion)
+    values = np.column_stack([ground_velocities(places, angles, motion.fps), places[:, 1], axes])
+    names = joint_channels([skeleton.names[joint] for joint in joints], SIXD_KINDS)
+    units = ROOT_SIXD_UNITS + ("1",) * len(names)
+    return replace(motion, values=values, channels=ROOT_SIXD + names, units=units)
+
+
 def in_world(features: Motion, after: Motion | None = None, pose: Array | None = None) -> tuple[Motion, Array]:
     """Features as a motion that can be played, and the pose (x, z, facing) of its last frame.
 
@@ -75,20 +92,33 @@ def in_world(features: Motion, after: Motion | None = None, pose: Array | None =
     """
     last = at_rest(features, joints_with(features.channels, "xx")) if after is None else after[-1]
     skeleton = skeleton_of(last)
+    root = skeleton.names[0]
+    facings, places = _way(features, after, pose)
+
+    # the root's rotation is turned from the facing to the world
+    rotations = joint_rotations(features)
+    rotations[root] = product(axis_to_rotmat("y", facings), rotations[root])
+    motion = continued(last, rotations, {root: places / skeleton.unit_factor(1.0)})
+    return motion, np.array([places[-1, 0], places[-1, 2], facings[-1]])
+
+
+def _way(features: Motion, after: Motion | None, pose: Array | None) -> tuple[Array, Array]:
+    """Facings (T,) in radians and places (T, 3) in metres of the root, from a pose as :func:`in_world` takes it."""
+    # the root's steps add up to its path; a first step from nowhere is none
     steps = features.select(ROOT_SIXD[:3]).values / features.fps
     if after is None:
         steps[:1] = 0
         pose = np.zeros(3)
     elif pose is None:
-        place = last_place(after)
-        pose = np.array([place[0], place[2], facing(after)[-1]])
+        pose = _last_pose(after)
     facings, x, z = way(steps, (pose[0], 0.0, pose[1]), pose[2])
-    root = skeleton.names[0]
-    rotations = joint_rotations(features)
-    rotations[root] = product(axis_to_rotmat("y", facings), rotations[root])
-    height = features.select(("root.height",)).values[:, 0]
-    path = np.column_stack([x, height, z]) / skeleton.unit_factor(1.0)
-    return continued(last, rotations, {root: path}), np.array([x[-1], z[-1], facings[-1]])
+    return facings, np.column_stack([x, features.select(ROOT_SIXD[3:]).values, z])
+
+
+def _last_pose(motion: Motion) -> Array:
+    """Where the root is over the ground and how it faces (x, z, facing) in a motion's last frame."""
+    place = last_place(motion)
+    return np.array([place[0], place[2], facing(motion)[-1]])
 
 
 def facing(motion: Motion) -> Array:
@@ -109,7 +139,7 @@ def facing(motion: Motion) -> Array:
 def joint_rotations(features: Motion) -> dict[str, Array]:
     """Local rotations (T, 3, 3) by joint; the root's is seen from the facing."""
     joints = joints_with(features.channels, "xx")
-    values = features.select(tuple(f"{joint}.{kind}" for joint in joints for kind in SIXD_KINDS)).values
+    values = features.select(joint_channels(joints, SIXD_KINDS)).values
     matrices = sixd_to_rotmat(values.reshape(len(features), len(joints), 6))
     return {joint: matrices[:, place] for place, joint in enumerate(joints)}
 
