@@ -87,6 +87,7 @@ def _raised(bone: Array, side: Array, height: Array) -> Array:
 
     side: directions (T, 3); the more is missing, the more a bone that points straight down bends that way.
     """
+    # as much higher as is wanted, and as much shorter over the ground as the length then leaves
     length = np.linalg.norm(bone, axis=-1, keepdims=True)
     rise = np.minimum(bone[:, 1:2] + height[:, None], 0.999 * length)
     flat = bone[:, [0, 2]] + height[:, None] * side[:, [0, 2]]

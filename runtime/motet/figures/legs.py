@@ -8,7 +8,16 @@ from numpy.typing import NDArray
 
 from motet.figures.humanoid import BONES, HUMANOID, LEG, limb_of
 from motet.figures.two_bones import TwoBones
-from motet.motion.scalar_or_batch import Part, Quaternion, Vector, inverse, plus, product, rotated, rotated_axis
+from motet.motion.scalar_or_batch import (
+    Part,
+    Quaternion,
+    Vector,
+    inverse,
+    plus,
+    product,
+    rotated,
+    rotated_axis,
+)
 
 Floats = NDArray[np.float32]
 
@@ -37,9 +46,17 @@ def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
         for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), contacts[0].tolist(), strict=True):
             yield Limb(rotations[0, bones].tolist(), offsets, contact)
     else:
-        local = np.array(rotations.transpose(1, 2, 0)[LEG_BONES].transpose(1, 2, 0, 3), dtype=np.float64, order="C")
+        local = np.array(
+            rotations.transpose(1, 2, 0)[LEG_BONES].transpose(1, 2, 0, 3),
+            dtype=np.float64,
+            order="C",
+        )
         offsets = OFFSETS.transpose(1, 2, 0)[..., None]
-        yield Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], contacts.T)
+        yield Limb(
+            [tuple(quats) for quats in local],
+            [tuple(offset) for offset in offsets],
+            contacts.T,
+        )
 
 
 def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
@@ -77,4 +94,8 @@ def reached_by(hips: Quaternion, turned: list[Quaternion], places: list[Vector],
     # thigh and shin turn in the world, then each is seen from the joint above it
     thigh = product(turn_thigh, thigh)
     shin = product(turn_shin, shin)
-    return [product(inverse(hips), thigh), product(inverse(thigh), shin), product(inverse(shin), foot)]
+    return [
+        product(inverse(hips), thigh),
+        product(inverse(thigh), shin),
+        product(inverse(shin), foot),
+    ]

@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from motet.errors import MotionError
-from motet.figures.humanoid import HUMANOID, Figure, JointMap, from_humanoid, map_of, on_humanoid
+from motet.figures.humanoid import (
+    HUMANOID,
+    Figure,
+    JointMap,
+    from_humanoid,
+    map_of,
+    on_humanoid,
+)
 from motet.motion.kinematics import (
     by_name,
     channels_of,
@@ -84,7 +91,11 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
     MotionError, with the reason, for figures that are not human.
     """
     if motion.fps != like.fps:
-        log.warning("resampled the second motion from %g to %g fps, the rate of the first", motion.fps, like.fps)
+        log.warning(
+            "resampled the second motion from %g to %g fps, the rate of the first",
+            motion.fps,
+            like.fps,
+        )
         motion = motion.continuous().resample(like.fps)
     skeleton = skeleton_of(like)
     if not _same_figure(skeleton_of(motion), skeleton):
@@ -115,7 +126,10 @@ def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) ->
     """
     skeleton = skeleton_of(motion)
     # the first joint with a translation is the hips
-    hips = next((i for i, name in enumerate(skeleton.names) if has_channels(motion, name, "t")), None)
+    hips = next(
+        (i for i, name in enumerate(skeleton.names) if has_channels(motion, name, "t")),
+        None,
+    )
     if hips is None or not has_channels(motion, skeleton.names[hips], "r"):
         return None
     rotations, places = global_transforms(motion)
@@ -138,7 +152,11 @@ def _with_joint(motion: Motion, joint: int, turned: Array, path: Array) -> Motio
     above = skeleton.joints[joint].parent
     to_parent = inverse(rotations[:, above]) if joint else np.broadcast_to(np.eye(3), turned.shape)
     moved = rotated(to_parent, path - places[:, above] if joint else path)
-    return posed(motion, {skeleton.names[joint]: product(to_parent, turned)}, {skeleton.names[joint]: moved})
+    return posed(
+        motion,
+        {skeleton.names[joint]: product(to_parent, turned)},
+        {skeleton.names[joint]: moved},
+    )
 
 
 def _arrival(motion: Motion, before: Motion, hips: int, seconds: float, about: Array) -> Array:

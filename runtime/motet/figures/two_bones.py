@@ -46,8 +46,10 @@ class TwoBones:
         down = minus(ankle, knee)
         self._along = along
         self._down = down
+        # squares of both lengths
         upper = dot(along, along)
         lower = dot(down, down)
+        # the knee turns about the part of the hinge that is square to the thigh
         self._axis = unit(minus(hinge, times(along, dot(hinge, along) / upper)))
         # the part of the shin in the plane of the bend
         in_plane = larger(1 - dot(down, self._axis) ** 2 / lower, 1e-12)
@@ -61,11 +63,14 @@ class TwoBones:
         Near straight, a knee bends or straightens infinitely fast relative to the leg's length. So a leg lengthens less
         the straighter it gets, and a straight one bends only softly.
         """
+        # how long the leg is now, how long the target wants it, and how much is left until it is straight
         away = minus(target, self.hip)
         now = length(minus(self.ankle, self.hip))
         wanted = length(away)
         left = larger(self.longest - now, 1e-9)
+        # a leg lengthens by less and less of what is left: 1 - exp(-x), which begins as x
         longer = -self.EASED_SHARE * left * computed(np.expm1, -larger(wanted - now, 0.0) / (self.EASED_SHARE * left))
+        # and it shortens by x^2 / (x + give), which begins flat where it is straight, and is x where it is bent
         less = larger(now - wanted, 0.0)
         give, fade = (part * self.longest for part in self.GIVES)
         shorter = less * less / larger(less + give * computed(np.exp, -left / fade), 1e-12)
@@ -77,6 +82,7 @@ class TwoBones:
         The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
         bent back even where it was bent forward; then thigh and shin turn together the shortest way.
         """
+        # the law of cosines gives the bend for this length; then the leg swings to the target as a whole
         away = minus(target, self.hip)
         bend = self._bend((dot(away, away) - self._squares) / self._twice)
         turn = swing(plus(self._along, rotated(bend, self._down)), away)

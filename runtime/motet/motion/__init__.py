@@ -3,7 +3,16 @@
 from motet.figures.feet.contacts import feet_of, ground_of, has_feet, lay_root_path
 from motet.figures.feet.hold import hold_feet
 from motet.figures.feet.treadmill import is_in_place, with_travel
-from motet.figures.humanoid import HUMANOID, MIXAMO, Humanoid, JointMap, from_humanoid, read_map, rig, to_humanoid
+from motet.figures.humanoid import (
+    HUMANOID,
+    MIXAMO,
+    Humanoid,
+    JointMap,
+    from_humanoid,
+    read_map,
+    rig,
+    to_humanoid,
+)
 from motet.figures.root_motion import in_place
 from motet.motion.kinematics import (
     global_transforms,

@@ -72,7 +72,11 @@ def _angle_columns(motion: Motion, joints: Sequence[str]) -> tuple[list[int], li
     for place, name in enumerate(joints):
         joint_of_angle += [place] * len(columns_of[name])
         columns += columns_of[name]
-    return joint_of_angle, columns, np.array([TURN[motion.units[column]] for column in columns])
+    return (
+        joint_of_angle,
+        columns,
+        np.array([TURN[motion.units[column]] for column in columns]),
+    )
 
 
 def _by_order(joints: Sequence[Joint], names: Container[str] | None = None) -> dict[str, list[int]]:
@@ -87,6 +91,7 @@ def _by_order(joints: Sequence[Joint], names: Container[str] | None = None) -> d
 def local_translations(motion: Motion) -> Array:
     """Translations (T, J, 3) of every joint in its parent's frame: the channel if there is one, else the offset."""
     skeleton = skeleton_of(motion)
+    # offsets, replaced where a joint has a channel, in the skeleton's unit
     translations = frames_last((len(motion), len(skeleton.joints), 3))
     translations[:] = skeleton.offsets
     for column, name in enumerate(motion.channels):
@@ -104,6 +109,7 @@ def global_transforms(motion: Motion) -> tuple[Array, Array]:
 
 def chained(skeleton: Skeleton, rotations: Array, translations: Array) -> tuple[Array, Array]:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) in the world, from those in each parent's frame, in place."""
+    # level by level, so that all joints of one depth are computed at once, after their parents
     for level in skeleton.levels:
         parents = skeleton.parents[level]
         turned = rotations[:, parents]
@@ -129,6 +135,7 @@ def eulers_of(rotations: Array, joints: Sequence[Joint], leaps: bool = False) ->
     """Like :func:`euler_of` for several joints with their local rotations (T, J, 3, 3): (T, J, 3). leaps: may leap."""
     angles = frames_last(rotations.shape[:-1])
     for order, places in _by_order(joints).items():
+        # M from C M C^T, then its angles in the order x, y, z of the channels
         plain = _about_axes(rotations[:, places], [joints[place] for place in places], back=True)
         angles[:, places] = rotmats_to_euler(plain, order, leaps)[..., [order.index(axis) for axis in AXES]]
     return angles
@@ -136,6 +143,7 @@ def eulers_of(rotations: Array, joints: Sequence[Joint], leaps: bool = False) ->
 
 def _about_axes(turns: Array, joints: Sequence[Joint], back: bool = False) -> Array:
     """C M C^T (T, J, 3, 3) of each joint's turns M, or M of these."""
+    # only ASF files have joints with axes of their own
     with_axis = [place for place, joint in enumerate(joints) if any(joint.axis)]
     if with_axis:
         frames = np.array([joints[place].frame.T if back else joints[place].frame for place in with_axis])
@@ -158,6 +166,7 @@ def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
 
 def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
     """The motion with channels (T, len(names)) replaced, or prepended if it has none of that name."""
+    # new channels stand before all others
     new = tuple(name for name in names if name not in motion.channels)
     added = [names.index(name) for name in new]
     everything = np.concatenate([values[:, added], motion.values], axis=1)
@@ -175,19 +184,29 @@ def continued(last: Motion, rotations: Mapping[str, Array], translations: Mappin
     Lengths are in the skeleton's unit. Joints without channels are left out; channels of other joints keep their
     values.
     """
+    # the last frame is repeated, and then posed anew
     last = last[-1:]
     count = len(next(iter(rotations.values())))
-    after = posed(replace(last, values=np.repeat(last.values, count, axis=0)), rotations, translations, leaps=True)
+    after = posed(
+        replace(last, values=np.repeat(last.values, count, axis=0)),
+        rotations,
+        translations,
+        leaps=True,
+    )
     # the frame before the first one decides which of two equivalent angles is nearer
     return replace(last, values=np.concatenate([last.values, after.values])).continuous()[1:]
 
 
 def posed(
-    motion: Motion, rotations: Mapping[str, Array], translations: Mapping[str, Array], leaps: bool = False
+    motion: Motion,
+    rotations: Mapping[str, Array],
+    translations: Mapping[str, Array],
+    leaps: bool = False,
 ) -> Motion:
     """The motion in its channels with other local rotations (T, 3, 3) and translations (T, 3) of some joints, as
     :func:`continued` takes them. leaps: their angles may leap from frame to frame."""
     skeleton = skeleton_of(motion)
+    # angles first, then translations, in the units of their channels
     values = np.array(motion.values)
     _set_angles(values, motion, rotations, leaps)
     for column, channel in enumerate(motion.channels):
@@ -204,6 +223,7 @@ def _set_angles(values: Array, motion: Motion, rotations: Mapping[str, Array], l
     names = [name for name in motion.rotation_columns() if name in rotations]
     joints = [skeleton.joints[skeleton.index(name)] for name in names]
     angles = eulers_of(side_by_side([rotations[name] for name in names], len(motion)), joints, leaps)
+    # each angle in its channel's unit
     joint_of_angle, columns, turns = _angle_columns(motion, names)
     axes = [AXES.index(motion.channels[column][-1]) for column in columns]
     values[:, columns] = angles[:, joint_of_angle, axes] * turns / (2 * np.pi)
@@ -237,7 +257,13 @@ def motion_of(skeleton: Skeleton, turned: Array, moved: dict[int, Array], fps: f
         if i in turning:
             units |= dict.fromkeys(channels_of(name, "r"), "deg")
             columns.append(angles[:, turning.index(i)])
-    return Motion(np.concatenate(columns, axis=1), tuple(units), tuple(units.values()), fps, skeleton)
+    return Motion(
+        np.concatenate(columns, axis=1),
+        tuple(units),
+        tuple(units.values()),
+        fps,
+        skeleton,
+    )
 
 
 def _in_parents(skeleton: Skeleton, turned: Array) -> Array:
@@ -262,6 +288,7 @@ def without_heading(motion: Motion) -> Motion:
     root = skeleton_of(motion).names[0]
     if not has_channels(motion, root, "r") or not len(motion):
         return motion
+    # a line through the heading: where it starts and how fast it turns
     time = np.arange(len(motion))
     line: Array = np.polyval(np.polyfit(time, heading(motion), min(1, len(motion) - 1)), time).astype(np.float64)
     levelled = axis_to_rotmat("y", -line) @ local_rotations(motion, [0])[:, 0]

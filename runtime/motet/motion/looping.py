@@ -21,7 +21,16 @@ from motet.motion.kinematics import (
     skeleton_of,
 )
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import UP, Array, inverse, product, rotated, rotmat_to_rotvec, rotvec_to_rotmat, twist
+from motet.motion.rotations import (
+    UP,
+    Array,
+    inverse,
+    product,
+    rotated,
+    rotmat_to_rotvec,
+    rotvec_to_rotmat,
+    twist,
+)
 
 LIVELY = 0.6
 """Least energy of a loop, relative to the mean of the whole motion."""
@@ -93,6 +102,7 @@ def _closed_rotations(part: Motion, hips: int, hips_world: Array, above: Array, 
 def _difference(part: Motion, hips: str, turning: Iterable[str]) -> Array:
     """How much each channel (D,) differs at the end from the beginning, up to whole turns; 0 for the path and heading
     of the hips and the angles of joints that turn."""
+    # angles that differ by whole turns do not differ
     turns = np.array([TURN.get(unit, np.inf) for unit in part.units])
     difference: Array = part.values[-1] - part.values[0]
     angles = np.isfinite(turns)
@@ -113,6 +123,7 @@ def _hips(motion: Motion) -> int:
 
 def _closed(rotations: Array, share: Array) -> Array:
     """Rotations (T, 3, 3) adjusted by a share (T, 1) of the difference so that the last equals the first."""
+    # the turn from the last to the first, of which each frame takes its share
     difference = rotmat_to_rotvec(product(rotations[:1], inverse(rotations[-1:])))
     return product(rotvec_to_rotmat(share * difference), rotations)
 
@@ -126,6 +137,7 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
         raise MotionError(
             f"a motion of {motion.duration:.2g} s is too short for a loop of {shortest:g} s: use a longer one"
         )
+    # first among every few frames, then among all frames near the best pair
     poses = _poses(motion, hips)
     step = -(-len(motion) // LONGEST_COMPARED)
     start, stop = _coarse_repetition(poses, least, step)
@@ -203,6 +215,7 @@ def _poses(motion: Motion, hips: int) -> Array:
     root mean square over the joints, as a share of the figure's height.
     """
     skeleton = skeleton_of(motion)
+    # seen from the hips: position and heading do not count
     rotations, places = global_transforms(motion)
     to_facing = inverse(twist(rotations[:, hips], UP))[:, None]
     ground = places[:, [hips]] * (1 - UP)

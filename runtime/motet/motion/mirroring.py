@@ -117,7 +117,14 @@ def _same_channels(
     return channels
 
 
-def _with_mirrored(result: Motion, motion: Motion, joint: Joint, partner: int, letter: str, signs: Array) -> Motion:
+def _with_mirrored(
+    result: Motion,
+    motion: Motion,
+    joint: Joint,
+    partner: int,
+    letter: str,
+    signs: Array,
+) -> Motion:
     """The result with a joint's rotation ("r") or translation ("t") mirrored from its partner's in the motion: in the
     channels that it has, and in others that would leave their rest value."""
     names = channels_of(joint.name, letter)

@@ -11,7 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import ArgumentError, MotionError, listed, quoted
-from motet.motion.rotations import Array, continuous_euler, continuous_rotvec, without_turns
+from motet.motion.rotations import (
+    Array,
+    continuous_euler,
+    continuous_rotvec,
+    without_turns,
+)
 from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
@@ -118,10 +123,16 @@ class Motion:
         missing = [name for name in channels if name not in places]
         if missing:
             raise MotionError(f"the motion lacks {len(missing)} of {len(channels)} channels: {listed(missing)}")
+        # each column in its wanted unit
         columns = [places[name] for name in channels]
         units = units or tuple(self.units[column] for column in columns)
         factors = [self._factor(column, unit) for column, unit in zip(columns, units, strict=True)]
-        return replace(self, values=self.values[:, columns] * factors, channels=channels, units=units)
+        return replace(
+            self,
+            values=self.values[:, columns] * factors,
+            channels=channels,
+            units=units,
+        )
 
     def _factor(self, column: int, unit: str) -> float:
         old = self.units[column]
@@ -143,7 +154,11 @@ class Motion:
             raise MotionError(f"a unit is a positive number of metres, not {metres_per_unit!r}")
         factor = self.skeleton.unit_factor(metres_per_unit)
         factors = [factor if unit == "length" else 1.0 for unit in self.units]
-        return replace(self, values=self.values * factors, skeleton=self.skeleton.scaled(metres_per_unit))
+        return replace(
+            self,
+            values=self.values * factors,
+            skeleton=self.skeleton.scaled(metres_per_unit),
+        )
 
     def with_unit(self, metres_per_unit: float) -> "Motion":
         """The same motion with the skeleton's length unit set, for files that do not state it."""
@@ -161,6 +176,7 @@ class Motion:
             raise MotionError(f"the frame rate must be a positive number, not {fps!r}")
         if fps == self.fps:
             return self
+        # no more than memory holds
         ratio = self.fps / fps
         if self.values.size / ratio > 2**28:  # 2 GiB, six hours of a hundred channels at 120 fps
             raise MotionError(f"{self.duration:g} s at {fps:g} fps is too many frames")
@@ -250,6 +266,7 @@ def resampled(values: Array, ratio: float, to_end: bool = False) -> Array:
         step = round(ratio)
         return values[(frames - 1) % step if to_end and frames else 0 :: step]
     count = int((frames - 1) / ratio + 1e-9) + 1 if frames else 0
+    # at the times of the new frames, counted in old ones
     times: Array = np.arange(count, dtype=np.float64) * ratio
     if to_end and frames:
         times = frames - 1 - times[::-1]

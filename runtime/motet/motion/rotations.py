@@ -79,11 +79,13 @@ def rotmat_to_euler(matrix: Array, order: str) -> Array:
     """Matrices (..., 3, 3) to Euler angles (..., 3), the middle within a quarter turn, the last 0 at a gimbal lock."""
     i, j, k = map("xyz".index, order)
     sign = _handedness(order)
+    # the row that the first turn leaves and the column that the last one leaves tell all three angles
     cos_middle = np.sqrt(matrix[..., i, i] ** 2 + matrix[..., i, j] ** 2)
     angles = frames_last((*matrix.shape[:-2], 3))
     angles[..., 0] = angle_of(-sign * matrix[..., j, k], matrix[..., k, k])
     angles[..., 1] = angle_of(sign * matrix[..., i, k], cos_middle)
     angles[..., 2] = angle_of(-sign * matrix[..., i, j], matrix[..., i, i])
+    # where the outer axes are the same, the first angle takes all of the turn
     locked = cos_middle < LOCKED
     if locked.any():
         angles[locked, 0] = angle_of(sign * matrix[locked, k, j], matrix[locked, j, j])
@@ -141,7 +143,11 @@ def rotmats_to_euler(matrices: Array, order: str, leaps: bool = False) -> Array:
         frames = np.arange(len(angles)).reshape(-1, *[1] * (angles.ndim - 2))
         free = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)
         last = np.take_along_axis(angles[..., 2], free, axis=0)
-        angles[..., 0] -= np.where(locked, _handedness(order) * np.sign(angles[..., 1]) * (last - angles[..., 2]), 0)
+        angles[..., 0] -= np.where(
+            locked,
+            _handedness(order) * np.sign(angles[..., 1]) * (last - angles[..., 2]),
+            0,
+        )
         angles[..., 2] = np.where(locked, last, angles[..., 2])
     return angles if leaps else continuous_euler(angles)
 
@@ -162,6 +168,7 @@ def continuous_rotvec(vectors: Array) -> Array:
     if len(joints):  # without jumps they are the nearest already
         joints = np.unique(joints)
         part = result[:, joints]
+        # from the last jump backwards, each frame after the one behind it is settled
         for t in range(int(frames.max()), -1, -1):
             part[t] += _whole_turns(part[t], part[t + 1])
         result[:, joints] = part
@@ -173,7 +180,11 @@ def _whole_turns(now: Array, after: Array) -> Array:
     angle = np.linalg.norm(now, axis=-1, keepdims=True)
     angle_after = np.linalg.norm(after, axis=-1, keepdims=True)
     # a rotation by no angle takes the axis of the frame after it
-    axis = np.where(angle > 1e-3, now / np.maximum(angle, 1e-9), after / np.maximum(angle_after, 1e-9))
+    axis = np.where(
+        angle > 1e-3,
+        now / np.maximum(angle, 1e-9),
+        after / np.maximum(angle_after, 1e-9),
+    )
     along = (after * axis).sum(-1, keepdims=True)
     return np.asarray(axis * (np.round((along - angle) / (2 * np.pi)) * 2 * np.pi))
 
@@ -204,6 +215,7 @@ def rodrigues(cosine: Array, sine: Array, versed: Array, along: Array) -> Array:
 def rotmat_to_rotvec(matrix: Array) -> Array:
     """Matrices (..., 3, 3) to rotation vectors (..., 3) of at most half a turn."""
     quat = rotmat_to_quat(matrix)
+    # the quaternion is (n sin a/2, cos a/2)
     sin_half = np.linalg.norm(quat[..., :3], axis=-1, keepdims=True)
     half = angle_of(sin_half, quat[..., 3:])
     scale = np.where(sin_half > 1e-12, 2 * half / np.where(sin_half > 1e-12, sin_half, 1.0), 2.0)
@@ -280,7 +292,11 @@ def swing(start: Array, end: Array) -> Array:
     half = cosine < -1 + 1e-6
     if half.any():
         side = unit(np.cross(start, np.eye(3)[np.argmin(np.abs(start), axis=-1)]))
-        turn = np.where(half[..., None, None], 2 * side[..., :, None] * side[..., None, :] - np.eye(3), turn)
+        turn = np.where(
+            half[..., None, None],
+            2 * side[..., :, None] * side[..., None, :] - np.eye(3),
+            turn,
+        )
     return turn
 
 
@@ -298,6 +314,7 @@ def twist(rotations: Array, axis: Array) -> Array:
 
 def quat_product(left: NDArray[Any], right: NDArray[Any]) -> NDArray[Any]:
     """Products of quaternions (..., 4): the right rotation first, then the left."""
+    # (v, s)(w, t) = (s w + t v + v x w, s t - v.w)
     a = left[..., :3]
     b = right[..., :3]
     products = np.empty(np.broadcast_shapes(left.shape, right.shape), dtype=left.dtype)

@@ -101,7 +101,11 @@ def length(a: Vector) -> Part:
 
 def cross(a: Vector, b: Vector) -> Vector:
     """The outer product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
 
 
 def unit(a: Vector) -> Vector:
@@ -128,13 +132,22 @@ def rotated(quat: Quaternion, vector: Vector) -> Vector:
     p = 2 * (y * c - z * b)
     q = 2 * (z * a - x * c)
     r = 2 * (x * b - y * a)
-    return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
+    return (
+        a + w * p + y * r - z * q,
+        b + w * q + z * p - x * r,
+        c + w * r + x * q - y * p,
+    )
 
 
 def yawed(quat: Quaternion, sine: Part, cosine: Part) -> Quaternion:
     """The product of a turn about the vertical, of which these are of half the angle, and a rotation."""
     x, y, z, w = quat
-    return cosine * x + sine * z, cosine * y + sine * w, cosine * z - sine * x, cosine * w - sine * y
+    return (
+        cosine * x + sine * z,
+        cosine * y + sine * w,
+        cosine * z - sine * x,
+        cosine * w - sine * y,
+    )
 
 
 def rotated_axis(quat: Quaternion, axis: int) -> Vector:
@@ -164,9 +177,11 @@ def normalised(quat: Quaternion) -> Quaternion:
 
 def swing(start: Vector, end: Vector) -> Quaternion:
     """The shortest rotation from one direction to another; half a turn is about any axis, and none from or to 0."""
+    # the half-way quaternion: w is 1 + cosine, and (x, y, z) the sine about the axis, both times the lengths
     both = root(dot(start, start) * dot(end, end))
     x, y, z = start
     cosine = both + dot(start, end)
+    # half a turn has no axis of its own: any that is square to the start
     half = cosine < 1e-6 * both
     a, b, c = cross(start, end)
     if half is not False and np.any(half):

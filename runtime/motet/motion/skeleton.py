@@ -249,7 +249,13 @@ SIDE_PATTERNS = (
 )
 """Patterns of the words for sides in names of joints, the clearest first."""
 
-SIDE_WORDS = (("l", "r"), ("L", "R"), ("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"))
+SIDE_WORDS = (
+    ("l", "r"),
+    ("L", "R"),
+    ("left", "right"),
+    ("Left", "Right"),
+    ("LEFT", "RIGHT"),
+)
 """Words for the left and for the right."""
 
 OTHER_SIDE = dict(SIDE_WORDS) | {right: left for left, right in SIDE_WORDS}

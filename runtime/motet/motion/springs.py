@@ -23,6 +23,7 @@ def damping_of(half_life: float) -> float:
 
 def damped(off: Part, rate: Part, damping: Part, seconds: float) -> tuple[Part, Part]:
     """A distance from rest and its rate, of one shape or floats, ``seconds`` later (exact); the damping broadcasts."""
+    # what is left of it, and how it would rise without damping
     left = _left(damping, seconds) if isinstance(damping, float) else np.exp(-damping * seconds)
     rise = (rate + damping * off) * seconds
     return (off + rise) * left, (rate - damping * rise) * left

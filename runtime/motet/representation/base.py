@@ -96,6 +96,7 @@ def mirror_by_joints(features: Motion, signs: Mapping[str, float]) -> FrameMirro
     lateral_x(features)
     joints = joints_with(features.channels, next(iter(signs)))
     places = {name: column for column, name in enumerate(features.channels)}
+    # a joint's columns come from its partner's, with the sign of their kind
     columns = np.arange(len(places))
     signs_of_columns = root_signs(features.channels)
     for joint, partner in zip(joints, partners_of(joints), strict=True):

@@ -14,7 +14,12 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.base import FrameMirror, Representation, phases
-from motet.representation.retargeting import foreign, in_joints_of, in_known_unit, to_model_figure
+from motet.representation.retargeting import (
+    foreign,
+    in_joints_of,
+    in_known_unit,
+    to_model_figure,
+)
 from motet.representation.root_block import Angles, RootAngles, RootVectors
 from motet.representation.root_sixd import RootSixd
 
@@ -83,7 +88,13 @@ class MotionContract:
 
         plant: let the feet say where the figure goes, in representations of generated motions.
         """
-        features = Motion(np.asarray(frames, dtype=np.float64), self.channels, self.units, self.fps, self.skeleton)
+        features = Motion(
+            np.asarray(frames, dtype=np.float64),
+            self.channels,
+            self.units,
+            self.fps,
+            self.skeleton,
+        )
         return named(self.representation).planted(features) if plant else features
 
     def frames(self, motion: Motion) -> Array:
@@ -106,11 +117,13 @@ class MotionContract:
         """
         if self._is_own(motion) or self.skeleton is None:
             return motion
+        # a figure whose angles mean the same is taken as it is
         reason = foreign(motion, self.skeleton, self._joints)
         if reason is None:
             return in_known_unit(motion, self.skeleton)
         if named(self.representation).required and not any(channel.endswith(".tx") for channel in motion.channels):
             raise MotionError("this motion lacks the root's tx, ty and tz, the path of the figure")
+        # brought to the humanoid, and from there to the model's figure
         slower = motion.continuous().resample(self.fps) if motion.fps > self.fps else motion
         average = self.motion(self.mean[None], plant=False)
         return to_model_figure(slower, average, reason, figure)
@@ -145,8 +158,13 @@ class MotionContract:
 
     def normalised(self, frames: ArrayLike) -> Array:
         """Frames (..., D) in standard deviations from the mean: 0 in dead channels, and within Z_LIMIT."""
+        # dead channels are divided by infinity
         scale = np.where(self.std > 0, self.std, np.inf)
-        z: Array = np.clip((np.asarray(frames, dtype=np.float64) - self.mean) / scale, -Z_LIMIT, Z_LIMIT)
+        z: Array = np.clip(
+            (np.asarray(frames, dtype=np.float64) - self.mean) / scale,
+            -Z_LIMIT,
+            Z_LIMIT,
+        )
         return z
 
     def denormalised(self, z: ArrayLike) -> Array:

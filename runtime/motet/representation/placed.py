@@ -12,10 +12,22 @@ import numpy as np
 from motet.figures.humanoid import BONES
 from motet.motion.kinematics import channels_of, continued, local_rotations, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import (
+    Array,
+    inverse,
+    product,
+    rotmat_to_rotvec,
+    rotvec_to_rotmat,
+)
 from motet.motion.skeleton import partners_of
 from motet.representation.base import FrameMirror
-from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, SIXD_SIGNS, rotmat_to_sixd, sixd_to_rotmat
+from motet.representation.root_sixd import (
+    ROOT_SIXD,
+    SIXD_KINDS,
+    SIXD_SIGNS,
+    rotmat_to_sixd,
+    sixd_to_rotmat,
+)
 
 ROOT_PLACE = 3
 """Channels of the root's place, before all axes."""
@@ -40,13 +52,13 @@ def placed_by_way(frames: Array, fps: float) -> Array:
 
     # each step is taken in the facing before it: they add up to the path, and the height is as it is
     facing = np.cumsum(turn, axis=-1)
-    moves = np.stack([left, np.zeros(left.shape), forward], axis=-1)
+    moves = np.stack([left, np.zeros_like(left), forward], axis=-1)
     _turn(moves, facing - turn)
     path = np.cumsum(moves, axis=-2)
     path[..., 1] = frames[..., ROOT_PLACE]
 
     # the hips are turned from the facing to the world; all other bones are seen from their parents
-    placed_frames = np.concatenate([path, frames[..., len(ROOT_SIXD) :]], axis=-1)
+    placed_frames = np.concatenate([path, frames[..., len(ROOT_SIXD) :]], axis=-1, dtype=np.float64)
     _turn(placed_frames[..., ROOT_PLACE : ROOT_PLACE + 6], facing)
     return placed_frames
 
@@ -57,6 +69,7 @@ def pose_of(frames: Array) -> Array:
     The angle is that of the turn about the vertical axis after which the root is tilted, as that of
     :func:`motet.representation.root_sixd.facing`, but of one frame alone.
     """
+    # of a turn about y after a tilt, this quotient is free of the tilt
     hips = sixd_to_rotmat(frames[..., ROOT_PLACE : ROOT_PLACE + 6])
     angle = np.arctan2(hips[..., 0, 2] - hips[..., 2, 0], hips[..., 0, 0] + hips[..., 2, 2])
     return np.stack([frames[..., 0], frames[..., 2], angle], axis=-1)
@@ -64,6 +77,7 @@ def pose_of(frames: Array) -> Array:
 
 def seen_from(frames: Array, pose: Array) -> Array:
     """Placed frames (..., T, E) as they are seen from poses (..., 3), which come to the origin and face z."""
+    # moved first, then turned
     seen = np.array(frames, dtype=np.float64)
     seen[..., 0] -= pose[..., None, 0]
     seen[..., 2] -= pose[..., None, 1]
@@ -72,6 +86,7 @@ def seen_from(frames: Array, pose: Array) -> Array:
 
 def put_at(frames: Array, pose: Array) -> Array:
     """The inverse of :func:`seen_from`: frames whose origin comes to poses (..., 3)."""
+    # turned first, then moved
     put = _turned(np.array(frames, dtype=np.float64), pose[..., None, 2])
     put[..., 0] += pose[..., None, 0]
     put[..., 2] += pose[..., None, 1]
@@ -84,6 +99,7 @@ def bridge(past: Array, after: Array, count: int, pace: float = 1.0) -> Array:
     Joints turn the shortest way at an even speed (slerp); the root goes on a cubic Hermite curve that leaves and
     arrives with the velocities it has there. pace: frames of the gap per frame of the past.
     """
+    # the root: a cubic through both ends, with the velocities there (Hermite)
     part = _parts(count)
     start = past[..., -1:, :ROOT_PLACE]
     end = after[..., :1, :ROOT_PLACE]
@@ -120,10 +136,11 @@ def _root_velocity(places: Array) -> Array:
 def _axes_between(past: Array, after: Array, part: Array) -> Array:
     """Axes (..., T, 6 K) of bones that turn the shortest way from the last of frames (..., P, E) to the first of
     (..., A, E), of which they have parts (T, 1) behind them (slerp)."""
+    # the turn from one to the other as a rotation vector, of which each frame has its part
     rotations = _rotations(past[..., -1:, :])
     turns = rotmat_to_rotvec(product(inverse(rotations), _rotations(after[..., :1, :]))) * part[..., None]
     axes = rotmat_to_sixd(np.matmul(rotations, rotvec_to_rotmat(turns)))
-    return axes.reshape(*axes.shape[:-2], -1)
+    return axes.reshape(*axes.shape[:-2], past.shape[-1] - ROOT_PLACE)
 
 
 def unplaced(frames: Array, after: Motion) -> Motion:
@@ -138,6 +155,7 @@ def mirror() -> FrameMirror:
     columns = np.arange(PLACED_CHANNELS)
     signs = np.ones(PLACED_CHANNELS, dtype=np.float32)
     signs[0] = -1
+    # each bone's columns come from its partner's
     kinds = np.arange(len(SIXD_KINDS)) + ROOT_PLACE
     for bone, partner in enumerate(partners_of(BONES)):
         bone_columns = kinds + len(SIXD_KINDS) * bone

@@ -8,7 +8,15 @@ from functools import lru_cache
 import numpy as np
 
 from motet.errors import MotionError, UnitError, listed
-from motet.figures.humanoid import HUMANOID, Figure, from_humanoid, is_mmm, map_of, on_humanoid, unit_by_legs
+from motet.figures.humanoid import (
+    HUMANOID,
+    Figure,
+    from_humanoid,
+    is_mmm,
+    map_of,
+    on_humanoid,
+    unit_by_legs,
+)
 from motet.motion.kinematics import (
     by_name,
     channels_of,
@@ -22,7 +30,13 @@ from motet.motion.kinematics import (
     with_channels,
 )
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, inverse, product, rotmat_to_rotvec, rotvec_to_rotmat
+from motet.motion.rotations import (
+    Array,
+    inverse,
+    product,
+    rotmat_to_rotvec,
+    rotvec_to_rotmat,
+)
 from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
@@ -31,6 +45,9 @@ log = logging.getLogger(__name__)
 FARTHEST_BONES = 45.0
 """Degrees from which on the same angles mean different poses: the bones of 16 of CMU's subjects, measured individually,
 lie up to 24 degrees apart."""
+
+SHORTEST_BONE = 1e-6
+"""Length, in the skeleton's unit, below which a bone points nowhere."""
 
 
 def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | None:
@@ -77,7 +94,7 @@ def _bone_angle(skeleton: Skeleton, other: Skeleton, name: str) -> float:
     other_bone = _rest_bone(other, name, parent)
     length = float(np.linalg.norm(bone))
     other_length = float(np.linalg.norm(other_bone))
-    if min(length, other_length) < 1e-6:
+    if min(length, other_length) < SHORTEST_BONE:
         return 0.0
     cosine = bone @ other_bone / max(length * other_length, 1e-12)
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
@@ -245,7 +262,10 @@ def _converted(motion: Motion, skeleton: Skeleton, names: list[str]) -> Motion:
     angles = eulers_of(local_rotations(motion, places), [figure.joints[place] for place in places])
     turns = [TURN[unit] for unit in units.values()]
     values = angles.reshape(len(motion), len(units)) * turns / (2 * np.pi)
-    return replace(with_channels(motion, tuple(units), values, tuple(units.values())), skeleton=figure)
+    return replace(
+        with_channels(motion, tuple(units), values, tuple(units.values())),
+        skeleton=figure,
+    )
 
 
 def _with_axes_of(skeleton: Skeleton, other: Skeleton, names: list[str]) -> Skeleton:

@@ -18,7 +18,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import MotionError, listed
-from motet.figures.feet.contacts import feet_of, ground_of, has_feet, lay_root_path, led_along, velocity_by_feet
+from motet.figures.feet.contacts import (
+    feet_of,
+    ground_of,
+    has_feet,
+    lay_root_path,
+    led_along,
+    velocity_by_feet,
+)
 from motet.figures.feet.hold import hold_feet
 from motet.motion.kinematics import (
     channels_of,
@@ -33,7 +40,13 @@ from motet.motion.kinematics import (
 )
 from motet.motion.mirroring import mirror
 from motet.motion.motion import TURN, Motion
-from motet.motion.rotations import Array, euler_to_rotmat, rotmat_to_rotvec, rotmats_to_euler, rotvec_to_rotmat
+from motet.motion.rotations import (
+    Array,
+    euler_to_rotmat,
+    rotmat_to_rotvec,
+    rotmats_to_euler,
+    rotvec_to_rotmat,
+)
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.base import (
     FrameMirror,
@@ -67,6 +80,7 @@ class Angles(Representation):
         """With the root's translation, found from the feet's contact with the ground; a human's feet stay there."""
         if features.skeleton is None or not has_feet(features.skeleton):
             return features
+        # feet say where the root goes, and then they are held
         laid = lay_root_path(features, tremble=0.06)
         try:
             return hold_feet(laid, trembling=True)
@@ -81,7 +95,13 @@ class Angles(Representation):
         """By :mod:`motet.motion.mirroring`."""
         # each column of a probe frame holds its own number: where mirroring puts it, and with which sign, can be read
         count = len(features.channels)
-        probe = Motion(np.arange(1.0, count + 1)[None], features.channels, features.units, 1.0, features.skeleton)
+        probe = Motion(
+            np.arange(1.0, count + 1)[None],
+            features.channels,
+            features.units,
+            1.0,
+            features.skeleton,
+        )
         mirrored = mirror(probe)
         sources = np.abs(mirrored.values[0])
         if mirrored.channels != probe.channels or not np.array_equal(np.sort(sources), probe.values[0]):
@@ -89,7 +109,14 @@ class Angles(Representation):
         return FrameMirror(sources.astype(np.intp) - 1, np.sign(mirrored.values[0]).astype(np.float32))
 
 
-ROOT_BLOCK = ("root.forward", "root.left", "root.turn", "root.height", "root.pitch", "root.roll")
+ROOT_BLOCK = (
+    "root.forward",
+    "root.left",
+    "root.turn",
+    "root.height",
+    "root.pitch",
+    "root.roll",
+)
 ROOT_BLOCK_UNITS = ("m/s", "m/s", "deg/s", "m", "deg", "deg")
 """Forward, to the left, turning to the left (counterclockwise seen from above), above y = 0, and what remains."""
 
@@ -137,6 +164,7 @@ def from_root_block(motion: Motion, after: Motion | None = None) -> Motion:
     that knows its unit of length.
     """
     skeleton = skeleton_of(motion)
+    # the root's own Euler angles, in its joint's order
     rotations, places = root_in_world(motion, after)
     angles = np.degrees(euler_of(rotations, skeleton.joints[0]))
     rest = motion.select(tuple(name for name in motion.channels if name not in ROOT_BLOCK))
@@ -146,6 +174,7 @@ def from_root_block(motion: Motion, after: Motion | None = None) -> Motion:
 
 def root_in_world(motion: Motion, after: Motion | None = None) -> tuple[Array, Array]:
     """Rotations (T, 3, 3) and places (T, 3) in metres of the root whose block a motion has, from the origin or on."""
+    # steps of a frame each, in metres and radians
     block = motion.select(ROOT_BLOCK, ROOT_BLOCK_UNITS).values
     steps = block[:, :3] * (1, 1, np.pi / 180) / motion.fps
     if after is None:
@@ -237,6 +266,7 @@ class RootAngles(Representation):
     def mirror(self, features: Motion) -> FrameMirror:
         """The joints as :class:`motet.representation.root_block.Angles` does it."""
         lateral_x(features)
+        # joints mirror as without the block, whose channels stay in place
         joints = np.flatnonzero([name not in ROOT_BLOCK for name in features.channels])
         by_joints = Angles().mirror(features.select(tuple(features.channels[d] for d in joints)))
         columns = np.arange(len(features.channels))
@@ -272,11 +302,16 @@ class RootVectors(Representation):
         name = skeleton_of(features if after is None else after).names[0]
         joints = joints_of(features.channels)
         last = at_rest(features, (name, *joints)) if after is None else after[-1]
+        # the root by its block, all other joints by their exponential maps
         root, places = root_in_world(features, after)
         vectors = features.select(joint_channels(joints, VECTOR_KINDS)).values
         matrices = rotvec_to_rotmat(vectors.reshape(len(features), len(joints), 3))
         rotations = {joint: matrices[:, n] for n, joint in enumerate(joints)}
-        return continued(last, {name: root, **rotations}, {name: places / skeleton_of(last).unit_factor(1.0)})
+        return continued(
+            last,
+            {name: root, **rotations},
+            {name: places / skeleton_of(last).unit_factor(1.0)},
+        )
 
     def mirror(self, features: Motion) -> FrameMirror:
         """As :func:`motet.motion.mirroring.mirror` does it, for exponential maps in the parent joint's axes."""

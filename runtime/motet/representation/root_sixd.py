@@ -40,6 +40,10 @@ SIXD_SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
 """What a mirror image in the plane x = 0 makes of them."""
 
 
+FACING_SPREAD = 4 / 30
+"""Seconds, the standard deviation of the window that smooths the facing: hips sway by a stride, 0.5 s."""
+
+
 class RootSixd(Representation):
     """How the root moves over the ground, its height, and two axes of every joint."""
 
@@ -129,7 +133,8 @@ def facing(motion: Motion) -> Array:
     """
     quat = rotmat_to_quat(local_rotations(motion, [0])[:, 0])
     half = quat[:, 3] + 1j * quat[:, 1]
-    spread = 4 / 30 * motion.fps  # s, of the window that smooths it: hips sway by a stride, .5 s
+    # smoothed by a Gaussian window, and only then made an angle
+    spread = FACING_SPREAD * motion.fps
     reach = max(1, round(4 * spread))
     window = np.exp(-0.5 * (np.arange(-reach, reach + 1) / spread) ** 2)
     smooth = np.convolve(half * half, window)[reach : reach + len(motion)]
@@ -146,6 +151,7 @@ def joint_rotations(features: Motion) -> dict[str, Array]:
 
 def sixd_to_rotmat(sixd: Array) -> Array:
     """Two axes (..., 6), of any length and not quite orthogonal, to matrices (..., 3, 3) by Gram and Schmidt."""
+    # x as it is, and what of y is square to it
     x = sixd[..., :3]
     y = sixd[..., 3:]
     x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)

@@ -107,6 +107,7 @@ def ground_speeds(points: Array, fps: float) -> Array:
 
 def rise(values: Array, start: float, end: float) -> Array:
     """Smoothly from 0 at ``start`` to 1 at ``end`` (Perlin's "smootherstep", 2002)."""
+    # no division by 0 where start and end are the same: a threshold
     part = np.clip((values - start) / max(end - start, 1e-12), 0, 1)
     return part**3 * (10 - 15 * part + 6 * part**2)
 
@@ -200,10 +201,16 @@ def _height_with_flight(standing: Array, fps: float) -> Array:
 
 def led_along(motion: Motion, velocity: Array, height: Array, metres: float) -> Motion:
     """The motion with its root led by velocities (T - 1, 2) in m/s, from x = z = 0, at heights (T,) in m."""
+    # velocities add up over the ground, and the height is as it is
     path = np.zeros((len(motion), 3))
     path[1:, [0, 2]] = np.cumsum(velocity, axis=0) / motion.fps
     path[:, 1] = height
-    return with_channels(motion, channels_of(skeleton_of(motion).names[0], "t"), path / metres, ("length",) * 3)
+    return with_channels(
+        motion,
+        channels_of(skeleton_of(motion).names[0], "t"),
+        path / metres,
+        ("length",) * 3,
+    )
 
 
 def _with_flight(standing: Array, fps: float) -> Array:
@@ -225,7 +232,11 @@ def _with_flight(standing: Array, fps: float) -> Array:
 
 
 def velocity_by_feet(
-    points: Array, above: Array, fps: float, guess: Array | float = 0.0, trust: float = 1e-12
+    points: Array,
+    above: Array,
+    fps: float,
+    guess: Array | float = 0.0,
+    trust: float = 1e-12,
 ) -> Array:
     """Velocity (T - 1, 2) in m/s of the root, from points of the feet (T, K, 2) and their heights (T, K).
 
@@ -263,6 +274,9 @@ def _mean_vote(votes: Array, weights: Array, window: Array, trust: float, guess:
     reach, the guess."""
     reach = len(window) // 2
     # sums over the points first, of the weights and of the weighted votes, then over the window
-    columns = [weights.sum(axis=1), *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0)]
+    columns = [
+        weights.sum(axis=1),
+        *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0),
+    ]
     total, x, z = (np.convolve(column, window)[reach : reach + len(votes)] for column in columns)
     return np.asarray((np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None])

@@ -26,10 +26,25 @@ from motet.figures.feet.contacts import (
     smoothed,
     windows,
 )
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, LEG, Figure, ground_under, leg_length, limb_of, sole_points
+from motet.figures.humanoid import (
+    HUMANOID,
+    LEFT_RIGHT,
+    LEG,
+    Figure,
+    ground_under,
+    leg_length,
+    limb_of,
+    sole_points,
+)
 from motet.figures.humanoid.measure import Fitted
 from motet.figures.two_bones import TwoBones
-from motet.motion.kinematics import channels_of, global_transforms, posed, skeleton_of, with_channels
+from motet.motion.kinematics import (
+    channels_of,
+    global_transforms,
+    posed,
+    skeleton_of,
+    with_channels,
+)
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, inverse, product, quat_to_rotmat, rotated
 from motet.motion.scalar_or_batch import Quaternion, Vector, parts
@@ -72,7 +87,10 @@ class Leg(NamedTuple):
 
 
 def hold_feet(
-    motion: Motion, trembling: bool = False, ground: float | None = None, anchor: float | None = None
+    motion: Motion,
+    trembling: bool = False,
+    ground: float | None = None,
+    anchor: float | None = None,
 ) -> Motion:
     """The motion of any human figure with its standing feet held in place and never below ground, by turning hips,
     knees and ankles; the root and all other joints are unchanged, and the feet keep their directions in the world.
@@ -89,6 +107,7 @@ def hold_feet(
     if len(motion) < 2:
         return motion
     skeleton = skeleton_of(motion)
+    # where joints and soles are, at the humanoid's size
     rotations, places = global_transforms(motion)
     legs, scale, soles = _measured(motion, rotations, places, ground)
     settings = HoldSettings(contact=TREMBLING if trembling else SOLES, anchor=anchor)
@@ -104,12 +123,18 @@ def hold_feet(
 
 
 def _leg_turns(
-    leg: Leg, rotations: Array, places: Array, points: Array, fps: float, settings: HoldSettings
+    leg: Leg,
+    rotations: Array,
+    places: Array,
+    points: Array,
+    fps: float,
+    settings: HoldSettings,
 ) -> tuple[Array, Array, Array]:
     """Turns (T, 3, 3) in the world of thigh, shin and foot that hold the foot; the foot keeps its direction.
 
     rotations: (T, J, 3, 3) of all joints. places: their positions (T, J, 3) in metres. points: (T, K, 3) of the sole.
     """
+    # the leg as two bones in all frames at once, with the knee's axis in the world
     hip, knee, ankle = (places[:, joint] for joint in leg.joints)
     hinge_world = rotated(rotations[:, leg.joints[1]], leg.hinge)
     limb = TwoBones(*map(parts, (hip, knee, ankle, hinge_world)))
@@ -119,6 +144,7 @@ def _leg_turns(
 
 def _with_turned(motion: Motion, turned: Array, joints: list[int]) -> Motion:
     """The motion with some of its joints turned as in world rotations (T, J, 3, 3)."""
+    # each joint in its parent's frame, as channels have it
     skeleton = skeleton_of(motion)
     local = {}
     for i in joints:
@@ -140,7 +166,11 @@ def _measured(motion: Motion, rotations: Array, places: Array, ground: float | N
     if motion.skeleton == HUMANOID:
         soles = sole_points(rotations, places)
         soles[..., 1] -= ground_under(soles) if ground is None else ground
-        return _legs(HUMANOID.places, np.tile(np.eye(3), (places.shape[1], 1, 1))), 1.0, soles
+        return (
+            _legs(HUMANOID.places, np.tile(np.eye(3), (places.shape[1], 1, 1))),
+            1.0,
+            soles,
+        )
 
     figure = Figure.of(motion)
     fitted = figure.fitted
@@ -214,8 +244,12 @@ def _stance_paths(
     times = []
     paths = []
     for start, stop in _stances(standing, settings.lifted * fps):
+        # steps add up to a path, whose median becomes the place where the foot stands
         path = np.concatenate([np.zeros((1, 2)), np.cumsum(undone[start:stop], axis=0)])
-        path -= np.median(path if settings.anchor is None else path[: round(settings.anchor * fps) + 1], axis=0)
+        path -= np.median(
+            path if settings.anchor is None else path[: round(settings.anchor * fps) + 1],
+            axis=0,
+        )
         times.append(np.arange(start, stop + 1))
         paths.append(path)
     return times, paths
@@ -224,6 +258,7 @@ def _stance_paths(
 def _stances(standing: NDArray[np.bool_], lifted: float) -> Iterator[tuple[int, int]]:
     """The first and last frame of each stance, from whether a foot stands (T - 1,) from each frame to the next; stances
     with fewer than ``lifted`` frames between them are one."""
+    # the frames at which a stance starts and stops; neighbours that are near become one
     edges = np.flatnonzero(np.diff([False, *standing, False])).reshape(-1, 2)
     apart = edges[1:, 0] - edges[:-1, 1] >= lifted
     starts = edges[np.r_[True, apart][: len(edges)], 0]
@@ -244,11 +279,13 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
 
 def _keys(times: list[NDArray[np.intp]], values: list[Array], blend: float) -> tuple[Array, Array]:
     """Times (K,) and values (K, 2): the known ones, and zeros wherever there is time to fade out and in again."""
+    # the first and the last key lie outside the motion, so that each frame is between two
     zero = np.zeros((1, 2))
     key_times = [np.array([-2 * blend])]
     key_values = [zero]
     for time, value in zip(times, values, strict=True):
         last = key_times[-1][-1]
+        # a pause that is long enough goes to 0 and back; a shorter one straight from stance to stance
         if time[0] - last > 2 * blend:
             key_times.append(np.array([last + blend, time[0] - blend]))
             key_values += [zero, zero]

@@ -20,7 +20,15 @@ from motet.figures.feet.contacts import (
     smoothed,
     velocity_by_feet,
 )
-from motet.figures.humanoid import HUMANOID, ground_under, is_mmm, leg_length, sole_points, to_humanoid, with_figure
+from motet.figures.humanoid import (
+    HUMANOID,
+    ground_under,
+    is_mmm,
+    leg_length,
+    sole_points,
+    to_humanoid,
+    with_figure,
+)
 from motet.motion.kinematics import (
     channels_of,
     global_transforms,
@@ -82,6 +90,7 @@ def is_in_place(motion: Motion, settings: TreadmillSettings = STANDARD) -> bool:
     skeleton = motion.skeleton
     if skeleton is None or not any(name.endswith(".tx") for name in motion.channels):
         return False
+    # cheap tests first: most recordings go too far to be in place
     motion = motion.resample(min(motion.fps, settings.fps))
     try:
         if len(motion) < 3 or not _may_be(motion, skeleton, settings):
@@ -100,21 +109,30 @@ def with_travel(motion: Motion) -> Motion:
     is not human.
     """
     motion = with_figure(motion) if is_mmm(motion) else motion
+    # the path that the feet of the humanoid lay, beside the one that it has
     on_humanoid, to_file = _on_humanoid(motion)
     root = local_translations(on_humanoid)[:, 0]
     laid_root = local_translations(lay_root_path(on_humanoid))[:, 0]
     path = (laid_root - root + root[:1]) * [1, 0, 1]
+    # the same path in the file's world and unit
     root_in_file = local_translations(motion)[:, 0] + path @ to_file
-    return with_channels(motion, channels_of(skeleton_of(motion).names[0], "t"), root_in_file, ("length",) * 3)
+    return with_channels(
+        motion,
+        channels_of(skeleton_of(motion).names[0], "t"),
+        root_in_file,
+        ("length",) * 3,
+    )
 
 
 def _may_be(motion: Motion, skeleton: Skeleton, settings: TreadmillSettings) -> bool:
     """Whether a first look, before the figure is measured, leaves it open: most recordings end here."""
+    # the root goes too far, as far as an adult's size tells
     unit = skeleton.height / ADULT_HEIGHT
     extents = np.ptp(local_translations(motion), axis=0)
     moving = extents[extents.max(axis=1) > 0]
     if len(moving) and np.hypot(*moving[0, [0, 2]]) > 1.5 * settings.room * unit:  # with y up
         return False
+    # or the feet do not move at all
     if not has_feet(skeleton):
         return True
     reach = np.ptp(positions(motion)[:, feet_of(skeleton)], axis=0)
@@ -159,6 +177,7 @@ def _strides(motion: Motion, settings: TreadmillSettings) -> bool:
 def _swing_by_turns(left: Array, right: Array, settings: TreadmillSettings) -> bool:
     """Whether feet that are ``left`` and ``right`` (T,) metres ahead of the root stride widely, each while the other
     goes back."""
+    # the feet are apart, and one goes forward while the other goes back
     is_wide = (left - right).std() >= settings.stride
     is_opposite = (left - left.mean()) @ (right - right.mean()) < 0
     return bool(is_wide and is_opposite)
@@ -173,12 +192,14 @@ def _feet_ahead(points: Array, root: Array, direction: Array) -> Array:
 
 def _slid(motion: Motion, points: Array, settings: TreadmillSettings) -> Array:
     """The velocity (T - 1, 2) in m/s that would keep points (T, P, 3) of the humanoid's soles from sliding."""
+    # over the ground, without the trembling of recorded feet
     plane = smoothed(points[..., [0, 2]], settings.calm, motion.fps)
     return velocity_by_feet(plane, points[..., 1] - ground_under(points), motion.fps)
 
 
 def _averaged(velocity: Array, frames: float) -> Array:
     """Velocities (T, 2), each the mean over a window of that many frames around it, cut off at the ends."""
+    # a sum over the window, divided by the number of frames that it has there
     window = np.ones(max(1, min(round(frames), len(velocity))))
     count = np.convolve(np.ones(len(velocity)), window, "same")
     return np.stack([np.convolve(column, window, "same") / count for column in velocity.T], axis=1)

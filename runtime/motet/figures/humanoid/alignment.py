@@ -18,7 +18,14 @@ import numpy as np
 
 from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, limb_of, sided
 from motet.figures.humanoid.joint_map import LIMB_BONES, Body, humanoid_direction
-from motet.motion.rotations import Array, frames_last, product, rotvec_to_rotmat, swing, unit
+from motet.motion.rotations import (
+    Array,
+    frames_last,
+    product,
+    rotvec_to_rotmat,
+    swing,
+    unit,
+)
 
 
 def _axes_turns() -> Array:
@@ -61,6 +68,7 @@ def body_frame(pose: Array, body: Body, exact: bool = False) -> Array | None:
     A body stands where both legs point one way and the trunk the other, feet forward, and left is left. Axes near
     those of the coordinates, as they are in every rest pose that somebody made, are taken to be exactly these.
     """
+    # legs decide: across them is left, along them is up
     across = body.to_left(pose, "UpperLeg")
     up = body.legs_up(pose)
     if not np.linalg.norm(across) or abs(float(np.dot(unit(across), up))) > 0.9:
@@ -88,6 +96,7 @@ def _stands(pose: Array, body: Body, axes: Array) -> bool:
 
 def rests_in_motion(body: Body) -> bool:
     """Whether the rest pose is one out of a motion: limbs of left and right differ, and are not along axes."""
+    # limbs seen from the body, of both sides
     rest = body.skeleton.rest_positions
     axes = frame(body.to_left(rest, "UpperLeg"), body.trunk_up(rest))
     parts = [part for part in (*LEG[:2], *ARM[1:3]) if body.aims[sided("left", part)]]
@@ -101,6 +110,7 @@ def rests_in_motion(body: Body) -> bool:
 
 def _near_axes(rotation: Array, degrees: float) -> Array:
     """The nearest of :data:`AXES_TURNS` to a rotation (3, 3) if it is within ``degrees`` of it, else the rotation."""
+    # the trace of the product is largest for the nearest rotation, and gives the angle to it
     nearest: Array = AXES_TURNS[int(np.argmax(np.sum(AXES_TURNS * rotation, axis=(1, 2))))]
     angle = np.arccos(np.clip((np.sum(rotation * nearest) - 1) / 2, -1, 1))
     return nearest if np.degrees(angle) < degrees else rotation
@@ -157,6 +167,7 @@ def _foot_turn(target: Array, body: Array, leg: Array) -> Array:
     Where legs are spread at rest, some figures stand on flat soles and others have feet that are at right angles to
     the legs, as those of ASF files; the latter lie in the plane of leg and forward direction.
     """
+    # which of both the foot goes with
     base = leg if abs(float(leg[:, 0] @ target)) < abs(float(body[:, 0] @ target)) - 1e-3 else body
     x, y, z = base.T @ target
     if z < 0.5 * np.hypot(x, y) and z < 0.5:
@@ -174,11 +185,15 @@ def axes_agree(body: Body, rotations: Array, positions: Array) -> bool:
     directions: dict[int, tuple[Array, Array]] = {}
     for bone, ends in body.aims.items():
         if ends:
-            directions[body.joints[bone]] = (humanoid_direction(bone), body.along(positions, bone))
+            directions[body.joints[bone]] = (
+                humanoid_direction(bone),
+                body.along(positions, bone),
+            )
     to_left = np.array([1.0, 0.0, 0.0])
     directions[body.joints["hips"]] = (to_left, body.to_left(positions, "UpperLeg"))
     directions[joint_map.spine[-1]] = (to_left, body.to_left(positions, "UpperArm"))
 
+    # seen from the joints they have to be the same directions
     known = [joint for joint in directions if joint in joint_map.axes]
     for joint in known:
         of_humanoid, in_frames = directions[joint]
@@ -235,7 +250,7 @@ class Calibration:
         if known:
             self.aligned[joint] = _known_axes(known)
             return
-        # the rotation nearest to all from the joint's to its bone's
+        # the rotation nearest to all from the joint's to its bone's (Kabsch 1976)
         u, _, v = np.linalg.svd(np.einsum("tji,tjk->ik", self.rotations[:, joint], turns))
         mean: Array = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))]) @ v
         self.aligned[joint] = _near_axes(mean, 30) if self.along_axes else mean
@@ -253,7 +268,11 @@ class Calibration:
     def _trunk(self) -> None:
         """Hips and back: up towards the arms, the joint that carries the arms and those above: up towards the head."""
         body = self.body
-        back = [body.joints["hips"], *body.joint_map.spine, *body.joint_map.neck_and_head]
+        back = [
+            body.joints["hips"],
+            *body.joint_map.spine,
+            *body.joint_map.neck_and_head,
+        ]
         chest = len(body.joint_map.spine)
         legs_left = unit(body.to_left(self.positions, "UpperLeg"))
         arms_left = unit(body.to_left(self.positions, "UpperArm"))

@@ -57,7 +57,11 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
     places = dict(trunk)
     for side, sign in zip(sides, (1.0, -1.0), strict=True):
         for part, (parent, (x, y, z), order) in left.items():
-            places[side + part] = (side + parent if parent in left else parent, (sign * x, y, z), order)
+            places[side + part] = (
+                side + parent if parent in left else parent,
+                (sign * x, y, z),
+                order,
+            )
     names = list(places)
     joints = []
     for name, (parent, (x, y, z), order) in places.items():
@@ -121,7 +125,10 @@ FINGERS: Places = _TABLES["fingers"]
 MMM_HEIGHT = 1.7
 """Metres of the body of MMM files, which do not state it."""
 
-MMM_SKELETON = Skeleton(_joints(**_table("mmm.json"), sides=("L", "R"), scale=MMM_HEIGHT), metres_per_unit=1.0)
+MMM_SKELETON = Skeleton(
+    _joints(**_table("mmm.json"), sides=("L", "R"), scale=MMM_HEIGHT),
+    metres_per_unit=1.0,
+)
 """The figure of MMM files (KIT), which have no skeleton, and one channel for each angle: the Master Motor Map's
 reference body. Its segments, in mmm.json, are Winter's fractions of the body's height; it rests with arms down, and a
 joint turns about its three axes one after the other. Here y is up and the figure faces z."""
@@ -175,7 +182,13 @@ def rig(name: str) -> Skeleton:
     for joint, (parent, position) in tree.items():
         offset = (position - tree[parent][1] if parent else position) / rig["unit"]
         x, y, z = offset.tolist()
-        joints.append(Joint(rig.get("prefix", "") + joint, names.index(parent) if parent else -1, (x, y, z)))
+        joints.append(
+            Joint(
+                rig.get("prefix", "") + joint,
+                names.index(parent) if parent else -1,
+                (x, y, z),
+            )
+        )
     return Skeleton(tuple(joints), rig["unit"])
 
 

@@ -27,7 +27,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from motet.errors import FormatError, MotionError
-from motet.figures.humanoid.bones import ARM, BONES, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, Triple, limb_of, sided
+from motet.figures.humanoid.bones import (
+    ARM,
+    BONES,
+    HUMANOID,
+    LEFT_RIGHT,
+    LEG,
+    NECK,
+    SPINE,
+    Triple,
+    limb_of,
+    sided,
+)
 from motet.motion.rotations import Array, unit
 from motet.motion.skeleton import END_SUFFIX, Skeleton, repeated
 
@@ -152,6 +163,7 @@ class Body:
 
     def _ends(self, joint: int) -> tuple[int, ...]:
         """The nearest joints below one that lie apart from it, without thumbs."""
+        # joints at the same place point nowhere: those after them do
         children = [i for i in self.skeleton.children[joint] if "thumb" not in self.skeleton.names[i].lower()]
         apart = tuple(child for child in children if np.any(self.skeleton.offsets[child]))
         if apart:
@@ -234,9 +246,15 @@ def _chains(joint_map: JointMap) -> dict[str, tuple[int, ...]]:
     # the joint that carries the legs may hang beside the back, below an ancestor of both
     chains = {"back": joint_map.spine, "neck": (back, *joint_map.neck)}
     for side in LEFT_RIGHT:
-        for limb, first, parts in (("leg", joint_map.joints["hips"], LEG), ("arm", back, ARM)):
+        for limb, first, parts in (
+            ("leg", joint_map.joints["hips"], LEG),
+            ("arm", back, ARM),
+        ):
             bones = [bone for bone in limb_of(side, parts) if bone in joint_map.joints]
-            chains[f"{side} {limb}"] = (first, *(joint_map.joints[bone] for bone in bones))
+            chains[f"{side} {limb}"] = (
+                first,
+                *(joint_map.joints[bone] for bone in bones),
+            )
     return chains
 
 
@@ -278,7 +296,10 @@ def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, .
     places: dict[str, tuple[int, ...]] = {}
     for bone, names in _entries(path).items():
         if bone not in known:
-            raise FormatError(path, f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
+            raise FormatError(
+                path,
+                f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}",
+            )
         try:
             places[bone] = tuple(skeleton.index(name) for name in names)
         except MotionError as error:
@@ -353,7 +374,11 @@ class Convention:
 @cache
 def conventions() -> tuple[Convention, ...]:
     """All tables; one with several ways to write the sides comes once for each."""
-    tables = sorted((files("motet.figures.humanoid") / "conventions").iterdir(), key=lambda table: table.name)
+    # in the order of their files' names, which decides between equals
+    tables = sorted(
+        (files("motet.figures.humanoid") / "conventions").iterdir(),
+        key=lambda table: table.name,
+    )
     all_conventions = []
     for table in tables:
         content = json.loads(table.read_text("utf-8"))
@@ -447,6 +472,7 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
     HalfKnownError where a convention fits but for bones that are missing or out of order; MotionError where two joints
     are the hips.
     """
+    # every way to read the names by every convention, the best score first
     matches = []
     for names in _written(skeleton.names):
         for convention in conventions():
@@ -458,6 +484,7 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
     one_sided = missing_on_one_side(missing_bones(fullest), fullest)
     whole = [match for match in matches if not missing_bones(match.joint_map)]
     best = matches[0] if one_sided or not whole else whole[0]
+    # a convention that knows half of the names is no accident
     missing = missing_bones(best.joint_map)
     joints = best.joint_map.joints
     if missing:
@@ -489,12 +516,15 @@ def _nearly_all(count: int, names: Sequence[str]) -> bool:
 def without_numbers(names: tuple[str, ...]) -> tuple[str, ...]:
     """Names without the numbers that programs add at their ends: of nearly all names ("LeftArm_07", "hand.L.001"), or
     the one digit that nearly all end in ("Hips1", "Spine11"), or of names that no other is like without them."""
+    # numbers after a separator, that nearly all names have
     bare = tuple(re.sub(r"(?<=.)[ ._-]+[0-9]+$", "", name) for name in names)
     if _nearly_all(sum(map(str.__ne__, bare, names)), names):
         return bare
+    # one digit that nearly all names end in
     last, count = _commonest([name[-1:] for name in names])
     if last in set("0123456789") and _nearly_all(count, names):
         return tuple(name.removesuffix(last) if len(name) > 1 else name for name in names)
+    # else the number goes where the name stays unlike all others
     counts = Counter(bare)
     return tuple(short if counts[short] == 1 else name for short, name in zip(bare, names, strict=True))
 
@@ -586,14 +616,19 @@ def _chain(convention: Convention, chain: str, places: Mapping[str, int]) -> tup
 
 
 def _score(
-    convention: Convention, names: Sequence[str], bare: Sequence[str], joints: Mapping[str, int]
+    convention: Convention,
+    names: Sequence[str],
+    bare: Sequence[str],
+    joints: Mapping[str, int],
 ) -> tuple[int, int, int]:
     """How well a convention fits (:attr:`_Match.score`) plain names, written ones without prefixes, and the joints
     of limbs."""
+    # without a mark these names are another convention's
     known = convention.aside.union(*convention.names.values())
     is_marked = not convention.marks or not convention.marks.isdisjoint(names)
     count = sum(name in known for name in names) if is_marked else 0
     spelled = sum(name in convention.spelled for name in bare)
+    # bones that the convention has and this skeleton lacks
     absent = sum(_absent_in_chain(convention, chain, set(names)) for chain in CHAINS)
     for bone in convention.names:
         if bone not in CHAINS and bone not in joints and bone not in convention.optional:

@@ -25,11 +25,21 @@ from motet.figures.humanoid.joint_map import (
 from motet.motion.kinematics import local_translations, positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
-from motet.motion.skeleton import END_SUFFIX, LEFT, RIGHT, Skeleton, partners_of, sides_of
+from motet.motion.skeleton import (
+    END_SUFFIX,
+    LEFT,
+    RIGHT,
+    Skeleton,
+    partners_of,
+    sides_of,
+)
 
 NO_HUMAN = "this skeleton is no human's: expected hips with two legs, and a back with two arms"
 
-WORN = re.compile("hair|braid|bangs|skirt|cape|cloak|ribbon|scarf|backpack|髪|スカート|マント|リボン", re.IGNORECASE)
+WORN = re.compile(
+    "hair|braid|bangs|skirt|cape|cloak|ribbon|scarf|backpack|髪|スカート|マント|リボン",
+    re.IGNORECASE,
+)
 """What names of chains of joints contain that are no limbs."""
 
 Limbs = list[dict[str, int]]
@@ -63,7 +73,11 @@ class _Tree:
         self.skeleton = skeleton_of(motion)
         self.names = without_numbers(self.skeleton.names)
         self.partners = partners_of(self.names)
-        self.lengths = np.linalg.norm(local_translations(motion)[0] if len(motion) else self.skeleton.offsets, axis=1)
+        # from the first frame, as some files move joints that rest at the root
+        self.lengths = np.linalg.norm(
+            local_translations(motion)[0] if len(motion) else self.skeleton.offsets,
+            axis=1,
+        )
         self.lengths[0] = 0.0
         self.reach = np.zeros(len(self.lengths))
         for i in range(len(self.lengths) - 1, 0, -1):
@@ -102,6 +116,7 @@ class _Tree:
 
     def legs_and_arms(self) -> tuple[_Fork, _Fork]:
         """The two forks with the longest limbs, named ones if there are any, the one nearer to the root first."""
+        # of each joint the pair that is most alike, the longest limbs first
         forks = []
         for joint in range(len(self.lengths)):
             forks += self.forks(joint)[:1]
@@ -112,6 +127,7 @@ class _Tree:
         if len(limbs) < 2 or limbs[1].length < 0.3 * limbs[0].length:
             pairs = f"one pair of limbs, at {self.skeleton.names[limbs[0].joint]!r}" if limbs else "no pair of limbs"
             raise MotionError(f"{NO_HUMAN}; found {pairs}")
+        # legs hang nearer to the root than arms
         first, second = sorted(limbs[:2], key=lambda fork: len(self.skeleton.ancestors(fork.joint)))
         return first, second
 
@@ -144,6 +160,7 @@ class _Tree:
 
     def pair(self, fork: _Fork) -> tuple[list[list[int]], list[float]]:
         """The paths of two limbs, as long as the shorter, and how far down their joints are, the mean of both."""
+        # both limbs joint by joint, as far as both go
         paths = [self.path(limb) for limb in fork.limbs]
         shortest = min(map(len, paths))
         paths = [path[:shortest] for path in paths]
@@ -187,6 +204,7 @@ class _Tree:
 
     def neck(self, arms: _Fork) -> tuple[tuple[int, ...], int | None]:
         """The joints between the arms and the head, and the head's, where there are."""
+        # what else hangs where the arms do, if it has a length
         branches = [child for child in self.skeleton.children[arms.joint] if child not in arms.limbs]
         branches = [child for child in branches if self.reach[child] + self.lengths[child] > 0]
         if not branches:
@@ -243,6 +261,7 @@ def map_by_tree(motion: Motion) -> JointMap:
 def _mapped(tree: _Tree, frames: Array, legs: _Fork, arms: _Fork) -> JointMap:
     """The map by the tree with known legs and arms, in frames (T, J, 3)."""
     skeleton = tree.skeleton
+    # the back goes from the legs' joint up to the arms'
     hips_up = skeleton.ancestors(legs.joint)
     back = [joint for joint in skeleton.ancestors(arms.joint) if joint not in hips_up]
     if not back:
@@ -254,7 +273,10 @@ def _mapped(tree: _Tree, frames: Array, legs: _Fork, arms: _Fork) -> JointMap:
     if head is not None:
         joints["head"] = head
     _check_straight(skeleton, frames, joints)
-    return check_map(skeleton, JointMap(joints, tuple(back[::-1]), neck, BY_THE_TREE, 0.8 if named else 0.6))
+    return check_map(
+        skeleton,
+        JointMap(joints, tuple(back[::-1]), neck, BY_THE_TREE, 0.8 if named else 0.6),
+    )
 
 
 def _sided_limbs(tree: _Tree, frames: Array, legs: Limbs, arms: _Fork) -> tuple[dict[str, int], bool]:
@@ -265,7 +287,10 @@ def _sided_limbs(tree: _Tree, frames: Array, legs: Limbs, arms: _Fork) -> tuple[
     to_left = _to_left(poses, legs, tree.skeleton)
     joints = {}
     named = False
-    for pair, parts, first in ((legs, LEG, "UpperLeg"), (tree.arms(arms), ARM, "UpperArm")):
+    for pair, parts, first in (
+        (legs, LEG, "UpperLeg"),
+        (tree.arms(arms), ARM, "UpperArm"),
+    ):
         left_first, by_name = _left_first(tree, poses, to_left, [limb[first] for limb in pair])
         named = named or by_name
         for side, limb in zip(LEFT_RIGHT, pair if left_first else pair[::-1], strict=True):
@@ -319,6 +344,7 @@ def _is_bent(skeleton: Skeleton, frames: Array, upper: int, lower: int) -> bool:
 
 def _stands(pose: Array, legs: Limbs, arms: _Fork) -> bool:
     """Whether in a pose (J, 3) both legs are straight, and the arms above them."""
+    # legs point down, seen from the trunk
     thighs = unit(np.array([pose[leg["UpperLeg"]] - pose[leg["LowerLeg"]] for leg in legs]))
     shins = unit(np.array([pose[leg["LowerLeg"]] - pose[leg["Foot"]] for leg in legs]))
     trunk = unit(pose[list(arms.limbs)].mean(axis=0) - pose[[leg["UpperLeg"] for leg in legs]].mean(axis=0))
@@ -330,7 +356,10 @@ def _to_left(frames: Array, legs: Limbs, skeleton: Skeleton) -> Array:
     forward = np.zeros(frames[:, 0].shape)
     up = np.zeros(frames[:, 0].shape)
     for leg in legs:
-        ends = [*([leg["Toes"]] if "Toes" in leg else []), *skeleton.children[leg["Foot"]]]
+        ends = [
+            *([leg["Toes"]] if "Toes" in leg else []),
+            *skeleton.children[leg["Foot"]],
+        ]
         forward += unit(frames[:, ends[0]] - frames[:, leg["Foot"]]) if ends else 0.0
         up += unit(frames[:, leg["UpperLeg"]] - frames[:, leg["Foot"]])
     return np.cross(up, forward)
@@ -338,6 +367,7 @@ def _to_left(frames: Array, legs: Limbs, skeleton: Skeleton) -> Array:
 
 def _left_first(tree: _Tree, frames: Array, to_left: Array, pair: list[int]) -> tuple[bool, bool]:
     """Whether the first of two joints is the left one, and whether their names say so."""
+    # names first, then which of both lies to the left of the feet's direction
     sides = [sides_of(tree.names)[joint] for joint in pair]
     if sorted(sides) == sorted((LEFT, RIGHT)):
         return sides[0] == LEFT, True

@@ -9,7 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.errors import MotionError, UnitError, listed
-from motet.figures.humanoid.alignment import Calibration, alignments_of_pose, axes_agree, body_frame, rests_in_motion
+from motet.figures.humanoid.alignment import (
+    Calibration,
+    alignments_of_pose,
+    axes_agree,
+    body_frame,
+    rests_in_motion,
+)
 from motet.figures.humanoid.bones import (
     HUMANOID,
     LEFT_RIGHT,
@@ -22,7 +28,14 @@ from motet.figures.humanoid.bones import (
     part_of,
     sided,
 )
-from motet.figures.humanoid.joint_map import BY_THE_TREE, LIMB_BONES, NEEDED, Body, JointMap, humanoid_direction
+from motet.figures.humanoid.joint_map import (
+    BY_THE_TREE,
+    LIMB_BONES,
+    NEEDED,
+    Body,
+    JointMap,
+    humanoid_direction,
+)
 from motet.figures.humanoid.joint_tree import map_of
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
@@ -169,7 +182,15 @@ def _fit_in_first_frame(body: Body, leg: float, rotations: Array, pose: Array, f
     return Fitted(body, aligned, leg, _heights(body, leg, pose @ frame[:, 1]), None, 0.95, (note,))
 
 
-def _fit_in_frames(body: Body, leg: float, rotations: Array, places: Array, *, known: bool, moving: bool) -> Fitted:
+def _fit_in_frames(
+    body: Body,
+    leg: float,
+    rotations: Array,
+    places: Array,
+    *,
+    known: bool,
+    moving: bool,
+) -> Fitted:
     """A figure by the movements of its frames, or by the axes of joints where its convention's are known to fit.
 
     moving: whether the rest pose is out of a motion, so that joints have no axes along bones.
@@ -183,6 +204,7 @@ def _fit_in_frames(body: Body, leg: float, rotations: Array, places: Array, *, k
             "give a file of this figure that rests in a T-pose (rest=, --rest)"
         )
         confidence = 0.7
+    # each joint by the directions of its bones
     aligned = Calibration(body, rotations, places, along_axes=known or not moving).aligned
     # the joint that carries legs and back turns with the hips
     hips = body.joints["hips"]
@@ -215,6 +237,7 @@ def _heights(body: Body, leg: float, rise: Array | None) -> dict[str, float]:
 
 def leg_of(body: Body, pose: Array) -> float:
     """Length of thigh and shin in the skeleton's unit, the mean of both sides; MotionError for bones without length."""
+    # the lengths of all limbs' bones: a human has none of length 0
     bones = [bone for bone in NEEDED if bone not in ("hips", "spine") and body.aims[bone]]
     lengths = {bone: float(np.linalg.norm(body.along(pose, bone))) for bone in bones}
     leg = sum(lengths[bone] for bone in limb_of("left", LEG[:2]) + limb_of("right", LEG[:2])) / 2
@@ -247,7 +270,11 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
     # of the units that make likely legs the one that makes those nearest to an adult's
     shortest, longest = LIKELY_LEGS
     likely = [name for name, metres in LENGTH_UNITS.items() if shortest < leg * metres < longest]
-    guess = min(likely, key=lambda name: abs(np.log(leg * LENGTH_UNITS[name] / ADULT_LEG)), default=None)
+    guess = min(
+        likely,
+        key=lambda name: abs(np.log(leg * LENGTH_UNITS[name] / ADULT_LEG)),
+        default=None,
+    )
     stated = skeleton.metres_per_unit
     if stated is not None:
         shortest, longest = POSSIBLE_LEGS
@@ -259,7 +286,10 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
     if guess is None:
         return Unit(None, "unit not known: the figure is taken to be an adult's size")
     metres = LENGTH_UNITS[guess]
-    return Unit(metres, f"unit taken to be {guess} from the length of the legs, {leg * metres:.2f} m")
+    return Unit(
+        metres,
+        f"unit taken to be {guess} from the length of the legs, {leg * metres:.2f} m",
+    )
 
 
 def unit_by_legs(motion: Motion) -> Unit:
@@ -271,6 +301,7 @@ def unit_by_legs(motion: Motion) -> Unit:
 def height_of(fitted: Fitted) -> float:
     """Height of a figure that stands straight, in the skeleton's unit: its legs and back are measured, its soles and
     crown are the humanoid's."""
+    # up to the head, or as far as the figure has joints
     joint_map = fitted.joint_map
     skeleton = fitted.body.skeleton
     top = "head" if "head" in joint_map.joints else "neck" if joint_map.neck else SPINE[-1]
@@ -286,11 +317,16 @@ def _back_length(skeleton: Skeleton, hips: int, joint: int) -> float:
     return sum(float(np.linalg.norm(skeleton.offsets[i])) for i in chain[: chain.index(hips)])
 
 
+BENT = 0.3
+"""The sine of a knee's angle from which on it is bent."""
+
+
 def check_stance(body: Body, positions: Array) -> None:
     """Refuse frames (T, J, 3) of a figure on four legs; called where its rest pose is not a standing body.
 
     A human who sits has the trunk beside the legs, too; known names tell one who sits upright from an animal.
     """
+    # in 95 % of the frames the trunk is not above the legs
     trunk = body.trunk_up(positions)
     beside = np.quantile(np.sum(trunk * body.legs_up(positions), axis=-1), 0.95) < 0.3
     sits = body.joint_map.convention != BY_THE_TREE and np.median(trunk[:, 1]) > 0.5
@@ -337,7 +373,7 @@ def _knee_frames(body: Body, positions: Array, hinges: dict[str, Array]) -> tupl
     for side, hinge in hinges.items():
         thigh = body.direction(positions, sided(side, "UpperLeg"))
         bend = np.cross(thigh, body.direction(positions, sided(side, "LowerLeg")))
-        is_bent = np.linalg.norm(bend, axis=-1) > 0.3  # the sine of the knee's angle
+        is_bent = np.linalg.norm(bend, axis=-1) > BENT
         is_forward = (np.sum(bend * hinge, axis=-1) < 0) & (np.sum(bend * left, axis=-1) < 0)
         bent += int(is_bent.sum())
         wrong += int((is_bent & is_forward).sum())
@@ -369,11 +405,15 @@ def upright(fitted: Fitted, places: Array) -> tuple[Array, str | None]:
     name = "xyz"[int(np.argmax(np.abs(up)))]
     if _walks_across(fitted, up, places[trunk @ up > ALONG]):
         return swing(up, UP), f"turned upright: the frames stand along {name}, the rest pose along y"
-    return still, f"the body lies along {name} in most frames: if it stands there, export the file with y up"
+    return (
+        still,
+        f"the body lies along {name} in most frames: if it stands there, export the file with y up",
+    )
 
 
 def _up_of_frames(fitted: Fitted, trunk: Array, places: Array) -> Array | None:
     """The direction (3,) along x or z in which trunks (T, 3) and legs point in most frames; None where y is up."""
+    # the axis that trunks are nearest to in the middle of the frames
     mean = np.median(trunk, axis=0)
     axis = int(np.argmax(np.abs(mean)))
     up: Array = np.sign(mean[axis]) * np.eye(3)[axis]
@@ -384,6 +424,7 @@ def _up_of_frames(fitted: Fitted, trunk: Array, places: Array) -> Array | None:
 
 def _walks_across(fitted: Fitted, up: Array, places: Array) -> bool:
     """Whether a figure walks: it goes its leg's length and more across ``up``, and not along it."""
+    # how far it goes along the axis, and how far across it
     path = fitted.body.middle(places, "UpperLeg")
     rise = float(np.ptp(path @ up))
     extent = np.linalg.norm(np.ptp(path - (path @ up)[:, None] * up, axis=0))

@@ -31,7 +31,14 @@ from motet.figures.humanoid.bones import (
 )
 from motet.figures.humanoid.joint_map import BY_THE_TREE, JointMap
 from motet.figures.humanoid.joint_tree import map_of
-from motet.figures.humanoid.measure import Fitted, check_frames, fit, height_of, unit_of, upright
+from motet.figures.humanoid.measure import (
+    Fitted,
+    check_frames,
+    fit,
+    height_of,
+    unit_of,
+    upright,
+)
 from motet.figures.humanoid.soles import Mesh, on_own_soles
 from motet.motion.kinematics import (
     by_name,
@@ -187,6 +194,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     skeleton = skeleton_of(motion)
     if not len(motion):
         raise MotionError("this motion has no frames to put on the humanoid")
+    # by names, by the tree, or as the user says
     joint_map = joint_map or map_of(motion)
 
     # the figure is measured, and refused where its knees bend the wrong way about the thighs' axes
@@ -240,6 +248,7 @@ def grounded(motion: Motion) -> Motion:
     if "hips.ty" not in motion.channels:
         return motion
     ground = bones.ground_under(bones.sole_points(*global_transforms(motion)))
+    # what is far from the ground is meant to be: stairs, a chair, a jump
     values = np.array(motion.values)
     values[:, motion.channels.index("hips.ty")] -= ground if abs(ground) < 0.1 else 0.0
     return replace(motion, values=values)
@@ -254,21 +263,27 @@ def _humanoid_rotations(rotations: Array, places: Array, fitted: Fitted) -> Arra
     aligned = product(rotations, fitted.aligned)
     turned = {bone: aligned[:, joint] for bone, joint in joint_map.joints.items()}
     if not fitted.pelvis:
-        # the pelvis turns the shortest way to where the legs' joints lie
-        left_of_hips = turned["hips"][:, :, 0]
-        turned["hips"] = product(swing(left_of_hips, fitted.body.to_left(places, "UpperLeg")), turned["hips"])
+        turned["hips"] = _as_legs_lie(turned["hips"], fitted.body.to_left(places, "UpperLeg"))
 
     # back and neck share out the turns of as many joints as the figure has there
     spine = [aligned[:, joint] for joint in joint_map.spine]
-    neck = [aligned[:, joint] for joint in joint_map.neck_and_head]
     turned |= _spread([turned["hips"], *spine], SPINE)
-    if neck:
-        turned |= _spread([spine[-1], *neck], NECK)
+    neck = [aligned[:, joint] for joint in (joint_map.spine[-1], *joint_map.neck_and_head)]
+    if len(neck) > 1:
+        turned |= _spread(neck, NECK)
 
     # bones that the figure lacks, and tips, go with their parents
     for bone, parent in PARENTS.items():
         turned.setdefault(bone, turned[parent])
-    return side_by_side([turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names], len(rotations))
+    return side_by_side(
+        [turned[name.removesuffix(END_SUFFIX)] for name in HUMANOID.names],
+        len(rotations),
+    )
+
+
+def _as_legs_lie(hips: Array, to_left: Array) -> Array:
+    """Rotations (T, 3, 3) of hips turned the shortest way to where the legs' joints lie, from directions (T, 3)."""
+    return product(swing(hips[:, :, 0], to_left), hips)
 
 
 Key = TypeVar("Key", str, int)
@@ -280,6 +295,7 @@ def _spread(chain: list[Array], others: Sequence[Key]) -> dict[Key, Array]:
     The first rotation is that of the joint that carries both chains, which is not among the others; the last of both
     chains is the same. Between joints rotations go the shortest way, by how far up the chain they are.
     """
+    # all rotations of the chain in one array, so that all shares are computed at once
     stacked = side_by_side(chain, len(chain[0]))
     # where the other joints are on the chain: after which joint, and by which part of the way to the next
     up_chain = np.arange(1, len(others) + 1) * (len(chain) - 1) / max(len(others), 1)
@@ -369,6 +385,7 @@ def _rise_of_joints(fitted: Fitted, source: tuple[Array, Array], turned: Array, 
 
     source: rotations and positions of the humanoid's joints. turned: rotations (T, J, 3, 3) of the figure's.
     """
+    # its soles would be here; they come to where the humanoid's are
     rotations = {bone: source[0][:, HUMANOID.index(bone)] for bone in fitted.heights}
     soles = fitted.soles(rotations, places_of(fitted.body.skeleton, turned) + path[:, None])
     ground = bones.ground_under(bones.sole_points(*source))
@@ -381,6 +398,7 @@ def _translations(fitted: Fitted, skeleton: Skeleton, turned: Array, path: Array
     carrier = fitted.joint_map.carrier(skeleton)
     if not carrier:
         return {0: path}
+    # from the joint above, whose own offset from the root is no part of the path
     figure = places_of(skeleton, turned)
     above = skeleton.joints[carrier].parent
     from_above = figure[:, carrier] + path - figure[:, above] - skeleton.offsets[0]
@@ -426,7 +444,13 @@ def _bone_rotations(source: Array, joint_map: JointMap, skeleton: Skeleton) -> d
 FINGER_BENDS = (15.0, 25.0, 15.0)
 """Degrees by which the bones of a finger of a hand at rest bend, each against the bone before."""
 
-FINGER_SHARES = {"thumb": 0.5, "index": 0.8, "mid": 1.0, "ring": 1.15, "pinky|little": 1.3}
+FINGER_SHARES = {
+    "thumb": 0.5,
+    "index": 0.8,
+    "mid": 1.0,
+    "ring": 1.15,
+    "pinky|little": 1.3,
+}
 """Pattern of the names of a finger's joints -> how far it bends in a relaxed hand, as a factor of FINGER_BENDS."""
 
 
@@ -437,6 +461,7 @@ def relaxed(skeleton: Skeleton, still: Array, joints: Mapping[str, int]) -> Arra
     finger, in the plane of themselves and the palm's normal, the thumb towards the other fingers, too. The knuckles of
     index and other fingers show on which side the palm is. Bends at rest count.
     """
+    # the hands at rest, in the world
     rotations, places = chained(skeleton, still[None].copy(), skeleton.offsets[None].copy())
     bent = still.copy()
     for side, sign in zip(LEFT_RIGHT, (-1.0, 1.0), strict=True):
@@ -474,6 +499,7 @@ def _hand_directions(fingers: Mapping[str, list[int]], places: Array, hand: int,
     knuckles = {finger: places[chain[0]] for finger, chain in fingers.items() if finger != "thumb"}
     if "index" not in knuckles or len(knuckles) < 2:
         return None
+    # index and little finger lie on a line across the palm, which tells its normal, left and right mirrored
     along = unit(np.mean(list(knuckles.values()), axis=0) - places[hand])
     across = unit(knuckles[list(knuckles)[-1]] - knuckles["index"])
     return HandDirections(along, across, unit(sign * np.cross(along, across)))
@@ -495,7 +521,10 @@ def _finger_turns(
     for joint, bone, bend in zip(chain, pointing, FINGER_BENDS, strict=False):
         # each bone bends against the bone before, about the part of the axis that is across it
         aside = unit(axis - (axis @ bone) * bone)
-        yield joint, max(0.0, np.radians(bend) * share - _bend(before, bone, aside)) * aside
+        yield (
+            joint,
+            max(0.0, np.radians(bend) * share - _bend(before, bone, aside)) * aside,
+        )
         before = bone
 
 
@@ -511,6 +540,7 @@ def _fingers(skeleton: Skeleton, hand: int) -> dict[str, list[int]]:
     fingers: dict[str, list[int]] = {}
     for joint in skeleton.below(hand):
         name = skeleton.names[joint].lower()
+        # bones within the palm do not bend
         finger = next((words for words in FINGER_SHARES if re.search(words, name)), None)
         within_palm = finger != "thumb" and re.search("meta|carpal|palm|inhand", name)
         if joint == hand or finger is None or within_palm:

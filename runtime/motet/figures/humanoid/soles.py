@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.figures.feet.contacts import bell, rise, smoothed, windows
-from motet.figures.humanoid.bones import HUMANOID, LEFT_RIGHT, ground_under, sided, sole_points
+from motet.figures.humanoid.bones import (
+    HUMANOID,
+    LEFT_RIGHT,
+    ground_under,
+    sided,
+    sole_points,
+)
 from motet.figures.humanoid.joint_map import Body
 from motet.motion.kinematics import places_of
 from motet.motion.rotations import UP, Array, product, rotated, rotvec_to_rotmat, unit
@@ -74,6 +80,7 @@ class Mesh:
 
     def lowest(self, turned: Array, places: Array) -> Array:
         """The height (T,) of the lowest point of feet, hands and head, without what hangs from the head."""
+        # hair and hats may be below the ground, a head may not
         joints = self.under("head")[:1]
         for side in LEFT_RIGHT:
             joints += self.under(sided(side, "Foot")) + self.under(sided(side, "Hand"))
@@ -107,6 +114,7 @@ class Foot:
 
     def lowest(self, share: Array) -> Array:
         """The height (T,) of the lowest point where the sole is turned by shares (T,) of the way to the level."""
+        # only heights count, so the middle row of each rotation is enough
         foot_up = rotvec_to_rotmat(share[:, None] * self.foot_to_flat)[:, 1, :, None]
         toes_up = rotvec_to_rotmat(share[:, None] * self.toes_to_flat)[:, 1, :, None]
         of_foot = (self.foot_points @ foot_up)[..., 0].min(axis=1, initial=np.inf)
@@ -120,8 +128,10 @@ class Foot:
         Less where that would raise the lowest point by less than ``worth``, so that no foot snaps for the sake of
         millimetres, and none of it where the foot neither stands nor tips; smoothed over time.
         """
+        # no further up than the ground, and no further than a flat foot reaches
         as_it_is = self.lowest(np.zeros(len(self.tilt)))
         reachable = np.minimum(self.lowest(np.ones(len(self.tilt))), ground)
+        # the least share that gets there, by bisection in all frames at once
         least = np.zeros(len(self.tilt))
         most = np.ones(len(self.tilt))
         for _ in range(BISECTIONS):
@@ -129,13 +139,17 @@ class Foot:
             above = self.lowest(middle) >= reachable
             most = np.where(above, middle, most)
             least = np.where(above, least, middle)
+        # feet of a body that lies or turns over are left as they are
         stands_or_tips = 1 - rise(self.tilt, *STEEP)
         share = most * rise(reachable - as_it_is, 0.0, worth) * stands_or_tips
         return np.clip(smoothed(share[:, None, None], CALM, fps)[:, 0, 0], 0, 1)
 
     def turn(self, turned: Array, share: Array) -> None:
         """Turn the foot's joints in ``turned`` by shares (T,) of the way to the level."""
-        for joints, to_flat in ((self.foot_joints, self.foot_to_flat), (self.toes_joints, self.toes_to_flat)):
+        for joints, to_flat in (
+            (self.foot_joints, self.foot_to_flat),
+            (self.toes_joints, self.toes_to_flat),
+        ):
             turn = rotvec_to_rotmat(share[:, None] * to_flat)
             for joint in joints:
                 turned[:, joint] = product(turn, turned[:, joint])
@@ -144,13 +158,19 @@ class Foot:
 def _to_flat(source: Array, bone: str) -> tuple[Array, Array]:
     """The angle (T,) between the sole's normal of a bone and the vertical, and the rotation vector (T, 3) that levels
     it, from rotations (T, B, 3, 3) of the humanoid's joints."""
+    # the humanoid's sole is level at rest, so its y axis is the sole's normal
     normal = source[:, HUMANOID.index(bone), :, 1]
     tilt = np.arccos(np.clip(normal @ UP, -1, 1))
     return tilt, unit(np.cross(normal, UP)) * tilt[:, None]
 
 
 def on_own_soles(
-    mesh: Mesh, source: tuple[Array, Array], turned: Array, path: Array, scale: float, fps: float
+    mesh: Mesh,
+    source: tuple[Array, Array],
+    turned: Array,
+    path: Array,
+    scale: float,
+    fps: float,
 ) -> tuple[Array, Array]:
     """A character's rotations (T, J, 3, 3) with feet tipped less where they would dig in, and how far (T,) its root is
     raised above its path, in the skeleton's unit.
@@ -182,6 +202,7 @@ def _rise_to_the_ground(feet: Sequence[Foot], soles: Array, scale: float, fps: f
     soles: (T, 6, 3) of the humanoid, whose height counts where it is far from the ground.
     """
     frames = len(soles)
+    # moments in which a foot stands flat
     heights, stands = _standing_feet(soles, fps)
     flat = np.stack([foot.lowest(np.ones(frames)) for foot in feet], axis=1)
     stands &= np.stack([foot.tilt <= FLAT for foot in feet], axis=1) & np.isfinite(flat)
@@ -198,6 +219,7 @@ def _rise_to_the_ground(feet: Sequence[Foot], soles: Array, scale: float, fps: f
 def _standing_feet(soles: Array, fps: float) -> tuple[Array, NDArray[np.bool_]]:
     """The height (T, 2) of the lowest point of each foot, and whether it is the lower one and stands, from points
     (T, 6, 3) of soles: heel, ball and tip of each foot."""
+    # the lower foot stands where its heel and its ball are both still
     points = soles.reshape(len(soles), 2, 3, 3)
     heights = points[..., 1].min(axis=2)
     lower = heights <= heights.min(axis=1, keepdims=True)
