@@ -54,6 +54,8 @@ MODULES = (
     "motet.predict.free_run",
     "motet.predict.model",
     "motet.representation.placed",
+    "motet.representation.retargeting",
+    "motet.representation.root_sixd",
     "motet.search.model",
     "motet.search.nearest",
     "motet.steering.action_layer",

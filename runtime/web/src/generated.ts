@@ -40,7 +40,10 @@ export const consensusSettings = {
 export const CONTACTS = {
   ADULT_HEIGHT: 1.7,
   ALLOWED: [0.6000000000000001, 0.2],
+  GRAVITY: 9.81,
   REACH: 1,
+  REWEIGHTINGS: 10,
+  RISE_SPAN: 0.05,
   SOLES: { heights: [0.02, 0.05], speeds: [0.3, 0.9], calm: 0.015 },
   TOGETHER: 0.05,
   VOTING_HEIGHT: 0.07,
@@ -76,7 +79,12 @@ export const ALIGNMENT = {
 
 // motet.figures.humanoid.measure
 export const MEASURE = {
+  ADULT_LEG: 0.82,
+  ALONG: 0.82,
+  BENT: 0.3,
   LENGTH_UNITS: { metres: 1, decimetres: 0.1, "CMU's unit": 0.05644444444444444, inches: 0.0254, centimetres: 0.01, millimetres: 0.001 },
+  LIKELY_LEGS: [0.55, 1.1],
+  POSSIBLE_LEGS: [0.2, 1.6],
 } as const;
 
 // motet.figures.humanoid.retarget
@@ -271,6 +279,17 @@ export const PREDICT = {
 // motet.representation.placed
 export const PLACED = {
   ROOT_PLACE: 3,
+} as const;
+
+// motet.representation.retargeting
+export const RETARGETING = {
+  FARTHEST_BONES: 45,
+  SHORTEST_BONE: 1e-06,
+} as const;
+
+// motet.representation.root_sixd
+export const ROOT_SIXD = {
+  FACING_SPREAD: 0.13333333333333333,
 } as const;
 
 // motet.search.model.IndexSettings

@@ -1,4 +1,3 @@
-import {} from "../generated.js";
 import { MotionError } from "../errors.js";
 import { spread } from "./numbers.js";
 import { plus, type Quaternion, type Vector } from "./rotations.js";

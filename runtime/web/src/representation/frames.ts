@@ -1,6 +1,7 @@
 /* Motions as the frames of a model, and back: docs/reference/bundle.md, "Frames". */
 import type { Manifest } from "../bundle/bundle.js";
 import { DecodingError, MotionError } from "../errors.js";
+import { RETARGETING, ROOT_SIXD } from "../generated.js";
 import { eulersOf, fromEuler } from "../motion/euler.js";
 import { holdFeet } from "../figures/feet/hold.js";
 import { BONES, HUMANOID, isHumanoid } from "../figures/humanoid/bones.js";
@@ -118,12 +119,12 @@ function hasBones(skeleton: Skeleton): boolean {
     HUMANOID.joints.every(({ name, parent }) => {
       if (parent < 0 || !skeleton.names.includes(name)) return true;
       const above = HUMANOID.names[parent]!;
-      const [bone, two] = [skeleton, HUMANOID].map((figure) =>
+      const [bone, other] = [skeleton, HUMANOID].map((figure) =>
         minus(at(figure, name), at(figure, above)),
       ) as [Vector, Vector];
       return (
-        Math.min(size(bone), size(two)) < 1e-6 ||
-        dot(bone, two) >= Math.cos(45 * RADIANS) * size(bone) * size(two)
+        Math.min(size(bone), size(other)) < RETARGETING.SHORTEST_BONE ||
+        dot(bone, other) >= Math.cos(RETARGETING.FARTHEST_BONES * RADIANS) * size(bone) * size(other)
       );
     })
   );
@@ -170,7 +171,7 @@ function sixd(root: Quaternion[], places: Vector[], joints: Quaternion[][], fps:
 
 /** The turn about the vertical axis, smoothed over time, calm where the root is tilted: docs/reference/bundle.md, "Frames". */
 function facingOf(root: Quaternion[], fps: number): number[] {
-  const deviation = (4 / 30) * fps;
+  const deviation = ROOT_SIXD.FACING_SPREAD * fps;
   const reach = Math.max(1, rounded(4 * deviation));
   const doubled = root.map(([, y, , w]) => [w * w - y * y, 2 * w * y] as const);
   let last = 0;

@@ -41,7 +41,7 @@ export function velocityByFeet(points: Plane[], heights: number[][], fps: number
     row.map((_, k) => 1 - rise((heights[at]![k]! + heights[at + 1]![k]!) / 2, 0, CONTACTS.VOTING_HEIGHT)),
   );
   let velocity = led(votes, near, fps);
-  for (let attempt = 0; attempt < 10; attempt++) {
+  for (let round = 0; round < CONTACTS.REWEIGHTINGS; round++) {
     const weights = votes.map((row, at) =>
       row.map((vote, k) => near[at]![k]! * agreement(vote, velocity[at]!)),
     );
@@ -96,14 +96,19 @@ export function heightsByFeet(standing: number[], fps: number): number[][] {
 
 function flown(standing: number[], fps: number): number[] {
   const heights = [...standing];
-  const span = Math.max(1, rounded(0.05 * fps)); // the upward velocity is measured over it
+  const span = Math.max(1, rounded(CONTACTS.RISE_SPAN * fps));
   let speed = 0;
   for (let at = 1; at < heights.length; at++) {
-    const falling = heights[at - 1]! + speed / fps - (0.5 * 9.81) / fps ** 2;
-    const start = Math.max(0, at - span);
-    const flies = falling > heights[at]!;
-    if (flies) heights[at] = falling;
-    speed = flies ? speed - 9.81 / fps : ((heights[at]! - heights[start]!) * fps) / (at - start);
+    const falling = heights[at - 1]! + speed / fps - (0.5 * CONTACTS.GRAVITY) / fps ** 2;
+    if (falling > heights[at]!) {
+      // in flight: the feet would have to go down faster than it falls
+      heights[at] = falling;
+      speed -= CONTACTS.GRAVITY / fps;
+    } else {
+      // on the ground, where the next flight begins with the speed of the last frames
+      const start = Math.max(0, at - span);
+      speed = ((heights[at]! - heights[start]!) * fps) / (at - start);
+    }
   }
   return heights;
 }

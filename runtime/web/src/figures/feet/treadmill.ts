@@ -78,35 +78,43 @@ function strides(motion: Motion): boolean {
   if (Math.hypot(...[0, 2].map((axis) => spread(root.map((place) => place[axis]!)))) > treadmillSettings.room)
     return false;
   const soles = solePoints(worldOf(motion));
-  const ground = groundUnder(soles);
-  const slid = averaged(
-    velocityByFeet(
-      soles.map(flat),
-      soles.map((row) => row.map((point) => point[1] - ground)),
-      fps,
-    ),
-    treadmillSettings.span * fps,
-  );
+
+  // the feet are fast, and the root goes less far than they do
+  const span = treadmillSettings.span * fps;
+  const slid = averaged(slidOf(soles, fps), span);
   const went = averaged(
     root.slice(1).map((place, at) => flat([times(minus(place, root[at]!), fps)])[0]!),
-    treadmillSettings.span * fps,
+    span,
   );
   const way = (velocity: Plane) => velocity.reduce((sum, step) => sum + Math.hypot(...step), 0);
-  const [left, right] = [0, 3].map((first) =>
-    slid.map(([x, z], at) => {
-      const foot = minus(mean(soles[at + 1]!.slice(first, first + 3)), root[at + 1]!);
-      return (foot[0] * x + foot[2] * z) / Math.max(Math.hypot(x, z), 1e-9);
-    }),
-  ) as [number[], number[]];
+  if (way(slid) < treadmillSettings.speed * slid.length) return false;
+  if (way(went) > treadmillSettings.share * way(slid)) return false;
+
+  // by turns one foot is ahead of the other, and the body stands
+  const left = aheadOf(soles, 0, root, slid);
+  const right = aheadOf(soles, 3, root, slid);
   const apart = left.map((place, at) => place - right[at]!);
   const hips = average(root.map((place) => place[1])) - average(soles.flat().map((point) => point[1]));
   return (
-    way(slid) >= treadmillSettings.speed * slid.length &&
-    way(went) <= treadmillSettings.share * way(slid) &&
     Math.sqrt(together(apart, apart)) >= treadmillSettings.stride &&
     together(left, right) < 0 &&
     hips >= treadmillSettings.hips
   );
+}
+
+/** The velocity that would keep points of soles from sliding. */
+function slidOf(soles: Vector[][], fps: number): Plane {
+  const ground = groundUnder(soles);
+  const heights = soles.map((row) => row.map((point) => point[1] - ground));
+  return velocityByFeet(soles.map(flat), heights, fps);
+}
+
+/** How far a foot, of three points from the first on, is ahead of the root along a velocity, from the second frame on. */
+function aheadOf(soles: Vector[][], first: number, root: Vector[], velocity: Plane): number[] {
+  return velocity.map(([x, z], at) => {
+    const foot = minus(mean(soles[at + 1]!.slice(first, first + 3)), root[at + 1]!);
+    return (foot[0] * x + foot[2] * z) / Math.max(Math.hypot(x, z), 1e-9);
+  });
 }
 
 /** The path over the ground of a motion of the humanoid whose feet do not slide, from the origin. */

@@ -3,7 +3,7 @@
  * the joint's rotation in the world. From a pose that is a standing body: docs/reference/retargeting.md, "Rest poses that stand".
  */
 import type { Body } from "./body.js";
-import { ARM, directionOf, LEG, SIDES } from "./bones.js";
+import { ARM, directionOf, LEG, limbOf, SIDES } from "./bones.js";
 import { carrierOf, LIMBS } from "./jointMap.js";
 import {
   cross,
@@ -58,14 +58,21 @@ export function bodyFrame(pose: Vector[], body: Body, exact = false): Quaternion
   if (!size(across) || Math.abs(dot(unit(across), up)) > 0.9) return null;
   const axes = frame(across, up);
   const bodyTurn = exact ? axes : nearAxes(axes, 15);
+  return stands(pose, body, bodyTurn) ? bodyTurn : null;
+}
+
+/** Whether a pose stands, seen from a frame: legs down, trunk up, feet forward, and the left arm on the left. */
+function stands(pose: Vector[], body: Body, bodyTurn: Quaternion): boolean {
   const seen = (vector: Vector) => rotated(inverse(bodyTurn), vector);
-  const bones = (parts: string[]) =>
-    SIDES.flatMap((side) => parts.map((part) => side + part)).filter((bone) => body.aimed(bone));
-  const legs = bones(LEG.slice(0, 2)).every((bone) => seen(body.direction(pose, bone))[1] < -0.75);
-  const stands = legs && dot(body.trunkUp(pose), rotated(bodyTurn, Y)) > 0.85;
-  const feet = bones(["Foot"]).every((bone) => seen(body.direction(pose, bone))[2] > 0.2);
-  const arms = ["UpperArm", "LowerArm"].every((part) => seen(body.toLeft(pose, part))[0] > 0);
-  return stands && feet && arms ? bodyTurn : null;
+  for (const side of SIDES) {
+    for (const bone of limbOf(side, LEG.slice(0, 2))) {
+      if (body.aimed(bone) && !(seen(body.direction(pose, bone))[1] < -0.75)) return false;
+    }
+    const foot = `${side}Foot`;
+    if (body.aimed(foot) && !(seen(body.direction(pose, foot))[2] > 0.2)) return false;
+  }
+  if (!(dot(body.trunkUp(pose), rotated(bodyTurn, Y)) > 0.85)) return false;
+  return ["UpperArm", "LowerArm"].every((part) => seen(body.toLeft(pose, part))[0] > 0);
 }
 
 /** Whether the rest pose is one out of a motion: limbs of left and right differ, and are not along axes. */

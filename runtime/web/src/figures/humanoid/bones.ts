@@ -24,6 +24,11 @@ export const ARM = ["Shoulder", "UpperArm", "LowerArm", "Hand"];
 /** Points of the sole in the frames of the foot (heel, ball) and of the toes (tip). */
 export const SOLES = soles;
 
+/** The bones of a limb on one side, such as those of LEG. */
+export function limbOf(side: string, parts: string[]): string[] {
+  return parts.map((part) => side + part);
+}
+
 /** A bone without its side. */
 export function partOf(bone: string): string {
   return bone.replace(/^(left|right)/, "");

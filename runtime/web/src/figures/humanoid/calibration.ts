@@ -2,7 +2,7 @@
 import { ALIGNMENT } from "../../generated.js";
 import { frame, knownAxes, meanDirection, nearAxes } from "./alignment.js";
 import type { Body } from "./body.js";
-import { ARM, directionOf, LEG, SIDES } from "./bones.js";
+import { ARM, directionOf, LEG, limbOf, SIDES } from "./bones.js";
 import type { World } from "../../motion/motion.js";
 import {
   cross,
@@ -27,12 +27,10 @@ import {
 export function calibrated(body: Body, world: World, alongAxes: boolean): Quaternion[] {
   const calibration = new Calibration(body, world, alongAxes);
   calibration.trunk();
+  // each stage builds on the joints settled before: trunk, then legs from the hips, and arms from the chest
   SIDES.forEach((side, at) => {
-    calibration.leg(LEG.map((part) => side + part));
-    calibration.arm(
-      ARM.map((part) => side + part),
-      at ? -1 : 1,
-    );
+    calibration.leg(limbOf(side, LEG));
+    calibration.arm(limbOf(side, ARM), at ? -1 : 1);
   });
   return calibration.aligned;
 }
@@ -92,61 +90,52 @@ class Calibration {
     const back = [joints.hips!, ...spine, ...above];
     const chest = spine.length;
     back.forEach((joint, i) => {
-      const last = i === back.length - 1;
-      this.settle(
-        joint,
-        places.map((pose) => {
-          const legs = unit(body.toLeft(pose, "UpperLeg"));
-          const arms = unit(body.toLeft(pose, "UpperArm"));
-          const left = i < chest ? plus(times(legs, 1 - i / chest), times(arms, i / chest)) : arms;
-          const start = last
-            ? pose[back[Math.max(i - 1, chest - 1)]!]!
-            : i
-              ? pose[joint]!
-              : body.middle(pose, "UpperLeg");
-          const end = last ? pose[joint]! : i < chest ? body.middle(pose, "UpperArm") : pose[back.at(-1)!]!;
-          return frame(left, minus(end, start));
-        }),
-      );
+      const turns = places.map((pose) => {
+        // left goes over from that of the legs to that of the arms
+        const legs = unit(body.toLeft(pose, "UpperLeg"));
+        const arms = unit(body.toLeft(pose, "UpperArm"));
+        const left = i < chest ? plus(times(legs, 1 - i / chest), times(arms, i / chest)) : arms;
+        return frame(left, this.up(pose, i, back, chest));
+      });
+      this.settle(joint, turns);
     });
   }
 
+  /** Up from the i-th joint of the back; from the joint below to the last. */
+  private up(pose: Vector[], i: number, back: number[], chest: number): Vector {
+    if (i === back.length - 1) return minus(pose[back[i]!]!, pose[back[Math.max(i - 1, chest - 1)]!]!);
+    const start = i ? pose[back[i]!]! : this.body.middle(pose, "UpperLeg");
+    const end = i < chest ? this.body.middle(pose, "UpperArm") : pose[back.at(-1)!]!;
+    return minus(end, start);
+  }
+
   /** Knees are hinges that bend backwards; feet and toes have the hinge's axis. */
-  leg(bones: string[]): void {
+  leg([upperLeg, lowerLeg, ...footAndToes]: string[]): void {
     const { joints } = this.body.map;
-    const thigh = this.directions(bones[0]!);
-    const shin = this.directions(bones[1]!);
+    const thigh = this.directions(upperLeg!);
+    const shin = this.directions(lowerLeg!);
     const hips = this.turned(joints.hips!);
     const hinge = thigh.map((along, at) =>
       plus(cross(along, shin[at]!), times(rotated(hips[at]!, X), ALIGNMENT.HINGE)),
     );
-    this.settleLimb(
-      bones[0]!,
-      thigh,
-      hinge.map((axis, at) => frame(axis, times(thigh[at]!, -1))),
-    );
-    this.settleLimb(
-      bones[1]!,
-      shin,
-      hinge.map((axis, at) => frame(axis, times(shin[at]!, -1))),
-    );
-    const shins = this.turned(joints[bones[1]!]!);
-    for (const bone of bones.slice(2).filter((name) => joints[name] !== undefined)) {
-      if (!this.body.aimed(bone)) {
-        this.settle(joints[bone]!, shins);
-        continue;
-      }
-      const along = this.directions(bone);
-      const slope = inverse(swing(Z, directionOf(bone)));
-      this.settleLimb(
-        bone,
-        along,
-        along.map((direction, at) => {
-          const left = rotated(shins[at]!, X);
-          return product(frame(left, cross(direction, left)), slope);
-        }),
-      );
+    const about = (along: Vector[]) => hinge.map((axis, at) => frame(axis, times(along[at]!, -1)));
+    this.settleLimb(upperLeg!, thigh, about(thigh));
+    this.settleLimb(lowerLeg!, shin, about(shin));
+    for (const bone of footAndToes) {
+      if (joints[bone] !== undefined) this.foot(bone, this.turned(joints[lowerLeg!]!));
     }
+  }
+
+  /** A foot, or toes, slopes against the level as the humanoid's does; without a direction it turns with the shin. */
+  private foot(bone: string, shins: Quaternion[]): void {
+    if (!this.body.aimed(bone)) return this.settle(this.body.map.joints[bone]!, shins);
+    const along = this.directions(bone);
+    const slope = inverse(swing(Z, directionOf(bone)));
+    const turns = along.map((direction, at) => {
+      const left = rotated(shins[at]!, X);
+      return product(frame(left, cross(direction, left)), slope);
+    });
+    this.settleLimb(bone, along, turns);
   }
 
   /** Elbows are hinges that bend forwards with the arms out to the sides; hands are in line with the forearms. */

@@ -1,5 +1,6 @@
 import { RETARGET } from "../../generated.js";
 import { SIDES } from "./bones.js";
+import { worldOf } from "../../motion/motion.js";
 import {
   cross,
   dot,
@@ -31,16 +32,14 @@ export function relaxed(
   still: Quaternion[],
   joints: Record<string, number>,
 ): Quaternion[] {
+  // the hands at rest, in the world
+  const offsets = skeleton.joints.map((joint) => joint.offset);
+  const { turns, places } = worldOf({ skeleton, rotations: [still], translations: [offsets] });
   const bent = [...still];
-  const turns: Quaternion[] = [];
-  const places: Vector[] = [];
-  skeleton.joints.forEach(({ parent, offset }, at) => {
-    turns.push(parent < 0 ? still[at]! : product(turns[parent]!, still[at]!));
-    places.push(parent < 0 ? offset : plus(places[parent]!, rotated(turns[parent]!, offset)));
-  });
   SIDES.forEach((side, at) => {
     const hand = joints[`${side}Hand`];
-    if (hand !== undefined) bendFingers(fingersOf(skeleton, hand), hand, at ? 1 : -1, turns, places, bent);
+    if (hand === undefined) return;
+    bendFingers(fingersOf(skeleton, hand), hand, at ? 1 : -1, turns[0]!, places[0]!, bent);
   });
   return bent;
 }

@@ -135,56 +135,98 @@ export function mapOf(skeleton: Skeleton): JointMap {
   return checkedMap(skeleton, best.map);
 }
 
-function match(convention: Convention, skeleton: Skeleton, written: string[]) {
+/** How well a convention fits: joints that it has names for, those spelled as it spells them, and its bones that are absent. */
+interface Score {
+  known: number;
+  spelled: number;
+  absent: number;
+}
+
+/** The map that a convention makes of a skeleton's names, as they are written, and how well it fits. */
+function match(convention: Convention, skeleton: Skeleton, written: string[]): Score & { map: JointMap } {
+  const bare = withoutPrefixes(convention, written);
+  const names = bare.map(plain);
+  checkHips(convention, skeleton, names);
+  const joints = limbJoints(convention, names);
+  const score = scoreOf(convention, names, bare, joints);
+  const { known, absent } = score;
+  // other makers' figures of these names have joints besides, or rest in another pose
+  const whole = known >= skeleton.names.filter((name) => !name.endsWith(SKELETON.END_SUFFIX)).length;
+  const map = {
+    joints,
+    spine: chainOf(convention, "spine", names),
+    neck: chainOf(convention, "neck", names),
+    convention: convention.title,
+    confidence: Math.round(100 * (1 - (0.3 * absent) / Math.max(absent + known, 1))) / 100,
+    rest: whole ? convention.rest : undefined,
+    points: convention.points,
+    axes: Object.fromEntries(
+      names.flatMap((name, at) => (convention.axes[name] ? [[at, convention.axes[name]!]] : [])),
+    ),
+  };
+  return { ...score, map };
+}
+
+/** Names without the prefixes that a convention's names can have. */
+function withoutPrefixes(convention: Convention, names: string[]): string[] {
   const pattern = convention.prefixes.map((prefix) => `(?:${prefix})[ _:.-]*`).join("|") || "(?!)";
   const prefix = new RegExp(`^(?:${pattern})(?=.)`, "i");
-  const bare = written.map((name) => name.replace(prefix, "").split(/[:|]/).at(-1)!);
-  const names = bare.map(plain);
-  const chain = (bone: string) =>
-    (convention.names[bone] ?? [])
-      .map((name) => names.indexOf(name))
-      .filter((at) => at >= 0)
-      .sort((a, b) => a - b);
-  const spine = chain("spine");
-  const neck = chain("neck");
-  const hips = names.flatMap((name, at) =>
-    name === convention.names.hips![0] && skeleton.children[at]!.length >= 3 ? [at] : [],
+  return names.map((name) => name.replace(prefix, "").split(/[:|]/).at(-1)!);
+}
+
+/** MotionError where two joints with plain names are hips that carry three joints and more. */
+function checkHips(convention: Convention, skeleton: Skeleton, names: string[]): void {
+  const hips = names.filter(
+    (name, at) => name === convention.names.hips![0] && skeleton.children[at]!.length >= 3,
   );
   if (hips.length > 1) throw new MotionError("this file has two hips: put each figure in a file of its own");
-  const limbs = Object.entries(convention.names).filter(([bone]) => !CHAINS.includes(bone));
-  const roles = limbs.map(
-    ([bone, known]) => [bone, known.map((name) => names.indexOf(name)).find((at) => at >= 0)] as const,
-  );
-  const joints = Object.fromEntries(
-    roles.filter((pair): pair is readonly [string, number] => pair[1] !== undefined),
-  );
+}
+
+/** For each bone but back and neck the first joint of a plain name that it can have. */
+function limbJoints(convention: Convention, names: string[]): Record<string, number> {
+  const joints: Record<string, number> = {};
+  for (const [bone, known] of Object.entries(convention.names)) {
+    const joint = known.map((name) => names.indexOf(name)).find((at) => at >= 0);
+    if (!CHAINS.includes(bone) && joint !== undefined) joints[bone] = joint;
+  }
+  return joints;
+}
+
+/** The joints of back or neck, in the skeleton's order. */
+function chainOf(convention: Convention, chain: string, names: string[]): number[] {
+  return (convention.names[chain] ?? [])
+    .map((name) => names.indexOf(name))
+    .filter((at) => at >= 0)
+    .sort((a, b) => a - b);
+}
+
+function scoreOf(
+  convention: Convention,
+  names: string[],
+  bare: string[],
+  joints: Record<string, number>,
+): Score {
+  // without a mark these names are another convention's
   const accepted = new Set([...Object.values(convention.names).flat(), ...convention.aside]);
   const isMarked = !convention.marks.length || convention.marks.some((name) => names.includes(name));
   const known = isMarked ? names.filter((name) => accepted.has(name)).length : 0;
   const spelled = bare.filter((name) => convention.spelled.has(name)).length;
-  const chains = CHAINS.filter(
-    (bone) => convention.names[bone] && !(convention.optional.has(bone) && !chain(bone).length),
-  );
-  const links = chains
-    .flatMap((bone) => convention.names[bone]!)
-    .filter((name) => !names.includes(name)).length;
-  const lacking = limbs.filter(
-    ([bone]) => joints[bone] === undefined && !convention.optional.has(bone),
-  ).length;
-  const absent = lacking + chains.filter((bone) => !chain(bone).length).length + links;
-  // other makers' figures of these names have joints besides, or rest in another pose
-  const whole = known >= skeleton.names.filter((name) => !name.endsWith(SKELETON.END_SUFFIX)).length;
-  const axes = Object.fromEntries(
-    names.flatMap((name, at) => (convention.axes[name] ? [[at, convention.axes[name]!]] : [])),
-  );
-  const confidence = Math.round(100 * (1 - (0.3 * absent) / Math.max(absent + known, 1))) / 100;
-  const { title, rest, points } = convention;
-  return {
-    known,
-    spelled,
-    absent,
-    map: { joints, spine, neck, convention: title, confidence, rest: whole ? rest : undefined, points, axes },
-  };
+  // bones that the convention has and this skeleton lacks
+  let absent = 0;
+  for (const chain of CHAINS) absent += absentInChain(convention, chain, names);
+  for (const bone of Object.keys(convention.names)) {
+    if (CHAINS.includes(bone) || convention.optional.has(bone)) continue;
+    if (joints[bone] === undefined) absent++;
+  }
+  return { known, spelled, absent };
+}
+
+/** The number of bones of back or neck that are absent, and one more if none is there. */
+function absentInChain(convention: Convention, chain: string, names: string[]): number {
+  const known = convention.names[chain] ?? [];
+  const absent = known.filter((name) => !names.includes(name)).length;
+  if (absent < known.length) return absent;
+  return convention.optional.has(chain) || !known.length ? 0 : 1 + absent;
 }
 
 function nearlyAll(count: number, names: string[]): boolean {

@@ -201,16 +201,18 @@ function checkedLeg(body: Body, pose: Vector[]): number {
 
 /** Metres of one unit of the skeleton, as it says or as the length of its legs tells; null where neither does. */
 export function unitOf({ metresPerUnit }: Skeleton, leg: number): { metres: number | null; note?: string } {
+  const within = (metres: number, [shortest, longest]: readonly [number, number]) =>
+    shortest < leg * metres && leg * metres < longest;
   if (metresPerUnit !== null) {
-    if (leg * metresPerUnit > 0.2 && leg * metresPerUnit < 1.6) return { metres: metresPerUnit };
+    if (within(metresPerUnit, MEASURE.POSSIBLE_LEGS)) return { metres: metresPerUnit };
     throw new MotionError(
-      `legs of ${(leg * metresPerUnit).toPrecision(3)} m: a human's are 0.2 to 1.6 m: the unit of length is wrong`,
+      `legs of ${(leg * metresPerUnit).toPrecision(3)} m: a human's are ${MEASURE.POSSIBLE_LEGS.join(" to ")} m: the unit of length is wrong`,
     );
   }
-  // the unit in which legs are nearest to an adult's 0.82 m
-  const off = (metres: number) => Math.abs(Math.log((leg * metres) / 0.82));
-  const likely = Object.entries(MEASURE.LENGTH_UNITS).filter(
-    ([, metres]) => leg * metres > 0.55 && leg * metres < 1.1,
+  // of the units that make likely legs the one that makes those nearest to an adult's
+  const off = (metres: number) => Math.abs(Math.log((leg * metres) / MEASURE.ADULT_LEG));
+  const likely = Object.entries(MEASURE.LENGTH_UNITS).filter(([, metres]) =>
+    within(metres, MEASURE.LIKELY_LEGS),
   );
   const [name, metres] = likely.sort(([, a], [, b]) => off(a) - off(b))[0] ?? [];
   if (metres === undefined)
@@ -248,7 +250,7 @@ export function checkFrames(body: Body, places: Vector[][], hinges: Record<strin
       const lower = body.direction(pose, shin);
       if (body.aimed(foot)) toes.push(dot(cross(hinge[at]!, times(lower, -1)), body.direction(pose, foot)));
       const bend = cross(upper, lower);
-      if (size(bend) <= 0.3) return; // the sine of the knee's angle
+      if (size(bend) <= MEASURE.BENT) return;
       bent++;
       if (dot(bend, hinge[at]!) < 0 && dot(bend, body.toLeft(pose, "UpperLeg")) < 0) wrong++;
     });
@@ -277,27 +279,37 @@ export function upright(
       ? { turn: swing(rests, Y), note: "turned upright: the figure does not stand along y" }
       : { turn: STILL };
   }
+  const up = upOfFrames(body, trunk, places);
+  if (!up) return { turn: STILL };
+  const name = "xyz"[up.findIndex((part) => part !== 0)];
+  const standing = places.filter((_, at) => dot(trunk[at]!, up) > MEASURE.ALONG);
+  return walksAcross(body, leg, up, standing)
+    ? {
+        turn: swing(up, Y),
+        note: `turned upright: the frames stand along ${name}, the rest pose along y`,
+      }
+    : {
+        turn: STILL,
+        note: `the body lies along ${name} in most frames: if it stands there, export the file with y up`,
+      };
+}
+
+/** The direction along x or z in which trunks and legs point in most frames; null where y is up. */
+function upOfFrames(body: Body, trunk: Vector[], places: Vector[][]): Vector | null {
   const mean = [0, 1, 2].map((axis) => median(trunk.map((up) => up[axis]!)));
   const axis = mean.map(Math.abs).indexOf(Math.max(...mean.map(Math.abs)));
   const up = times([X, Y, Z][axis]!, Math.sign(mean[axis]!));
-  const along = 0.82; // the cosine from which on a body stands along an axis
-  const share = (axis: Vector) =>
-    trunk.filter((direction) => dot(direction, axis) > along).length / trunk.length;
-  if (axis === 1 || share(up) < 0.5 || share(Y) > 0.1) return { turn: STILL };
-  if (median(places.map((pose) => dot(body.legsUp(pose), up))) < along) return { turn: STILL };
-  const path = places
-    .filter((_, at) => dot(trunk[at]!, up) > along)
-    .map((pose) => body.middle(pose, "UpperLeg"));
+  const share = (direction: Vector) =>
+    trunk.filter((along) => dot(along, direction) > MEASURE.ALONG).length / trunk.length;
+  if (axis === 1 || share(up) < 0.5 || share(Y) > 0.1) return null;
+  return median(places.map((pose) => dot(body.legsUp(pose), up))) < MEASURE.ALONG ? null : up;
+}
+
+/** Whether a figure walks: it goes its leg's length and more across `up`, and not along it. */
+function walksAcross(body: Body, leg: number, up: Vector, places: Vector[][]): boolean {
+  const path = places.map((pose) => body.middle(pose, "UpperLeg"));
   const rise = spread(path.map((place) => dot(place, up)));
   const flat = path.map((place) => minus(place, times(up, dot(place, up))));
-  if (Math.hypot(...[0, 1, 2].map((i) => spread(flat.map((place) => place[i]!)))) > Math.max(leg, 2 * rise)) {
-    return {
-      turn: swing(up, Y),
-      note: `turned upright: the frames stand along ${"xyz"[axis]}, the rest pose along y`,
-    };
-  }
-  return {
-    turn: STILL,
-    note: `the body lies along ${"xyz"[axis]} in most frames: if it stands there, export the file with y up`,
-  };
+  const extent = Math.hypot(...[0, 1, 2].map((axis) => spread(flat.map((place) => place[axis]!))));
+  return extent > Math.max(leg, 2 * rise);
 }

@@ -136,14 +136,15 @@ function humanoidTurns(turns: Quaternion[], pose: Vector[], { body, aligned, pel
       swing(rotated(rotations.hips!, X), body.toLeft(pose, "UpperLeg")),
       rotations.hips!,
     );
+  // back and neck share out the turns of as many joints as the figure has there
+  const back = shared([rotations.hips!, ...spine.map(alignedTurn)], SPINE.length);
+  SPINE.forEach((bone, at) => (rotations[bone] = back[at]!));
   const above = [...neck.map(alignedTurn), ...(rotations.head ? [rotations.head] : [])];
-  shared([rotations.hips!, ...spine.map(alignedTurn)], SPINE.length).forEach(
-    (turn, at) => (rotations[SPINE[at]!] = turn),
-  );
-  if (above.length)
-    shared([alignedTurn(spine.at(-1)!), ...above], NECK.length).forEach(
-      (turn, at) => (rotations[NECK[at]!] = turn),
-    );
+  if (above.length) {
+    const upwards = shared([alignedTurn(spine.at(-1)!), ...above], NECK.length);
+    NECK.forEach((bone, at) => (rotations[bone] = upwards[at]!));
+  }
+  // bones that the figure lacks go with their parents
   for (const bone of BONES.slice(1)) {
     rotations[bone] ??= rotations[HUMANOID.names[HUMANOID.joints[HUMANOID.index(bone)]!.parent]!]!;
   }
@@ -187,21 +188,27 @@ export function fromHumanoid(
   const figure = figureOf(like, joints);
   const { skeleton, still } = postureOf(figure);
   const { fitted } = figure;
-  const [x, , z] = rotated(fitted.aligned[fitted.body.map.joints.hips!]!, Z);
-  const front = ahead && Math.hypot(x, z) > 0.5 ? about(Y, Math.atan2(x, z)) : STILL;
-  const { turns, places } = worldOf(motion);
-  const source: World = {
-    turns: turns.map((turned) => turned.map((turn) => product(front, turn))),
-    places: places.map((pose) => pose.map((place) => rotated(front, place))),
-  };
+  const world = worldOf(motion);
+  const source = ahead ? facingAs(fitted, world) : world;
+
+  // the figure's joints turn in the world as the humanoid's bones do
   const turned = source.turns.map((frameTurns) => figureTurns(frameTurns, fitted, skeleton, still));
+
+  // its path is the humanoid's, scaled, and laid so that the feet are as high
   const carrier = carrierOf(fitted.body.map, skeleton);
-  return motionFrom(
-    skeleton,
-    turned,
-    new Map([[carrier, moves(fitted, skeleton, source, turned, carrier)]]),
-    motion.fps,
-  );
+  const moved = new Map([[carrier, moves(fitted, skeleton, source, turned, carrier)]]);
+  return motionFrom(skeleton, turned, moved, motion.fps);
+}
+
+/** Frames of the humanoid turned so that z becomes the direction that a figure faces at rest. */
+function facingAs(fitted: Fitted, world: World): World {
+  const [x, , z] = rotated(fitted.aligned[fitted.body.map.joints.hips!]!, Z);
+  if (Math.hypot(x, z) <= 0.5) return world; // at rest it faces up or down
+  const front = about(Y, Math.atan2(x, z));
+  return {
+    turns: world.turns.map((turned) => turned.map((turn) => product(front, turn))),
+    places: world.places.map((pose) => pose.map((place) => rotated(front, place))),
+  };
 }
 
 /** The skeleton with its unit where that is known, and local rotations of joints that are no bones. */
