@@ -8,11 +8,11 @@ from os import PathLike
 from typing import Any, SupportsIndex
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import ArgumentError, MotionError, listed, quoted
 from motet.motion.rotations import (
     Array,
+    Indices,
     continuous_euler,
     continuous_rotvec,
     without_turns,
@@ -304,7 +304,7 @@ def _extended(values: Array) -> Array:
     return np.concatenate([before[None], values, after[None]])
 
 
-def _between(values: Array, times: Array) -> tuple[NDArray[np.intp], Array]:
+def _between(values: Array, times: Array) -> tuple[Indices, Array]:
     """For each time the frame before it, and the fraction of the way to the next one (S, 1, ...)."""
     # a time that equals a frame up to rounding is that frame
     start = np.minimum((times + 1e-9).astype(np.intp), len(values) - 2)

@@ -19,12 +19,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.motion.kinematics import channels_of, positions, skeleton_of, with_channels
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Mask
 from motet.motion.skeleton import Skeleton, partners_of
 
 GROUND_PERCENT = 10
@@ -89,7 +88,7 @@ def contacts(heights: Array, speeds: Array | None, settings: ContactSettings) ->
     return low if speeds is None else low * (1 - rise(speeds, *settings.speeds))
 
 
-def standing(heights: Array, speeds: Array | None, settings: ContactSettings) -> NDArray[np.bool_]:
+def standing(heights: Array, speeds: Array | None, settings: ContactSettings) -> Mask:
     """Which points surely stand, as in :func:`contacts`."""
     return np.equal(contacts(heights, speeds, settings), 1)
 

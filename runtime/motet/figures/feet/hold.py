@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.figures.feet.contacts import (
@@ -46,7 +45,7 @@ from motet.motion.kinematics import (
     with_channels,
 )
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, inverse, product, quat_to_rotmat, rotated
+from motet.motion.rotations import Array, Indices, Mask, inverse, product, quat_to_rotmat, rotated
 from motet.motion.scalar_or_batch import Quaternion, Vector, parts
 
 
@@ -237,8 +236,8 @@ def _shift(points: Array, fps: float, settings: HoldSettings) -> Array:
 
 
 def _stance_paths(
-    undone: Array, standing: NDArray[np.bool_], fps: float, settings: HoldSettings
-) -> tuple[list[NDArray[np.intp]], list[Array]]:
+    undone: Array, standing: Mask, fps: float, settings: HoldSettings
+) -> tuple[list[Indices], list[Array]]:
     """The frames of each stance, and the foot's shift (T, 2) on them around the place where it stands, from the steps
     (T - 1, 2) to be undone and whether the foot stands (T - 1,)."""
     times = []
@@ -255,7 +254,7 @@ def _stance_paths(
     return times, paths
 
 
-def _stances(standing: NDArray[np.bool_], lifted: float) -> Iterator[tuple[int, int]]:
+def _stances(standing: Mask, lifted: float) -> Iterator[tuple[int, int]]:
     """The first and last frame of each stance, from whether a foot stands (T - 1,) from each frame to the next; stances
     with fewer than ``lifted`` frames between them are one."""
     # the frames at which a stance starts and stops; neighbours that are near become one
@@ -266,7 +265,7 @@ def _stances(standing: NDArray[np.bool_], lifted: float) -> Iterator[tuple[int, 
     return zip(starts.tolist(), stops.tolist(), strict=True)
 
 
-def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, blend: float) -> Array:
+def _between(times: list[Indices], values: list[Array], frames: int, blend: float) -> Array:
     """Values (frames, 2) that are known at ``times``, go to 0 and come back in ``blend`` frames, smoothly."""
     key_times, key_values = _keys(times, values, blend)
     # each frame lies on a smooth step from the key before it to the key after
@@ -277,7 +276,7 @@ def _between(times: list[NDArray[np.intp]], values: list[Array], frames: int, bl
     return np.asarray(key_values[before] + part * (key_values[after] - key_values[before]))
 
 
-def _keys(times: list[NDArray[np.intp]], values: list[Array], blend: float) -> tuple[Array, Array]:
+def _keys(times: list[Indices], values: list[Array], blend: float) -> tuple[Array, Array]:
     """Times (K,) and values (K, 2): the known ones, and zeros wherever there is time to fade out and in again."""
     # the first and the last key lie outside the motion, so that each frame is between two
     zero = np.zeros((1, 2))

@@ -17,16 +17,17 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from motet.errors import MotionError
-from motet.figures.humanoid import bones
 from motet.figures.humanoid.bones import (
     HUMANOID,
     LEFT_RIGHT,
     NECK,
     PARENTS,
     SPINE,
+    ground_under,
     is_mmm,
     leg_length,
     sided,
+    sole_points,
     with_figure,
 )
 from motet.figures.humanoid.joint_map import BY_THE_TREE, JointMap
@@ -118,7 +119,7 @@ class Figure:
         joints += (legs - joints[:, HIPS].mean(axis=1))[:, None]
 
         # the ground goes to y = 0
-        ground = bones.ground_under(bones.sole_points(turned, joints)) if self.ground is None else self.ground
+        ground = ground_under(sole_points(turned, joints)) if self.ground is None else self.ground
         root = joints[:, 0] - (0.0, ground, 0.0)
         return motion_of(HUMANOID, turned, {0: root}, fps), replace(self, ground=ground)
 
@@ -247,7 +248,7 @@ def grounded(motion: Motion) -> Motion:
     little, as motions of models may; one that is further than 0.1 m from the ground stays as it is."""
     if "hips.ty" not in motion.channels:
         return motion
-    ground = bones.ground_under(bones.sole_points(*global_transforms(motion)))
+    ground = ground_under(sole_points(*global_transforms(motion)))
     # what is far from the ground is meant to be: stairs, a chair, a jump
     values = np.array(motion.values)
     values[:, motion.channels.index("hips.ty")] -= ground if abs(ground) < 0.1 else 0.0
@@ -388,8 +389,8 @@ def _rise_of_joints(fitted: Fitted, source: tuple[Array, Array], turned: Array, 
     # its soles would be here; they come to where the humanoid's are
     rotations = {bone: source[0][:, HUMANOID.index(bone)] for bone in fitted.heights}
     soles = fitted.soles(rotations, places_of(fitted.body.skeleton, turned) + path[:, None])
-    ground = bones.ground_under(bones.sole_points(*source))
-    return fitted.leg / leg_length() * ground - bones.ground_under(soles)
+    ground = ground_under(sole_points(*source))
+    return fitted.leg / leg_length() * ground - ground_under(soles)
 
 
 def _translations(fitted: Fitted, skeleton: Skeleton, turned: Array, path: Array) -> dict[int, Array]:

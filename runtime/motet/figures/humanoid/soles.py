@@ -10,7 +10,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.figures.feet.contacts import bell, rise, smoothed, windows
 from motet.figures.humanoid.bones import (
@@ -22,7 +21,7 @@ from motet.figures.humanoid.bones import (
 )
 from motet.figures.humanoid.joint_map import Body
 from motet.motion.kinematics import places_of
-from motet.motion.rotations import UP, Array, product, rotated, rotvec_to_rotmat, unit
+from motet.motion.rotations import UP, Array, Mask, product, rotated, rotvec_to_rotmat, unit
 
 STILL = 0.3
 """Metres a second below which heel and ball of a foot that stands both move."""
@@ -216,7 +215,7 @@ def _rise_to_the_ground(feet: Sequence[Foot], soles: Array, scale: float, fps: f
     return raised + (scale * ground if abs(ground) > NEAR else 0.0)
 
 
-def _standing_feet(soles: Array, fps: float) -> tuple[Array, NDArray[np.bool_]]:
+def _standing_feet(soles: Array, fps: float) -> tuple[Array, Mask]:
     """The height (T, 2) of the lowest point of each foot, and whether it is the lower one and stands, from points
     (T, 6, 3) of soles: heel, ball and tip of each foot."""
     # the lower foot stands where its heel and its ball are both still
