@@ -59,7 +59,6 @@ EDGES = {
     ("papers", "generate"): "the mixture of Plappert et al. is one more model that generates",
     ("predict", "generate"): "PredictModel.predict goes on after its horizon with a generate model",
     ("search", "formats"): "an index is made of a folder of files",
-    ("steering", "generate"): "SteerModel.start takes a generate model, for acts by sentence",
     ("serve", "live"): "figures are steered on the server's own port",
     ("cli", "bench"): "a command measures",
     ("cli", "corpus"): "commands go over many files",

@@ -50,7 +50,7 @@ from motet.predict.model import PredictModel, PredictSession
 from motet.search.model import Hit, Index, SearchModel
 from motet.steering.acts import Act
 from motet.steering.events import Event
-from motet.steering.matched import Matched
+from motet.steering.matching import Matched
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
 from motet.steering.sentence_acts import SaidActs

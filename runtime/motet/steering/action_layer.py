@@ -186,9 +186,8 @@ class ActionLayer:
         if not self.acts and self.orders.count(None) == len(self.orders):
             return np.empty(0, dtype=np.int64)
         changed = list[int]()
-        freed = list[int]()
-        goes = np.hypot(*target[:, :2].T) > 0
         before = list(self.playing)
+        goes = np.hypot(*target[:, :2].T) > 0
         for figure, (playing, order) in enumerate(zip(before, self.orders, strict=True)):
             if playing is None and order is None:
                 continue
@@ -200,33 +199,37 @@ class ActionLayer:
             # a pose jumps where an act begins or ends, or goes on by another part of the body
             if order is not None or after is None or after.whole != _is_whole(playing):
                 changed.append(figure)
-            # legs that an act has led so far are free
-            if _is_whole(playing) and not _is_whole(after):
-                freed.append(figure)
         self.orders = [None] * len(before)
-        if freed:
-            last = [cast(Playing, before[figure]) for figure in freed]
-            features = np.stack([playing.act.features[playing.frame] for playing in last])
-            self._free(features, matcher, codes, playback, target, gait, np.array(freed))
+        self._free(before, changed, matcher, codes, playback, target, gait)
         return np.array(changed, dtype=np.int64)
 
     def _free(
         self,
-        features: Array,
+        before: list[Playing | None],
+        changed: list[int],
         matcher: Matcher,
         codes: PoseCodes,
         playback: Playback,
         target: Array,
         gait: Rows,
-        figures: Rows,
     ) -> None:
-        """Let the legs of figures (n,) go on from the rows that fit best after shown poses with features (n, F -
-        TRAJECTORY)."""
-        # search from the pose of the act
+        """Let legs that an act has led so far go on from the rows that fit best after the pose of the act. before: what
+        figures have played. changed: those that play something else now."""
+        freed = list[int]()
+        features = list[Array]()
+        for figure in changed:
+            playing = before[figure]
+            if playing is not None and playing.whole and not _is_whole(self.playing[figure]):
+                freed.append(figure)
+                features.append(playing.act.features[playing.frame])
+        if not freed:
+            return
+        # search
+        figures = np.array(freed)
         table = matcher.table
         slow_walk = matcher.is_slow_walk(target[figures], gait[figures])
         trajectory = matcher.desired_trajectory(playback, target, slow_walk, figures)
-        desired = (np.concatenate([trajectory, features], axis=1) - table.mean) * table.scale
+        desired = (np.concatenate([trajectory, np.stack(features)], axis=1) - table.mean) * table.scale
         row, mirror, _ = matcher.best(matcher.query(desired.astype(np.float32)), gait[figures])
         # and play the row, as if it had been played in the last tick, too
         playback.restart(figures, row, mirror)
@@ -258,8 +261,7 @@ class ActionLayer:
         if len(changed):
             self._transition(base_before, step / seconds, changed, whole, settings, fps)
         self.led = whole
-        plays = np.array([playing is not None for playing in self.playing])
-        figures = np.flatnonzero(plays | (np.abs(self.offset).max(axis=1) > 0))
+        figures = self._active()
         if not len(figures):
             self._show(self.base, step / seconds)
             return pose
@@ -271,6 +273,11 @@ class ActionLayer:
         self._drift(playback, seconds)
         rotations = self.shown.rotations.astype(np.float32)
         return Pose(playback.root, rotations, self.shown.height.astype(np.float32), contacts)
+
+    def _active(self) -> Rows:
+        """The figures (n,) with an act or an offset."""
+        plays = np.array([playing is not None for playing in self.playing])
+        return np.flatnonzero(plays | (np.abs(self.offset).max(axis=1) > 0))
 
     def _show(self, shown: Body, velocity: Array) -> None:
         """Remember what is shown in this tick."""

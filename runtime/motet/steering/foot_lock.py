@@ -141,21 +141,20 @@ def _corrected(
     """The correction of a foot a tick later, as :attr:`FootLock.feet` has it."""
     shift_x, shift_z, drift_x, drift_z, height, rise, *sole_before = foot_before
     move_x, move_z = _sole_move(sole, sole_before, settings.bears)
-
     # hold: a foot that stands stays where it was, so its move since the last tick is taken from its offset; fade: the
     # offset of one that swings returns to 0
     held_x = shift_x - move_x
     held_z = shift_z - move_z
     slow = _length(move_x, move_z) < settings.swings * seconds
-    stands = (contact > settings.stands) & (_length(held_x, held_z) < settings.farthest) & slow
+    stands = slow & (contact > settings.stands) & (_length(held_x, held_z) < settings.farthest)
     fade = Inertializer(settings.fade)
     shift_x, drift_x = _held_or_faded(stands, held_x, shift_x, drift_x, fade, seconds)
     shift_z, drift_z = _held_or_faded(stands, held_z, shift_z, drift_z, fade, seconds)
 
     # step: a foot that moves over the ground while it is marked as a contact is lifted
     moved = _length(shift_x - held_x, shift_z - held_z)
-    height_and_rise = _stepped(height, rise, contact, moved, settings, seconds)
-    return [shift_x, shift_z, drift_x, drift_z, *height_and_rise, *chain.from_iterable(sole)]
+    step = _stepped(height, rise, contact, moved, settings, seconds)
+    return [shift_x, shift_z, drift_x, drift_z, *step, *chain.from_iterable(sole)]
 
 
 def _held_or_faded(

@@ -58,9 +58,8 @@ class IdleSettings(Settings):
 
 
 TRUNK = [BONES.index(bone) for bone in SPINE]
-TURNS = dict(zip(TRUNK, (1.0, 0.0, -2.0), strict=True)) | {
-    BONES.index(bone): 1.0 for bone in ("neck", "leftShoulder", "rightShoulder")
-}
+CARRIED = [BONES.index(bone) for bone in ("neck", "leftShoulder", "rightShoulder")]
+TURNS = dict(zip(TRUNK, (1.0, 0.0, -2.0), strict=True)) | dict.fromkeys(CARRIED, 1.0)
 """Bones that a breath turns about the x axis of the hips, and by how many times its depth: those of the trunk, and what
 the last of them carries."""
 

@@ -272,6 +272,20 @@ class Query(NamedTuple):
     """(n, 3)"""
 
 
+class Matched(NamedTuple):
+    """The rows that B figures play."""
+
+    row: Rows
+    """(B,) of the bundle's table."""
+    mirrored: Flags
+    """(B,) whether as its mirror image."""
+    cost: Array
+    """(B,) of that row for the present target, 0 for a perfect fit: half its squared distance in scaled features, and
+    the cost of its lag."""
+    path: Array
+    """(B, 3, 2) where the figure is to be after a third, two thirds and the whole of the horizon, x and z in metres."""
+
+
 class Matcher:
     """Searches a table, and jumps.
 
@@ -337,12 +351,9 @@ class Matcher:
             return
         playback.ticks_to_search[due] = self.settings.search_every - 1
         # the row that each plays, and what would be best
-        row = playback.row[due] + (playback.part[due] > 0.5)
-        mirror = playback.mirror[due]
         gait = gait[due]
         slow_walk = self.is_slow_walk(target[due], gait)
-        trajectory = self.desired_trajectory(playback, target, slow_walk, due)
-        query = self.query(self.desired_features(trajectory, row, mirror))
+        row, mirror, _, query = self._wanted(playback, target, slow_walk, due)
         best, best_mirror, best_cost = self.best(query, gait)
         # the present row is kept if the best one is hardly better, or so near that playback would loop on the spot
         cheap = self.cost_at(query, row, mirror) <= best_cost + np.where(slow_walk, 0, self.settings.continuing)
@@ -351,6 +362,28 @@ class Matcher:
         # never leave a row in mid-air; always leave one whose recording is about to end
         stays = (self.flies[row] | fits) & (self.table.left[row] >= self.reserve)
         self.jump(playback, due[~stays], best[~stays], best_mirror[~stays])
+
+    def _wanted(
+        self, playback: Playback, target: Array, slow_walk: Flags, figures: Rows | slice
+    ) -> tuple[Rows, Rows, Array, Query]:
+        """The rows and mirror images (n,) that figures (n,) play, and their desired trajectories and query."""
+        row = playback.row[figures] + (playback.part[figures] > 0.5)
+        mirror = playback.mirror[figures]
+        trajectory = self.desired_trajectory(playback, target, slow_walk, figures)
+        return row, mirror, trajectory, self.query(self.desired_features(trajectory, row, mirror))
+
+    def matched(self, playback: Playback, target: Array, gait: Rows) -> Matched:
+        """The rows that figures play in gaits (B,) with targets (B, 3): velocity along x and z, and facing."""
+        # the cost of the row that is played, with the constant that a search leaves out
+        row, mirror, trajectory, query = self._wanted(playback, target, self.is_slow_walk(target, gait), ALL)
+        squares = query.features[:, :-1].astype(np.float64) ** 2
+        cost = self.cost_at(query, row, mirror) + squares.sum(axis=1) / 2
+        # the path in the world
+        left, forward = trajectory[:, : 2 * HORIZONS].reshape(-1, HORIZONS, 2).swapaxes(0, 2)
+        sin = np.sin(playback.root[:, 2])
+        cos = np.cos(playback.root[:, 2])
+        steps = np.stack([cos * left + sin * forward, cos * forward - sin * left], axis=-1)
+        return Matched(row, mirror > 0, cost, playback.root[:, None, :2] + steps.swapaxes(0, 1))
 
     def is_slow_walk(self, target: Array, gait: Rows) -> Flags:
         """Which figures with targets (n, 3) in gaits (n,) are to go more slowly than recordings do."""
@@ -367,19 +400,8 @@ class Matcher:
         """
         settings = self.settings
         velocity_damping = damping_of(settings.velocity)
-        facing_damping = damping_of(settings.facing)
         facing = playback.root[figures, 2]
-
-        # springs and targets, those of slow walks at the pace of recordings
-        spring = playback.spring[figures]
-        spring_factor = pace_factors(spring, slow_walk, settings.creep)
-        target = target[figures]
-        target = target * pace_factors(target, slow_walk, settings.creep)
-
-        # how far the springs are from the targets, and how fast that changes
-        error = spring * spring_factor - target
-        error[:, 2] = wrapped(error[:, 2])
-        error_rate = playback.spring_rate[figures] * spring_factor
+        target, error, error_rate = self._spring_error(playback, target, slow_walk, figures)
 
         # places and facings at each horizon, as seen from the figure
         places = list[Array]()
@@ -388,7 +410,7 @@ class Matcher:
         for time in times:
             catching_up = damped_path(error[:, :2], error_rate[:, :2], velocity_damping, time)
             places.append(seen(target[:, :2] * time + catching_up, facing))
-            facing_left, _ = damped(error[:, 2], error_rate[:, 2], facing_damping, time)
+            facing_left, _ = damped(error[:, 2], error_rate[:, 2], damping_of(settings.facing), time)
             turn = target[:, 2] + facing_left - facing
             facings += [np.sin(turn), np.cos(turn)]
 
@@ -396,6 +418,19 @@ class Matcher:
         velocity_left, _ = damped(error[:, :2], error_rate[:, :2], velocity_damping, times[1])
         speed = np.hypot(*(target[:, :2] + velocity_left).T)
         return np.column_stack([*places, *facings, speed_feature(speed, settings)])
+
+    def _spring_error(
+        self, playback: Playback, target: Array, slow_walk: Flags, figures: Rows | slice
+    ) -> tuple[Array, Array, Array]:
+        """Targets, how far the springs are from them, and how fast that changes, all (n, 3); those of slow walks at the
+        pace of recordings."""
+        spring = playback.spring[figures]
+        spring_factor = pace_factors(spring, slow_walk, self.settings.creep)
+        target = target[figures]
+        target = target * pace_factors(target, slow_walk, self.settings.creep)
+        error = spring * spring_factor - target
+        error[:, 2] = wrapped(error[:, 2])
+        return target, error, playback.spring_rate[figures] * spring_factor
 
     def desired_features(self, trajectory: Array, row: Rows, mirror: Rows) -> Floats:
         """Features (n, F) of trajectories (n, TRAJECTORY) that are not yet scaled, from the poses of rows (n,)."""

@@ -14,7 +14,6 @@ from motet.bundle.manifest import Manifest
 from motet.errors import ArgumentError, BundleError, ControlError
 from motet.figures.feet.treadmill import travelling
 from motet.figures.humanoid import BONES
-from motet.generate.base import GenerateModel
 from motet.models.control import LARGEST_CROWD, ControlModel, captions
 from motet.motion.motion import Motion
 from motet.motion.rotations import rotmat_to_quat
@@ -32,7 +31,7 @@ from motet.steering.paths import ArrivalSettings
 from motet.steering.pose import Pose
 from motet.steering.reach_layer import ReachSettings
 from motet.steering.scripts import parse_orders
-from motet.steering.sentence_acts import SaidActs
+from motet.steering.sentence_acts import SaidActs, SentenceModel
 from motet.steering.session import SteerSession
 from motet.steering.settings import SteeringSettings
 from motet.steering.step import LOOPS, PoseCodes
@@ -127,7 +126,7 @@ class SteerModel(ControlModel):
         hold_feet: bool = True,
         strict: bool = False,
         phases: ArrayLike | None = None,
-        words: GenerateModel | SaidActs | None = None,
+        words: SentenceModel | SaidActs | None = None,
     ) -> SteerSession:
         """A session of ``characters`` figures that stand still, or continue from a motion's last pose.
 
@@ -156,10 +155,10 @@ class SteerModel(ControlModel):
             session.put(places)
         return session
 
-    def _sentence_acts(self, words: GenerateModel | SaidActs | None) -> SaidActs | None:
-        if not (words is None or hasattr(words, "act") or isinstance(words, GenerateModel)):
+    def _sentence_acts(self, words: SentenceModel | SaidActs | None) -> SaidActs | None:
+        if not (words is None or hasattr(words, "act") or isinstance(words, SentenceModel)):
             raise ArgumentError(f"expected words of a model, such as motet.load('generate'), not {words!r:.60}")
-        return SaidActs(self, words) if isinstance(words, GenerateModel) else words
+        return SaidActs(self, words) if isinstance(words, SentenceModel) else words
 
     def phases(self, characters: int, chosen: ArrayLike | None = None) -> Rows | None:
         """The phase of each character; None for those that search after every command."""
@@ -224,7 +223,7 @@ class SteerModel(ControlModel):
         start: Motion | str | None = None,
         *,
         hold_feet: bool = True,
-        words: GenerateModel | SaidActs | None = None,
+        words: SentenceModel | SaidActs | None = None,
     ) -> Motion:
         """The motion of one figure that is steered by a script (:mod:`motet.steering.scripts`).
 

@@ -180,9 +180,8 @@ class Going:
         # towards the aim, braking evenly
         left = np.where(on_last_stretch, distance, np.maximum(lengths - gone, distance))
         speed = np.where(stops, 0.0, np.minimum(self.speed, np.sqrt(2 * settings.brakes * left)))
-        velocity = _unit(self.paths.at(aim) - root) * speed[:, None]
         going = replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=self.goes & arrived)
-        return going, velocity
+        return going, _unit(self.paths.at(aim) - root) * speed[:, None]
 
     def _progress(self, root: Array) -> Array:
         """How far (B,) figures at roots (B, 2) have come along their paths, metres."""

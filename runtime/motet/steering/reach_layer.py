@@ -147,9 +147,7 @@ def _reached(
     offsets = [HUMANOID.joints[HUMANOID.index(bone)].offset for bone in bones]
     shoulder, upper, lower, hand = (parts(pose.rotations[:, BONES.index(bone)]) for bone in bones)
     # from the shoulder to the point, in the frame of the upper chest
-    chest_place, chest = frame_of(pose, SPINE)
-    point = rotated(inverse(chest), minus(parts(points), chest_place))
-    to_point = minus(point, plus(offsets[0], rotated(shoulder, offsets[1])))
+    to_point = minus(_in_chest(pose, points), plus(offsets[0], rotated(shoulder, offsets[1])))
     # the arm that is forward and half bent, brought as near as it can
     palm = plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0)))
     arm = _ready_arm(side, offsets[2], palm)
@@ -162,6 +160,12 @@ def _reached(
     # how far the hand still is from the point
     missing = length(minus(reachable, to_point))
     return (mixed_upper, mixed_lower), np.array(missing > settings.reached).reshape(-1)
+
+
+def _in_chest(pose: Pose, points: Array) -> Vector:
+    """Points (B, 3) of the world in the frame of the upper chest."""
+    place, chest = frame_of(pose, SPINE)
+    return rotated(inverse(chest), minus(parts(points), place))
 
 
 def _out(side: int) -> float:

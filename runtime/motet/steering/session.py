@@ -22,8 +22,7 @@ from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.gaits import Command
 from motet.steering.idle import IdleLayer, IdleSettings
 from motet.steering.look_layer import LookLayer, LookSettings
-from motet.steering.matched import Matched, matched
-from motet.steering.matching import Flags, Playback, Rows
+from motet.steering.matching import Flags, Matched, Playback, Rows
 from motet.steering.paths import ArrivalSettings, Going, Ways
 from motet.steering.pose import Pose
 from motet.steering.reach_layer import ReachLayer, ReachSettings
@@ -264,7 +263,7 @@ class SteerSession:
     def matched(self) -> Matched:
         """The rows that are played, what they cost, and the desired path."""
         state = self._state
-        return matched(self.model.matcher, state.playback, self._way, state.command.gait)
+        return self.model.matcher.matched(state.playback, self._way, state.command.gait)
 
     def go_to(
         self,
