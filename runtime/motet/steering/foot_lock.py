@@ -151,10 +151,11 @@ def _corrected(
     shift_x, drift_x = _held_or_faded(stands, held_x, shift_x, drift_x, fade, seconds)
     shift_z, drift_z = _held_or_faded(stands, held_z, shift_z, drift_z, fade, seconds)
 
-    # step: a foot that moves over the ground while it is marked as a contact is lifted
+    # step: a foot that moves over the ground while it is marked as a contact is lifted, higher the faster it is
     moved = _length(shift_x - held_x, shift_z - held_z)
-    step = _stepped(height, rise, contact, moved, settings, seconds)
-    return [shift_x, shift_z, drift_x, drift_z, *step, *chain.from_iterable(sole)]
+    goal = contact * smaller(moved * (settings.steps / (settings.swings * seconds)), settings.steps)
+    error, rise = Inertializer(settings.lifts).update(height - goal, rise, seconds)
+    return [shift_x, shift_z, drift_x, drift_z, goal + error, rise, *chain.from_iterable(sole)]
 
 
 def _held_or_faded(
@@ -163,15 +164,6 @@ def _held_or_faded(
     """A foot's offset along an axis, and its rate: where it is held, or on its way back to where it is played."""
     faded, fade_rate = fade.update(shift, drift, seconds)
     return where(stands, held, faded), where(stands, 0.0, fade_rate)
-
-
-def _stepped(
-    height: Part, rise: Part, contact: Part, moved: Part, settings: FootLockSettings, seconds: float
-) -> tuple[Part, Part]:
-    """How high a foot steps that has moved over the ground, higher the faster, and how fast that changes."""
-    goal = contact * smaller(moved * (settings.steps / (settings.swings * seconds)), settings.steps)
-    error, rise = Inertializer(settings.lifts).update(height - goal, rise, seconds)
-    return goal + error, rise
 
 
 def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float) -> tuple[Part, Part]:

@@ -125,7 +125,7 @@ def _in_spine(pose: Pose, points: Array) -> tuple[list[Quaternion], Vector]:
     turned = STILL
     bones = list[Quaternion]()
     for bone in SHARES:
-        turned = product(turned, _local(pose, bone))
+        turned = product(turned, parts(pose.rotations[:, BONES.index(bone)]))
         bones.append(turned)
     return bones, rotated(inverse(above), minus(parts(points), place))
 
@@ -138,11 +138,6 @@ def _eyes(bones: Sequence[Quaternion]) -> Vector:
         place = plus(place, rotated(above, OFFSETS[name]))
         above = bone
     return plus(place, rotated(above, EYES))
-
-
-def _local(pose: Pose, bone: str) -> Quaternion:
-    rotation: Quaternion = parts(pose.rotations[:, BONES.index(bone)])
-    return rotation
 
 
 def _angles(way: Vector) -> Array:

@@ -68,22 +68,25 @@ class Playback:
         phases: (figures,) ticks until the first search, after which a figure searches in its turn alone. By default all
         search in the next tick.
         """
+        zero = np.zeros(figures)
+        ground = np.zeros((figures, 3))
+        no_offset = np.zeros((figures, codes))
         playback = Playback(
             row=np.full(figures, row, dtype=np.int64),
-            part=np.zeros(figures),
-            mirror=np.zeros(figures, dtype=np.int64),
-            rate=np.ones(figures),
-            ticks_to_search=np.zeros(figures, dtype=np.int64) if phases is None else phases,
+            part=zero,
+            mirror=zero.astype(np.int64),
+            rate=zero + 1,
+            ticks_to_search=zero.astype(np.int64) if phases is None else phases,
             in_turn=np.full(figures, phases is not None),
-            root=np.zeros((figures, 3)),
-            spring=np.zeros((figures, 3)),
-            spring_rate=np.zeros((figures, 3)),
-            offset=np.zeros((figures, codes)),
-            offset_rate=np.zeros((figures, codes)),
-            warp=np.zeros(figures),
-            warp_rate=np.zeros(figures),
-            stride=np.ones(figures),
-            stride_rate=np.zeros(figures),
+            root=ground,
+            spring=ground,
+            spring_rate=ground,
+            offset=no_offset,
+            offset_rate=no_offset,
+            warp=zero,
+            warp_rate=zero,
+            stride=zero + 1,
+            stride_rate=zero,
         )
         return playback.copy()
 
@@ -91,14 +94,10 @@ class Playback:
         """Let figures (n,) play rows (n,) and mirror images (n,) as they are recorded."""
         self.row[figures] = row
         self.mirror[figures] = mirror
-        self.part[figures] = 0
+        for values in (self.part, self.offset, self.offset_rate, self.warp, self.warp_rate, self.stride_rate):
+            values[figures] = 0
         self.rate[figures] = 1
-        self.offset[figures] = 0
-        self.offset_rate[figures] = 0
-        self.warp[figures] = 0
-        self.warp_rate[figures] = 0
         self.stride[figures] = 1
-        self.stride_rate[figures] = 0
 
     def hasten(self, changed: Flags) -> None:
         """Let figures (B,) search in the next tick, unless they search in their turn alone."""

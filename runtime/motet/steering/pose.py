@@ -38,13 +38,10 @@ class Pose:
 
     def read_only(self) -> "Pose":
         """The same pose with read-only arrays: they are the state from which a session goes on."""
-        ground = self.ground.view()
-        rotations = self.rotations.view()
-        height = self.height.view()
-        contacts = self.contacts.view()
-        for array in (ground, rotations, height, contacts):
-            array.flags.writeable = False
-        return Pose(ground, rotations, height, contacts, self.events)
+        views: list[Any] = [array.view() for array in (self.ground, self.rotations, self.height, self.contacts)]
+        for view in views:
+            view.flags.writeable = False
+        return Pose(*views, events=self.events)
 
     def __len__(self) -> int:
         """B."""

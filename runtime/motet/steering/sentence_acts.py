@@ -1,10 +1,9 @@
 """Acts by sentence: made by a generate model, for steered figures."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from motet.errors import TextError, TextWarning, collected, each_once, warn
-from motet.motion.motion import Motion
 from motet.steering.acts import Act
 from motet.text.clauses import Shown
 from motet.text.vocabulary import Vocabulary
@@ -20,26 +19,6 @@ KEPT = 256
 """Acts, after which the one that was made first is forgotten."""
 
 
-class SentenceMotion(Protocol):
-    """A motion that is made for a sentence."""
-
-    @property
-    def motion(self) -> Motion:
-        """The motion."""
-
-    @property
-    def action(self) -> str:
-        """A sentence of the action that it shows."""
-
-    @property
-    def lacking(self) -> tuple[str, ...]:
-        """Words of its sentence that the action leaves out."""
-
-    @property
-    def confidence(self) -> float | None:
-        """How well its sentence is known, 0 to 1."""
-
-
 @runtime_checkable
 class SentenceModel(Protocol):
     """A model that makes motions for sentences, such as a :class:`motet.GenerateModel`."""
@@ -51,8 +30,8 @@ class SentenceModel(Protocol):
     def check(self, sentence: str, *, lacking: bool = True) -> None:
         """TextError for a sentence that it does not know; ``lacking``: or whose action leaves out a word."""
 
-    def generate(self, sentences: str, hypotheses: int, *, seconds: float) -> Sequence[SentenceMotion]:
-        """``hypotheses`` motions of ``seconds`` for a sentence."""
+    def generate(self, sentences: str, hypotheses: int, *, seconds: float) -> Sequence[Any]:
+        """``hypotheses`` motions of ``seconds`` for a sentence, as :class:`motet.Generated` has them."""
 
 
 class SaidActs:

@@ -576,10 +576,9 @@ class SteerSession:
 
     def run(self, script: str) -> list[Motion]:
         """Run a script (:mod:`motet.steering.scripts`) for all characters; one motion for each."""
-        poses = list(self.follow(parse_orders(script, self.model.gaits)))
-        return [
-            self.model.contract.motion(frames, plant=self._state.lock is not None) for frames in self.frames_of(poses)
-        ]
+        frames = self.frames_of(list(self.follow(parse_orders(script, self.model.gaits))))
+        plant = self._state.lock is not None
+        return [self.model.contract.motion(each, plant=plant) for each in frames]
 
     def follow(self, orders: Sequence[Order]) -> Iterator[Pose]:
         """The poses of all characters that follow orders, tick by tick."""

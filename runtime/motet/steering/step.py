@@ -140,9 +140,7 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
 
 def _advance(playback: Playback) -> None:
     """Go on by the playback rate."""
-    part = playback.part + playback.rate
-    whole = np.floor(part)
-    playback.part = part - whole
+    whole, playback.part = np.divmod(playback.part + playback.rate, 1)
     playback.row = playback.row + whole.astype(np.int64)
 
 
