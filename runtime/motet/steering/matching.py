@@ -344,11 +344,9 @@ class Matcher:
 
         target: (B, 3) velocity along x and z, and facing. gait: (B,).
         """
-        due = np.flatnonzero(playback.ticks_to_search <= 0)
-        playback.ticks_to_search -= 1
+        due = self._due(playback)
         if not len(due):
             return
-        playback.ticks_to_search[due] = self.settings.search_every - 1
         # the row that each plays, and what would be best
         gait = gait[due]
         slow_walk = self.is_slow_walk(target[due], gait)
@@ -361,6 +359,13 @@ class Matcher:
         # never leave a row in mid-air; always leave one whose recording is about to end
         stays = (self.flies[row] | fits) & (self.table.left[row] >= self.reserve)
         self.jump(playback, due[~stays], best[~stays], best_mirror[~stays])
+
+    def _due(self, playback: Playback) -> Rows:
+        """The figures (n,) whose search is due in this tick, which is counted."""
+        due = np.flatnonzero(playback.ticks_to_search <= 0)
+        playback.ticks_to_search -= 1
+        playback.ticks_to_search[due] = self.settings.search_every - 1
+        return due
 
     def _wanted(
         self, playback: Playback, target: Array, slow_walk: Flags, figures: Rows | slice

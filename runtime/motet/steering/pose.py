@@ -38,10 +38,10 @@ class Pose:
 
     def read_only(self) -> "Pose":
         """The same pose with read-only arrays: they are the state from which a session goes on."""
-        views: list[Any] = [array.view() for array in (self.ground, self.rotations, self.height, self.contacts)]
-        for view in views:
+        views = {name: getattr(self, name).view() for name in ("ground", "rotations", "height", "contacts")}
+        for view in views.values():
             view.flags.writeable = False
-        return Pose(*views, events=self.events)
+        return replace(self, **views)
 
     def __len__(self) -> int:
         """B."""
