@@ -354,8 +354,7 @@ class Matcher:
         best, best_mirror, best_cost = self.best(query, gait)
         # the present row is kept if the best one is hardly better, or so near that playback would loop on the spot
         cheap = self.cost_at(query, row, mirror) <= best_cost + np.where(slow_walk, 0, self.settings.continuing)
-        near = (best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead)
-        fits = self.table.shows[row, gait] & (near | cheap)
+        fits = self.table.shows[row, gait] & (self._is_near(best, row) | cheap)
         # never leave a row in mid-air; always leave one whose recording is about to end
         stays = (self.flies[row] | fits) & (self.table.left[row] >= self.reserve)
         self.jump(playback, due[~stays], best[~stays], best_mirror[~stays])
@@ -366,6 +365,10 @@ class Matcher:
         playback.ticks_to_search -= 1
         playback.ticks_to_search[due] = self.settings.search_every - 1
         return due
+
+    def _is_near(self, best: Rows, row: Rows) -> Flags:
+        """Whether rows (n,) are too near to the present ones (n,) to be jumped to, mirrored or not."""
+        return np.asarray((best >= row - self.settings.jump_back) & (best <= row + self.settings.jump_ahead))
 
     def _wanted(
         self, playback: Playback, target: Array, slow_walk: Flags, figures: Rows | slice
