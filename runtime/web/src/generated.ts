@@ -104,12 +104,12 @@ export const TWO_BONES = {
 export const GLTF = {
   MAX_JOINTS: 3000,
   MAX_SKINS: 500,
-  PATHS: { rotation: 4, translation: 3, scale: 3 },
 } as const;
 
 // motet.formats.gltf_data
 export const GLTF_DATA = {
   MAX_NODES: 20000,
+  REST: { translation: [0, 0, 0], rotation: [0, 0, 0, 1], scale: [1, 1, 1] },
 } as const;
 
 // motet.formats.text

@@ -1,5 +1,5 @@
 /* Reading glTF 2.0 and VRM: a figure's joints, and its animations as clips; every angle is 0 in the rest pose of the nodes. */
-import { GLTF, SKELETON } from "../generated.js";
+import { GLTF, GLTF_DATA, SKELETON } from "../generated.js";
 import { FormatError, MotionError } from "../errors.js";
 import { type Animation, Gltf, type Local, type Placed } from "./gltfData.js";
 import { BONES } from "../figures/humanoid/bones.js";
@@ -24,7 +24,10 @@ import {
 } from "../motion/rotations.js";
 import { type Joint, type RestNode, Skeleton, unique } from "../motion/skeleton.js";
 
-const WIDTHS: Record<string, number> = GLTF.PATHS;
+/** Numbers of a node's rotation, translation or scale. */
+const WIDTHS: Record<string, number> = Object.fromEntries(
+  Object.entries(GLTF_DATA.REST).map(([path, rest]) => [path, rest.length]),
+);
 
 /** The names of the animations that move a figure. FormatError as {@link readGLB}. */
 export function clipsOf(content: Uint8Array): string[] {
