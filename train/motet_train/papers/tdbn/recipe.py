@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
-from itertools import accumulate, pairwise
+from functools import partial
+from itertools import accumulate, chain, pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ import torch
 from torch import nn
 
 from motet.bundle.manifest import Manifest
+from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
@@ -34,39 +36,69 @@ BASELINES = {"default": Recipe("control", "angle-crbm", "session", AngleCRBMConf
 def train_control(clips: Clips, job: Job) -> Run:
     """Train on labelled clips, see :meth:`motet_train.recipes.recipe.Job.run`; DataError where one is too short."""
     config = job.recipe.config
-    found = clips.frames(config.fps)
-    for label, group in found.items():
-        if (shortest := min(map(len, group))) < 4 * config.taps:
-            have = f"a clip of {label!r} has {shortest} frames at the model's rate"
-            raise DataError(f"{have}; it needs {4 * config.taps}")
-    net = untrained(config, clips.skeleton, clips.channels, len(found))
-    units, every = ("deg",) * len(clips.channels), np.concatenate([s for group in found.values() for s in group])
-    mean, std = every.mean(axis=0), living(every.std(axis=0), units)
-    contract = MotionContract("angles", clips.channels, units, config.fps, mean, std, clips.skeleton)
-    net.measure_by(mean, std * config.sigma)
-    starts = {label: np.round(group[0][: config.taps], 6).tolist() for label, group in found.items()}
-    control = {"labels": list(found), "starts": starts}
+    motions = clips.frames(config.fps)
+    _check_lengths(motions, 4 * config.taps)
+    # the net, with the mean and scale of all frames
+    frames = np.concatenate(list(chain.from_iterable(motions.values())))
+    contract = _contract(clips, config.fps, frames)
+    net = untrained(config, clips.skeleton, clips.channels, len(motions))
+    net.measure_by(contract.mean, contract.std * config.sigma)
+    control = {"labels": list(motions), "starts": _starts(motions, config.taps)}
     manifest = job.manifest(contract, net.to_config(), net.defaults, clips.licence, control=control)
-    labels = zip(np.eye(len(found)), found.values(), strict=True)
-    controls = [[np.tile(label, (len(frames), 1)) for frames in group] for label, group in labels]
-    periodic = [is_periodic(frames) for frames in found.values()]
-    lessons = Lessons(list(found.values()), controls, [1.0 if one else config.onset for one in periodic])
-
-    def missed(run: Run, enough: int) -> list[str]:
-        model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
-        return missed_goals(study_of(model, clips), enough)
-
-    def more(log: Sequence[Line]) -> dict[str, Any]:
-        tried = sum("missed" in line for line in log)
-        chosen = {"candidates": tried, "missed": kept(log, "best")["missed"]} if tried else {}
-        given, moving = torch.tensor(every, dtype=torch.float32), std > 0
-        with torch.no_grad():
-            error = (net.cpu().decode(net.encode(given)) - given).numpy()[:, moving] / std[moving]
-        # RMS in z units of frames encoded and decoded
-        return {"reconstruction": round(float(np.sqrt(np.mean(error**2))), 6), **chosen}
-
     # clips that show no gait have none to try a candidate with
-    return train_lessons(net, job, manifest, lessons, missed if any(periodic) else None, more)
+    any_gait = any(map(is_periodic, motions.values()))
+    missed = partial(_missed, clips) if any_gait else None
+    results = partial(_results, net, frames, contract.std)
+    return train_lessons(net, job, manifest, _lessons(motions, config.onset), missed, results)
+
+
+def _check_lengths(motions: Mapping[str, Sequence[Array]], least: int) -> None:
+    for label, group in motions.items():
+        shortest = min(map(len, group))
+        if shortest < least:
+            have = f"a clip of {label!r} has {shortest} frames at the model's rate"
+            raise DataError(f"{have}; it needs {least}")
+
+
+def _starts(motions: Mapping[str, Sequence[Array]], taps: int) -> dict[str, list[list[float]]]:
+    """The first frames of each label, from which sessions begin."""
+    return {label: np.round(group[0][:taps], 6).tolist() for label, group in motions.items()}
+
+
+def _contract(clips: Clips, fps: float, frames: Array) -> MotionContract:
+    """The contract of joint angles with the mean and standard deviation of frames (N, D)."""
+    units = ("deg",) * len(clips.channels)
+    std = living(frames.std(axis=0), units)
+    return MotionContract("angles", clips.channels, units, fps, frames.mean(axis=0), std, clips.skeleton)
+
+
+def _lessons(motions: Mapping[str, Sequence[Array]], onset: float) -> Lessons:
+    """The sequences of each label under its control, with an onset for the motions that end."""
+    controls = []
+    onsets = []
+    for label, group in zip(np.eye(len(motions)), motions.values(), strict=True):
+        controls.append([np.tile(label, (len(frames), 1)) for frames in group])
+        onsets.append(1.0 if is_periodic(group) else onset)
+    return Lessons(list(motions.values()), controls, onsets)
+
+
+def _missed(clips: Clips, run: Run, enough: int) -> list[str]:
+    """The goals that a net misses, see :func:`motet_train.papers.tdbn.report.missed_goals`."""
+    model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    return missed_goals(study_of(model, clips), enough)
+
+
+def _results(net: ControlNet, frames: Array, std: Array, log: Sequence[Line]) -> dict[str, Any]:
+    """Entries of the manifest: RMS error in z units of coded frames (N, D), the nets tried, the goals missed."""
+    moving = std > 0
+    original = torch.tensor(frames, dtype=torch.float32)
+    with torch.no_grad():
+        error = (net.cpu().decode(net.encode(original)) - original).numpy()[:, moving] / std[moving]
+    results: dict[str, Any] = {"reconstruction": round(float(np.sqrt(np.mean(error**2))), 6)}
+    tried = sum("missed" in line for line in log)
+    if tried:
+        results |= {"candidates": tried, "missed": kept(log, "best")["missed"]}
+    return results
 
 
 def untrained(
@@ -88,18 +120,15 @@ def train_lessons(
 ) -> Run:
     """Train a net that has its mean and scale; missed: the goals that a candidate misses, of several to choose from."""
     generator = torch.Generator(job.device).manual_seed(job.about.seed)
-    given, told = (
-        [[torch.tensor(rows, dtype=torch.float32, device=job.device) for rows in group] for group in part]
-        for part in (lessons.sequences, lessons.controls)
-    )
-    stages, others = net.to(job.device).stages(Lessons(given, told, lessons.onsets), generator)
+    stages, others = net.to(job.device).stages(lessons.tensors(job.device), generator)
 
     def misses(enough: int) -> list[str]:
         assert missed is not None
         return missed(Run(manifest, deepcopy(net).cpu()), enough)
 
     choose = missed is not None and sum(stage.whole for stage in stages) > 1
-    return job.run(net, DivergenceLearner(net, stages, generator, misses if choose else None, others), manifest, more)
+    learner = DivergenceLearner(net, stages, generator, misses if choose else None, others)
+    return job.run(net, learner, manifest, more)
 
 
 EPOCHS_A_CHUNK = 200
@@ -118,7 +147,8 @@ class DivergenceLearner:
     unit: Literal["epoch", "step"] = "epoch"
     keep: Literal["best", "last"] = "best"
     patience: int | None = None
-    first, target = 0, 0.0
+    first = 0
+    target = 0.0
 
     def __init__(
         self,
@@ -131,12 +161,17 @@ class DivergenceLearner:
         if distributed.count() > 1:
             raise RunError("contrastive divergence trains in one process, without torchrun")
         self.kept: nn.Module = net
-        self.stages, self.generator, self.missed = stages, generator, missed
+        self.stages = stages
+        self.generator = generator
+        self.missed = missed
         self.bounds = list(accumulate((stage.epochs for stage in stages), initial=0))
-        self.ends = [end for span in pairwise(self.bounds) for end in (*range(*span, EPOCHS_A_CHUNK)[1:], span[1])]
+        self.ends: list[int] = []
+        for first, last in pairwise(self.bounds):
+            self.ends += [*range(first, last, EPOCHS_A_CHUNK)[1:], last]
         self.parts: dict[str, Part] = {"net": net, **others, "learning": self}
         self.layer: Layer | None = None
-        self.done, self.fewest = 0, 1000  # more goals than exist
+        self.done = 0
+        self.fewest = 1000  # more goals than exist
 
     def chunk(self, start: int, stop: int, rng: np.random.Generator) -> Iterator[tuple[int, float, float]]:
         """Train from one epoch to another of the same stage; all random numbers are the generator's."""
@@ -152,9 +187,9 @@ class DivergenceLearner:
         """The goals that a whole net misses."""
         if self.missed is None or self.done not in self.bounds or not self.stages[self._stage(self.done - 1)].whole:
             return {}
-        found = self.missed(self.fewest)
-        self.fewest = min(self.fewest, len(found))
-        return {"validation": len(found), "missed": found}
+        missed = self.missed(self.fewest)
+        self.fewest = min(self.fewest, len(missed))
+        return {"validation": len(missed), "missed": missed}
 
     def _stage(self, done: int) -> int:
         return next(n for n, stop in enumerate(self.bounds[1:]) if done < stop)
@@ -168,7 +203,8 @@ class DivergenceLearner:
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Go on there; the net has its weights."""
-        self.done, self.fewest = state["done"], state["fewest"]
+        self.done = state["done"]
+        self.fewest = state["fewest"]
         self.layer = self.stages[self._stage(self.done - 1)].layer()
         for name, ascent in self.layer.ascents.items():
             ascent.velocity.copy_(state["velocities"][name])

@@ -62,7 +62,7 @@ TDBN = TDBNConfig(
     hidden_per_part=60,
     control_units=8,
     past_noise=0.1,
-    own=12,
+    unrolled=12,
     restarts=1,
     tries=1,
     rbm=Learning(40, rate=1e-2, final_rate=0.03, batch=50, temperature=(1.0, 0.38)),
@@ -81,7 +81,7 @@ CRBM = AngleCRBMConfig(
 
 RECIPES = {
     "default": Recipe("control", "tdbn", "session", TDBN),
-    "recorded-past": Recipe("control", "tdbn", "session", replace(TDBN, own=0, past_noise=0.3)),
+    "recorded-past": Recipe("control", "tdbn", "session", replace(TDBN, unrolled=0, past_noise=0.3)),
     "crbm": Recipe("control", "angle-crbm", "session", CRBM),
 }
 """The deep net; the same with the thesis' training, on recorded pasts only; and Taylor's net, without the RBM."""
@@ -94,21 +94,31 @@ def train_steered(store: Store, job: Job, data: str = "") -> Run:
     """
     if store.representation != "root_sixd":
         raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
-    known = {gait.name: gait for gait in gaits_of(store)}
-    gaits = tuple(known.get(name, Gait(name, (), ())) for name in GAITS)
-    recorded = recordings(store, gaits)
+    config = replace(job.recipe.config, fps=store.fps)
+    recorded = _recorded(store)
     contract, motions = mirrored_too(store, recorded)
     assert contract.skeleton is not None
-    config = replace(job.recipe.config, fps=store.fps)
+    # the net, with the mean and scale of all frames
     net = untrained(config, contract.skeleton, contract.channels, len(LABELS))
     net.measure_by(contract.mean, contract.std * config.sigma)
     control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, _start(recorded, config.taps))}
     about = {"data": {"name": data, "recordings": len(recorded), "frames": sum(map(len, motions))}}
     manifest = job.manifest(contract, net.to_config(), net.defaults, None, about, control=control)
-    # one group, so that long recordings weigh as much as short ones
+    return train_lessons(net, job, manifest, _lessons(motions))
+
+
+def _lessons(motions: Sequence[Motion]) -> Lessons:
+    """Recordings under the control of their course, in one group, so that long ones weigh as much as short ones."""
     sequences = [motion.values for motion in motions]
     controls = [controls_of(course(motion)) for motion in motions]
-    return train_lessons(net, job, manifest, Lessons([sequences], [controls], [1.0]))
+    return Lessons([sequences], [controls], [1.0])
+
+
+def _recorded(store: Store) -> list[Recording]:
+    """The recordings of :data:`GAITS`; DataError if a gait has none."""
+    known = {gait.name: gait for gait in gaits_of(store)}
+    gaits = tuple(known.get(name, Gait(name, (), ())) for name in GAITS)
+    return recordings(store, gaits)
 
 
 def _start(recorded: Sequence[Recording], taps: int) -> list[list[float]]:

@@ -47,6 +47,16 @@ class Lessons:
     controls: Sequence[Sequence[Any]]
     onsets: Sequence[float]
 
+    def tensors(self, device: str) -> "Lessons":
+        """The same as float32 tensors on a device."""
+        sequences = [_tensors(group, device) for group in self.sequences]
+        controls = [_tensors(group, device) for group in self.controls]
+        return Lessons(sequences, controls, self.onsets)
+
+
+def _tensors(group: Sequence[Any], device: str) -> list[Tensor]:
+    return [torch.tensor(rows, dtype=torch.float32, device=device) for rows in group]
+
 
 class ControlNet(Net):
     """A CRBM over codes of frames; subclasses encode and decode frames.
@@ -188,7 +198,7 @@ class TDBNConfig:
     for each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for
     the second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard
     deviation of a visible unit relative to its channel's: with a smaller one, codes are more precise. past_noise,
-    own: noise and unrolled of :class:`Past`. onset: how many times as often the first window of a motion that ends
+    unrolled: noise and unrolled of :class:`Past`. onset: how many times as often the first window of a motion that ends
     is drawn as its last. temperature: of the codes and of generation; learning anneals from 1 to it. initial:
     standard deviation of the first weights. restarts: RBMs that learn side by side; their features decide how the
     net moves. tries: most CRBMs trained on each of them until a net reaches its goals.
@@ -204,7 +214,7 @@ class TDBNConfig:
     clamped: bool = True
     sigma: float = 0.38
     past_noise: float = 0.3
-    own: int = 0
+    unrolled: int = 0
     onset: float = 100.0
     temperature: float = 0.38
     initial: float = 0.01
@@ -265,21 +275,32 @@ class TDBN(ControlNet):
         """
         config = self.config
         rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
+        stages = [self._rbm_stage(rbms, lessons, generator)]
+        for number in [*range(config.restarts)] * config.tries:
+            stages.append(self._crbm_stage(rbms, number, lessons, generator))
+        return stages, {"rbms": rbms}
 
-        def begin_rbm() -> None:
+    def _rbm_stage(self, rbms: RBM, lessons: Lessons, generator: torch.Generator) -> Stage:
+        """The RBMs, side by side."""
+        config = self.config
+
+        def begin() -> None:
             rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
 
-        def begin_crbm(number: int) -> None:
+        layer = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
+        return Stage(config.rbm.epochs, begin, layer, whole=False)
+
+    def _crbm_stage(self, rbms: RBM, number: int, lessons: Lessons, generator: torch.Generator) -> Stage:
+        """A CRBM on one of the RBMs."""
+        config = self.config
+
+        def begin() -> None:
             self.rbm.take(rbms, number)
             self.begin_crbm(generator)
 
-        rbm = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
-        past = Past(config.past_noise, unrolled=config.own)
-        crbm = partial(self.crbm_layer, lessons, generator, past, config.clamped)
-        stages = [Stage(config.rbm.epochs, begin_rbm, rbm, whole=False)]
-        for number in [*range(config.restarts)] * config.tries:
-            stages.append(Stage(config.crbm.epochs, partial(begin_crbm, number), crbm, whole=True))
-        return stages, {"rbms": rbms}
+        past = Past(config.past_noise, unrolled=config.unrolled)
+        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped)
+        return Stage(config.crbm.epochs, begin, layer, whole=True)
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
         """All frames (N, D), normalised, and their probabilities (N,), the same for each group."""
