@@ -84,7 +84,7 @@ def control(restarts: int = 2, missed: Callable[[int], list[str]] | None = None)
     clips = read_clips()
     parts = body_parts(clips.skeleton, clips.channels).of_channel.tolist()
     lower, upper = Learning(epochs=5), Learning(epochs=3)
-    net = TDBN(TDBNConfig(rbm=lower, crbm=upper, restarts=restarts, tries=1, hidden_per_part=4), parts, 3)
+    net = TDBN(TDBNConfig(rbm=lower, crbm=upper, restarts=restarts, tries=1, rounds=1, hidden_per_part=4), parts, 3)
     frames = [[torch.tensor(motion[::6].values).float() / 30 for motion in group] for group in clips.motions.values()]
     generator = torch.Generator().manual_seed(SEED)
     controls = [

@@ -52,7 +52,7 @@ def own_clips(folder: Path) -> Path:
 def test_a_folder_of_bvh_is_trained_on(tmp_path: Path) -> None:
     clips = read_clips(own_clips(tmp_path))
     assert clips.labels == ("jog", "stroll")
-    short = TDBNConfig(restarts=2, tries=1, rbm=Learning(epochs=1), crbm=Learning(epochs=1))
+    short = TDBNConfig(restarts=2, tries=1, rounds=1, rbm=Learning(epochs=1), crbm=Learning(epochs=1))
     run = control_run(clips, short)
     assert run.manifest["training"]["candidates"] == 2  # none of the untrained ones satisfies
     assert "cycle.energy" in run.manifest["training"]["missed"]

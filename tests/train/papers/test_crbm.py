@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from motet_train.papers.tdbn.rbm import CRBM, CRBMLayer, Learning, Past, transitions
+from motet_train.papers.tdbn.rbm import CRBM, Borrowed, CRBMLayer, Learning, Past, transitions
 
 
 def small_crbm(free: int = 0) -> CRBM:
@@ -43,6 +43,66 @@ def test_windows_against_loops() -> None:
         torch.testing.assert_close(getattr(data, name), torch.stack(rows), rtol=0, atol=0)
     np.testing.assert_allclose(data.probabilities[:8], 1 / 16)
     np.testing.assert_allclose(data.probabilities[8] / data.probabilities[11], 16, rtol=1e-5)
+
+
+def three_groups() -> list[list[torch.Tensor]]:
+    """Two motions that repeat and one that ends; each number is another."""
+    lengths = [[7, 5], [6], [8]]
+    numbers = iter(torch.arange(26 * 4).float().view(26, 4) / 1000)
+    return [[torch.stack([next(numbers) for _ in range(n)]) for n in group] for group in lengths]
+
+
+def test_gaits_are_each_others_rivals_and_a_motion_that_ends_has_none() -> None:
+    frames = three_groups()
+    units = [[row.expand(len(part), -1) for part in group] for row, group in zip(torch.eye(3), frames, strict=True)]
+    data = transitions(frames, units, taps=2, onsets=(1.0, 1.0, 16.0))
+    labels = [group for group, parts in enumerate(frames) for part in parts for _ in range(len(part) - 2)]
+    assert data.repeats.tolist() == [label < 2 for label in labels]
+    assert data.rival.argmax(dim=1).tolist() == [{0: 1, 1: 0, 2: 2}[label] for label in labels]
+    alone = transitions(frames[1:], units[1:], taps=2, onsets=(1.0, 16.0))
+    assert torch.equal(alone.rival, alone.control)
+
+
+def test_windows_borrow_whole_body_parts_and_some_of_a_rivals_control() -> None:
+    """Each part of a past is the window's or another's in all frames, and only gaits borrow."""
+    frames = three_groups()
+    units = [[row.expand(len(part), -1) for part in group] for row, group in zip(torch.eye(3), frames, strict=True)]
+    data = transitions(frames, units, taps=2, onsets=(1.0, 1.0, 16.0))
+    generator = torch.Generator().manual_seed(0)
+    borrowed = Borrowed(past=0.3, block=2, control=0.4)
+    layer = CRBMLayer(small_crbm(), data, Learning(1), generator, True, Past(), borrowed)
+    rows = torch.arange(len(data.past)).repeat(500)
+    past, control = layer._windows(rows)
+    # parts (N, K, 2, 2): taps, body parts, codes
+    parts, recorded = past.view(-1, 2, 2, 2), data.past.view(-1, 2, 2, 2)
+    changed = (parts != recorded[rows]).any(dim=3)
+    assert not changed[~data.repeats[rows]].any()
+    assert torch.equal(changed[:, 0], changed[:, 1])
+    # a window seldom borrows from itself
+    assert 0.26 < changed[data.repeats[rows]].float().mean() < 0.31
+    for part in range(2):
+        known = {tuple(window.flatten().tolist()) for window in recorded[:, :, part]}
+        assert {tuple(window.flatten().tolist()) for window in parts[:, :, part]} <= known
+    share = 1 - (control * data.control[rows]).sum(dim=1)
+    assert share[~data.repeats[rows]].abs().max() < 1e-6
+    gait = share[data.repeats[rows]]
+    assert gait.min() >= 0
+    assert 0.39 < gait.max() < 0.4
+    assert 0.19 < gait.mean() < 0.21
+    rival = (control * data.rival[rows]).sum(dim=1)[data.repeats[rows]]
+    torch.testing.assert_close(rival, gait, rtol=0, atol=1e-6)
+
+
+def test_nothing_is_drawn_for_what_is_not_borrowed() -> None:
+    """So that recipes without it learn as before."""
+    data = transitions(sequences(), controls(torch.eye(2, 3)), taps=2, onsets=(1.0, 1.0))
+    generator = torch.Generator().manual_seed(0)
+    layer = CRBMLayer(small_crbm(), data, Learning(1), generator, clamped=True, recall=Past())
+    before = generator.get_state()
+    past, control = layer._windows(torch.arange(4))
+    assert torch.equal(generator.get_state(), before)
+    assert torch.equal(past, data.past[:4])
+    assert torch.equal(control, data.control[:4])
 
 
 def test_controls_are_those_of_the_frame_that_they_drive() -> None:

@@ -11,10 +11,10 @@ from motet.papers.tdbn_control import TdbnModel
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import body_parts, read_clips
 from motet_train.papers.tdbn.rbm import Learning
-from motet_train.papers.tdbn.tdbn import TDBN, TDBNConfig
+from motet_train.papers.tdbn.tdbn import TDBN, Lessons, TDBNConfig
 from motet_train.runs import Run, RunError
 
-SHORT = replace(TDBNConfig(), restarts=1, tries=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))
+SHORT = replace(TDBNConfig(), restarts=1, tries=1, rounds=1, rbm=Learning(epochs=2), crbm=Learning(epochs=2))
 
 
 def train(config: TDBNConfig = SHORT, seed: int = 0) -> Run:
@@ -40,6 +40,22 @@ def test_the_thesis_second_layer_is_one_block_for_two_gaits_and_equal_parts_for_
     assert two.expansion.tolist() == [[0.0] * 20, [1.0] * 20]
     assert three.expansion.tolist() == np.repeat(np.eye(3), 7, axis=1).tolist()
     assert TDBNConfig.thesis().rbm.steps == 1
+
+
+def test_a_round_is_an_rbm_with_nets_on_it_and_the_next_begins_anew() -> None:
+    config = replace(SHORT, tries=2, rounds=3)
+    net = TDBN(config, [0, 0, 1], labels=1)
+    net.measure_by(np.zeros(3), np.ones(3))
+    rows = torch.randn(20, 3, generator=torch.Generator().manual_seed(0))
+    stages, parts = net.stages(Lessons([[rows]], [[torch.ones(20, 1)]], [1.0]), torch.Generator().manual_seed(0))
+    assert [stage.whole for stage in stages] == [False, True, True] * 3
+    stages[0].begin()
+    stages[0].layer().epoch(0)
+    assert parts["rbms"].hidden_bias.any()
+    stages[3].begin()
+    assert not parts["rbms"].hidden_bias.any()
+    assert not parts["rbms"].visible_bias.any()
+    assert 0.005 < parts["rbms"].weight[parts["rbms"].weight != 0].std() < 0.02
 
 
 def test_training_repeats_by_its_seed() -> None:

@@ -165,7 +165,7 @@ clips_data = with_options(
 labels = click.option("--labels", help='Labels to train on, such as "walk,run". [default: all]')
 
 
-# seed 6 is that of the bundle tdbn
+# with --preset pure, seed 6 is that of the bundle tdbn
 @train.add_command
 @train_command("tdbn", tdbn.RECIPES, clips_data, labels, defaults={"seed": 6, "out": "runs/tdbn", "name": "tdbn"})
 def train_tdbn(job: Job, data: Path | None, unit_in: str | None, labels: str | None) -> Run:

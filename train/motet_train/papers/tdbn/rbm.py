@@ -294,13 +294,17 @@ class CRBM(nn.Module):
 class Transitions(NamedTuple):
     """Training data of a CRBM: past (N, K H), visible (N, H), control (N, C), and probabilities (N,) of the rows.
 
-    If the net makes some of its past itself, that many frames and controls more come before these.
+    rival: (N, C) the mean control of the other motions that repeat, or the row's control where there is none. repeats:
+    (N,) whether the row's motion repeats. If the net makes some of its past itself, that many frames and controls more
+    come before these.
     """
 
     past: Tensor
     visible: Tensor
     control: Tensor
     probabilities: Tensor
+    rival: Tensor
+    repeats: Tensor
 
 
 def transitions(
@@ -314,7 +318,7 @@ def transitions(
 
     controls: the control units (T, C) of each sequence's frames. onsets: for each group how many times as often the
     first window of a sequence is drawn as its last, geometric between: a motion that ends must be entered at its
-    start. extra: number of additional frames, and controls, before these, see :class:`Past`.
+    start; 1 for a motion that repeats. extra: number of additional frames and controls before these, see :class:`Past`.
     """
     reach = taps + extra
     windows = [sequence.unfold(0, reach + 1, 1) for sequence in chain.from_iterable(codes)]
@@ -322,7 +326,22 @@ def transitions(
     every = torch.cat(windows).transpose(1, 2)
     control = torch.cat(units).transpose(1, 2).flatten(1)
     weights = [_window_weights(group, reach, onset) for group, onset in zip(codes, onsets, strict=True)]
-    return Transitions(every[:, :reach].flatten(1), every[:, reach], control, balanced(weights))
+    rival, repeats = _rivals(control, list(map(len, weights)), [onset == 1 for onset in onsets])
+    return Transitions(every[:, :reach].flatten(1), every[:, reach], control, balanced(weights), rival, repeats)
+
+
+def _rivals(control: Tensor, counts: Sequence[int], repeating: Sequence[bool]) -> tuple[Tensor, Tensor]:
+    """rival and repeats of :class:`Transitions`, from the control (N, C) of all windows and their number by group."""
+    of_groups = torch.split_with_sizes(control, counts)
+    rival = []
+    for number, of_group in enumerate(of_groups):
+        others = []
+        for other, repeats in enumerate(repeating):
+            if repeats and other != number:
+                others.append(of_groups[other].mean(0))
+        has_rival = repeating[number] and bool(others)
+        rival.append(torch.stack(others).mean(0).expand_as(of_group) if has_rival else of_group)
+    return torch.cat(rival), torch.tensor(repeating, device=control.device).repeat_interleave(torch.tensor(counts))
 
 
 def _window_weights(sequences: Sequence[Tensor], reach: int, onset: float) -> Tensor:
@@ -345,6 +364,24 @@ class Past:
     unrolled: int = 0
 
 
+@dataclass(frozen=True)
+class Borrowed:
+    """Parts that windows of motions that repeat, such as gaits, borrow from others in the training of a CRBM.
+
+    past: the probability with which the past of a body part is that of a window drawn at random. The net so learns to
+    take a body along whose parts move differently, instead of letting it rest between two gaits. block: codes of a body
+    part. control: the largest share of the control of the other motions that repeat; the share is uniform. The net so
+    learns to keep its gait under a control that is not pure.
+    """
+
+    past: float = 0.0
+    block: int = 1
+    control: float = 0.0
+
+
+NOTHING_BORROWED = Borrowed()
+
+
 class CRBMLayer(Layer):
     """A CRBM that learns by contrastive divergence with the past held fixed (thesis 3.2, 5.2).
 
@@ -352,21 +389,49 @@ class CRBMLayer(Layer):
     """
 
     def __init__(
-        self, crbm: CRBM, data: Transitions, learning: Learning, generator: torch.Generator, clamped: bool, recall: Past
+        self,
+        crbm: CRBM,
+        data: Transitions,
+        learning: Learning,
+        generator: torch.Generator,
+        clamped: bool,
+        recall: Past,
+        borrowed: Borrowed = NOTHING_BORROWED,
     ) -> None:
         super().__init__(crbm, learning, data.probabilities, generator)
         self.crbm = crbm
         self.data = data
         self.clamped = clamped
         self.recall = recall
+        self.borrowed = borrowed
 
     @torch.no_grad()
     def _learn(self, epoch: Epoch) -> float:
         for rows in epoch.batches:
-            error = self._update(self.data.past[rows], self.data.visible[rows], self.data.control[rows], epoch)
+            past, control = self._windows(rows)
+            error = self._update(past, self.data.visible[rows], control, epoch)
         if not self.crbm.past_weight.abs().max() <= 1000:  # normally weights stay near 1
             raise DivergedError("training diverged: the CRBM has weights beyond 1000")
         return float(error.square().mean())
+
+    def _windows(self, rows: Tensor) -> tuple[Tensor, Tensor]:
+        """Past (B, K H) and control (B, C) of windows (B,), with what they borrow, see :class:`Borrowed`."""
+        past = self.data.past[rows]
+        control = self.data.control[rows]
+        if not self.borrowed.past and not self.borrowed.control:
+            return past, control
+        share = self.borrowed.control * torch.rand(len(rows), 1, generator=self.generator, device=past.device)
+        return self._borrowed_past(rows, past), torch.lerp(control, self.data.rival[rows], share)
+
+    def _borrowed_past(self, rows: Tensor, past: Tensor) -> Tensor:
+        """The past (B, K H) of windows (B,), of some body parts another window's in all its frames."""
+        codes = len(self.crbm.visible_bias)
+        block = self.borrowed.block
+        others = torch.multinomial(self.probabilities, len(rows), replacement=True, generator=self.generator)
+        chances = torch.rand(len(rows), codes // block, generator=self.generator, device=past.device)
+        of_part = (chances < self.borrowed.past) & self.data.repeats[rows, None]
+        of_code = of_part.repeat_interleave(block, dim=1).repeat(1, past.shape[1] // codes)
+        return torch.where(of_code, self.data.past[others], past)
 
     def _update(self, past: Tensor, visible: Tensor, control: Tensor, epoch: Epoch) -> Tensor:
         """Learn from one mini-batch by CD-k; the error of the reconstruction (B, H)."""

@@ -27,6 +27,7 @@ from motet_train.trainer import Line, Part, kept
 
 RECIPES = {
     "default": Recipe("control", "tdbn", "session", TDBNConfig()),
+    "pure": Recipe("control", "tdbn", "session", TDBNConfig().pure()),
     "unclamped": Recipe("control", "tdbn", "session", TDBNConfig().unclamped()),
     "thesis": Recipe("control", "tdbn", "session", TDBNConfig.thesis()),
 }

@@ -63,8 +63,12 @@ TDBN = TDBNConfig(
     control_units=8,
     past_noise=0.1,
     unrolled=12,
+    borrowed_past=0.0,
+    borrowed_control=0.0,
+    onset=100.0,
     restarts=1,
     tries=1,
+    rounds=1,
     rbm=Learning(40, rate=1e-2, final_rate=0.03, batch=50, temperature=(1.0, 0.38)),
     crbm=Learning(60, rate=1e-2, final_rate=0.05, batch=50, temperature=(0.38, 0.38)),
 )

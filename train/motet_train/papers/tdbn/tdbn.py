@@ -23,7 +23,9 @@ from motet.representation.contract import Z_LIMIT
 from motet_train.models.net import Net, Part, configured, normalised
 from motet_train.papers.tdbn.rbm import (
     CRBM,
+    NOTHING_BORROWED,
     RBM,
+    Borrowed,
     CRBMLayer,
     Learning,
     Past,
@@ -122,12 +124,19 @@ class ControlNet(Net):
             if weight is not None:
                 weight.normal_(0.0, self.config.initial, generator=generator)
 
-    def crbm_layer(self, lessons: Lessons, generator: torch.Generator, past: Past, clamped: bool = True) -> CRBMLayer:
+    def crbm_layer(
+        self,
+        lessons: Lessons,
+        generator: torch.Generator,
+        past: Past,
+        clamped: bool = True,
+        borrowed: Borrowed = NOTHING_BORROWED,
+    ) -> CRBMLayer:
         """The training of the CRBM on sequences in the present codes."""
         codes = [list(map(self.encode, group)) for group in lessons.sequences]
         units = [list(map(self._units, group)) for group in lessons.controls]
         data = transitions(codes, units, self.config.taps, lessons.onsets, past.unrolled)
-        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
+        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past, borrowed)
 
     def _units(self, control: Tensor) -> Tensor:
         """Control values (..., L) as control units (..., C)."""
@@ -192,16 +201,17 @@ def _spec(name: str, *sizes: int) -> TensorSpec:
 
 @dataclass(frozen=True)
 class TDBNConfig:
-    """Sizes and training of the net; the defaults are the recipe of the shipped bundle.
+    """Sizes and training of the net; the bundle that ships was trained by :meth:`pure`.
 
     root_rotation: whether it is among the channels: 59 of CMU's skeleton, otherwise the thesis' 56. control_units:
     for each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for
     the second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard
     deviation of a visible unit relative to its channel's: with a smaller one, codes are more precise. past_noise,
-    unrolled: noise and unrolled of :class:`Past`. onset: how many times as often the first window of a motion that ends
-    is drawn as its last. temperature: of the codes and of generation; learning anneals from 1 to it. initial:
-    standard deviation of the first weights. restarts: RBMs that learn side by side; their features decide how the
-    net moves. tries: most CRBMs trained on each of them until a net reaches its goals.
+    unrolled: noise and unrolled of :class:`Past`. borrowed_past, borrowed_control: past and control of
+    :class:`Borrowed`. onset: how many times as often the first window of a motion that ends is drawn as its last.
+    temperature: of the codes and of generation; learning anneals from 1 to it. initial: standard deviation of the
+    first weights. restarts: RBMs that learn side by side. tries: most CRBMs trained on each of them until a net reaches
+    its goals. rounds: how often all of this begins anew until then.
     """
 
     fps: float = 40.0
@@ -215,11 +225,14 @@ class TDBNConfig:
     sigma: float = 0.38
     past_noise: float = 0.3
     unrolled: int = 0
-    onset: float = 100.0
+    borrowed_past: float = 0.035
+    borrowed_control: float = 0.17
+    onset: float = 300.0
     temperature: float = 0.38
     initial: float = 0.01
-    restarts: int = 2
-    tries: int = 3
+    restarts: int = 1
+    tries: int = 2
+    rounds: int = 3
     rbm: Learning = field(
         default_factory=lambda: Learning(2000, rate=1e-2, final_rate=0.03, steps=2, temperature=(1.0, 0.38))
     )
@@ -235,11 +248,15 @@ class TDBNConfig:
         rbm = Learning(1000, temperature=(1.0, 1.0))
         crbm = Learning(100, temperature=(1.0, 1.0))
         net = TDBNConfig(root_rotation=False, control_units=7, gait_units=20, rbm=rbm, crbm=crbm)
-        return replace(net.unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
+        return replace(net.pure().unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
+
+    def pure(self) -> "TDBNConfig":
+        """The recipe whose windows borrow nothing, with its choice among six nets on two RBMs."""
+        return replace(self, borrowed_past=0.0, borrowed_control=0.0, onset=100.0, restarts=2, tries=3, rounds=1)
 
     def unclamped(self) -> "TDBNConfig":
         """The same recipe with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
-        return replace(self, clamped=False, restarts=1, tries=1)
+        return replace(self, clamped=False, restarts=1, tries=1, rounds=1)
 
 
 class TDBN(ControlNet):
@@ -269,15 +286,17 @@ class TDBN(ControlNet):
         return self.rbm.decode(codes) * self.scale + self.mean
 
     def stages(self, lessons: Lessons, generator: torch.Generator) -> tuple[list[Stage], dict[str, RBM]]:
-        """The RBM, then the CRBM several times with other random numbers.
+        """The RBM, then the CRBM several times with other random numbers; all of it ``rounds`` times.
 
         There are ``tries`` of these on each of the ``restarts`` of the RBM, which are the parts that have a state.
         """
         config = self.config
         rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
-        stages = [self._rbm_stage(rbms, lessons, generator)]
-        for number in [*range(config.restarts)] * config.tries:
-            stages.append(self._crbm_stage(rbms, number, lessons, generator))
+        stages = []
+        for _ in range(config.rounds):
+            stages.append(self._rbm_stage(rbms, lessons, generator))
+            for number in [*range(config.restarts)] * config.tries:
+                stages.append(self._crbm_stage(rbms, number, lessons, generator))
         return stages, {"rbms": rbms}
 
     def _rbm_stage(self, rbms: RBM, lessons: Lessons, generator: torch.Generator) -> Stage:
@@ -286,6 +305,8 @@ class TDBN(ControlNet):
 
         def begin() -> None:
             rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
+            rbms.visible_bias.zero_()
+            rbms.hidden_bias.zero_()
 
         layer = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
         return Stage(config.rbm.epochs, begin, layer, whole=False)
@@ -299,7 +320,8 @@ class TDBN(ControlNet):
             self.begin_crbm(generator)
 
         past = Past(config.past_noise, unrolled=config.unrolled)
-        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped)
+        borrowed = Borrowed(config.borrowed_past, config.hidden_per_part, config.borrowed_control)
+        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped, borrowed)
         return Stage(config.crbm.epochs, begin, layer, whole=True)
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
