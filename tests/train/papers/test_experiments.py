@@ -26,7 +26,7 @@ from motet_train.evaluate.tables import reached
 from motet_train.papers.tdbn.clips import Clips, read_clips
 from motet_train.papers.tdbn.experiments import gait_transitions, limit_cycle
 from motet_train.papers.tdbn.figures import drawings
-from motet_train.papers.tdbn.report import GOALS, by_label, control_report, study_of
+from motet_train.papers.tdbn.report import GOALS, by_label, control_report, missed_goals, study_of
 from motet_train.papers.tdbn.study import ControlStudy
 from motet_train.papers.tdbn.tdbn import TDBNConfig
 
@@ -51,6 +51,17 @@ def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: 
         if group in ("feet", "random"):  # not of the net but of how it is shown
             continue
         assert model.manifest.quality[group][key] == pytest.approx(_of(report, name), rel=0.05, abs=0.05), name
+
+
+def test_a_candidate_is_judged_by_every_goal_but_its_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    groups: dict[str, dict[str, float]] = {}
+    for name in GOALS:
+        group, key = name.split(".")
+        groups.setdefault(group, {})[key] = np.nan
+    every: Any = {group: [lambda study, figures=figures: figures] for group, figures in groups.items()}
+    monkeypatch.setattr("motet_train.papers.tdbn.report.experiments_of", lambda study: every)
+    study: Any = SimpleNamespace(walk="walk", run="run", bend="bend")
+    assert sorted(missed_goals(study, 1000)) == sorted(name for name in GOALS if not name.startswith("train."))
 
 
 @pytest.mark.slow

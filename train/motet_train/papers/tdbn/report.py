@@ -90,7 +90,7 @@ def missed_goals(study: ControlStudy, enough: int) -> list[str]:
     """The goals that a model misses, by quick experiments first; stops at ``enough`` of them."""
     missed: list[str] = []
     groups = experiments_of(study)
-    for group in ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis"):
+    for group in ("gait", "bend", "sync", "cycle_run", "cycle", "hysteresis", "random", "feet"):
         for experiment in groups.get(group, []):
             figures = {f"{group}.{key}": value for key, value in experiment(study).items()}
             wrong = [name for name in figures if name in GOALS and not reached(GOALS, name, figures[name])]
