@@ -108,7 +108,7 @@ CEILINGS = {
     "motet_train.data": 22_000,
     "motet_train.evaluate": 44_900,
     "motet_train.models": 21_100,
-    "motet_train.papers": 40_600,
+    "motet_train.papers": 41_600,
     "motet_train.recipes": 15_500,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets

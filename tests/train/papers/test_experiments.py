@@ -24,7 +24,7 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.tables import reached
 from motet_train.papers.tdbn.clips import Clips, read_clips
-from motet_train.papers.tdbn.experiments import gait_transitions, limit_cycle
+from motet_train.papers.tdbn.experiments import constant_hysteresis, gait_transitions, limit_cycle
 from motet_train.papers.tdbn.figures import drawings
 from motet_train.papers.tdbn.report import GOALS, by_label, control_report, missed_goals, study_of
 from motet_train.papers.tdbn.study import ControlStudy
@@ -73,6 +73,25 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     run = control_run(clips, config)
     study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
     assert least < gait_transitions(study, count=8)["jump_ratio"] < most
+
+
+@pytest.mark.slow
+def test_gaits_that_borrow_persist_and_switch_where_pure_ones_rest_between(clips: Clips) -> None:
+    """Seed 21, whose RBM has a state of rest between its gaits: it takes the walk away, and delays switches."""
+    widths = []
+    quick = []
+    for config in (TDBNConfig().pure(), TDBNConfig()):
+        alone = replace(config, restarts=1, tries=1, rounds=1, rbm=replace(config.rbm, epochs=300))
+        run = control_run(clips, alone, seed=21)
+        study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
+        widths.append(constant_hysteresis(study)["constant_width"])
+        quick.append(gait_transitions(study)["under_half"])
+    pure, borrowed = widths
+    assert pure < 0.2
+    assert borrowed >= 0.25
+    pure, borrowed = quick
+    assert pure < 0.75
+    assert borrowed >= 0.8
 
 
 def test_a_linear_autoregression_has_no_cycle(clips: Clips) -> None:
