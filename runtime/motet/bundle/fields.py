@@ -131,9 +131,13 @@ class Fields:
         """An object of anything; empty where there is none."""
         return self.fields(key).data if key in self else {}
 
+    def optional(self, key: str) -> "Fields":
+        """An object; an empty one where there is none."""
+        return Fields(self.mapping(key), self.at(key))
+
     def entries(self, key: str) -> Iterator[tuple[str, "Fields"]]:
         """The objects of an object, by name; none where there is none."""
-        objects = Fields(self.mapping(key), self.at(key))
+        objects = self.optional(key)
         return ((name, objects.fields(name)) for name in objects.data)
 
     def list_of_fields(self, key: str) -> "list[Fields]":

@@ -159,30 +159,46 @@ class GraphSpec:
     @staticmethod
     def read(data: Fields) -> "GraphSpec":
         """The inverse of :meth:`to_json`; BundleError if it contradicts itself."""
-        inputs, outputs = (tuple(map(TensorSpec.read, data.list_of_fields(key))) for key in ("inputs", "outputs"))
-        fed, start = (data.fields(key) if key in data else Fields({}) for key in ("feedback", "start"))
+        inputs = tuple(map(TensorSpec.read, data.list_of_fields("inputs")))
+        outputs = tuple(map(TensorSpec.read, data.list_of_fields("outputs")))
+        fed = data.optional("feedback")
         feedback = {name: fed.text(name) for name in fed.data}
-        sizes: dict[str, tuple[int, ...]] = {}
-        for name in start.data:
-            sizes[name] = tuple(map(int, start.numbers(name, len(start.items(name)))))
-        graph_spec = GraphSpec(inputs, outputs, feedback, sizes)
-        for tensors in (inputs, outputs):
-            if len({spec.name for spec in tensors}) != len(tensors):
-                raise BundleError(f"manifest, {data.path}: two tensors have the same name")
-        for name, source in feedback.items():
-            source_tensor = graph_spec.output(source)
-            taken = graph_spec.input(name)
-            pairs = zip(source_tensor.shape, taken.shape, strict=False)
-            alike = all(b in {a, source_tensor.shape[0]} or isinstance(b, str) for a, b in pairs)
-            if source_tensor.dtype != taken.dtype or len(source_tensor.shape) != len(taken.shape) or not alike:
-                raise BundleError(f"manifest, {data.path}.feedback: {source!r} does not fit the input {name!r}")
-        for name, state_shape in sizes.items():
-            shape = graph_spec.input(name).shape[1:]
-            fits = len(state_shape) == len(shape)
-            fits = fits and all(isinstance(b, str) or a == b for a, b in zip(state_shape, shape, strict=True))
-            if name not in feedback or not fits or not all(0 <= size <= MAX_AXIS for size in state_shape):
-                raise BundleError(f"manifest, {data.path}.start: {list(state_shape)} does not fit the state {name!r}")
+        starts = data.optional("start")
+        start: dict[str, tuple[int, ...]] = {}
+        for name in starts.data:
+            start[name] = tuple(map(int, starts.numbers(name, len(starts.items(name)))))
+        graph_spec = GraphSpec(inputs, outputs, feedback, start)
+        graph_spec._check(data.path)
         return graph_spec
+
+    def _check(self, path: str) -> None:
+        """BundleError where names, feedback or start contradict the tensors. path: of the graph in the manifest."""
+        for tensors in (self.inputs, self.outputs):
+            if len({spec.name for spec in tensors}) != len(tensors):
+                raise BundleError(f"manifest, {path}: two tensors have the same name")
+        for name, source in self.feedback.items():
+            if not _may_feed(self.output(source), self.input(name)):
+                raise BundleError(f"manifest, {path}.feedback: {source!r} does not fit the input {name!r}")
+        for name, sizes in self.start.items():
+            is_fed = _may_start(sizes, self.input(name).shape[1:]) and name in self.feedback
+            if not is_fed:
+                raise BundleError(f"manifest, {path}.start: {list(sizes)} does not fit the state {name!r}")
+
+
+def _may_feed(source: TensorSpec, taken: TensorSpec) -> bool:
+    """Whether an output can be fed back into an input: each axis of the same size or name, or of any where the input's
+    is dynamic, or else the batch."""
+    if source.dtype != taken.dtype or len(source.shape) != len(taken.shape):
+        return False
+    axes = zip(source.shape, taken.shape, strict=True)
+    return all(b in {a, source.shape[0]} or isinstance(b, str) for a, b in axes)
+
+
+def _may_start(sizes: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
+    """Whether a state of these sizes fits a shape, both without the batch."""
+    if len(sizes) != len(shape) or not all(0 <= size <= MAX_AXIS for size in sizes):
+        return False
+    return all(isinstance(b, str) or a == b for a, b in zip(sizes, shape, strict=True))
 
 
 def _named(name: str, tensors: tuple[TensorSpec, ...], kind: str) -> TensorSpec:
@@ -218,16 +234,8 @@ class OnnxGraph:
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
             raise BundleError(f"ONNX Runtime rejected the graph: {str(error).partition(chr(10))[0]}") from error
         self._outputs = [tensor.name for tensor in spec.outputs]
-        inputs = ("input", self._session.get_inputs(), spec.inputs)
-        for kind, nodes, declared in (inputs, ("output", self._session.get_outputs(), spec.outputs)):
-            actual = {node.name: (node.type, _sizes(node.shape)) for node in nodes}
-            wanted = {tensor.name: (DTYPES[tensor.dtype], _sizes(tensor.shape)) for tensor in declared}
-            for name in actual.keys() | wanted.keys():
-                if actual.get(name) != wanted.get(name):
-                    raise BundleError(
-                        f"the graph does not match its contract: {kind} {name!r} is {actual.get(name, 'absent')}, "
-                        f"declared {wanted.get(name, 'nowhere')}"
-                    )
+        _check_contract("input", self._session.get_inputs(), spec.inputs)
+        _check_contract("output", self._session.get_outputs(), spec.outputs)
 
     @property
     def providers(self) -> tuple[str, ...]:
@@ -248,6 +256,16 @@ class OnnxGraph:
             if array.dtype.kind == "f" and not -LARGEST <= array.min(initial=0) <= array.max(initial=0) <= LARGEST:
                 raise BundleError(f"the graph's output {name!r} is not finite, or beyond {LARGEST:g}")
         return outputs
+
+
+def _check_contract(kind: str, nodes: Any, declared: tuple[TensorSpec, ...]) -> None:
+    """BundleError where ONNX Runtime's tensors of a graph are not those that its contract declares."""
+    actual = {node.name: (node.type, _sizes(node.shape)) for node in nodes}
+    wanted = {tensor.name: (DTYPES[tensor.dtype], _sizes(tensor.shape)) for tensor in declared}
+    for name in actual.keys() | wanted.keys():
+        if actual.get(name) != wanted.get(name):
+            difference = f"{actual.get(name, 'absent')}, declared {wanted.get(name, 'nowhere')}"
+            raise BundleError(f"the graph does not match its contract: {kind} {name!r} is {difference}")
 
 
 def _sizes(shape: Any) -> tuple[int | None, ...]:

@@ -46,6 +46,9 @@ MESSAGES = {
 """The fields of onnx.proto by number. Types of values (fields 11 to 13 of a graph, 14 and 15 of an attribute) and
 annotations hold neither tensors nor nodes."""
 
+DATA = frozenset({4, 5, 6, 7, 9, 10, 11})
+"""The fields of a tensor that hold its numbers."""
+
 
 def check_graph(model: bytes) -> None:
     """BundleError where an ONNX model is damaged or could reach outside its bytes: what was found, and where."""
@@ -113,14 +116,14 @@ def _fault(kind: str, number: int, value: Value) -> str | None:
     """What is wrong with a field that holds no message to look into."""
     place = (kind, number)
     fault = None
-    data = kind == "tensor" and number in (4, 5, 6, 7, 9, 10, 11)
+    is_data = kind == "tensor" and number in DATA
     if place == ("tensor", 13) or (place == ("tensor", 14) and value != 0):
         fault = "has its data in another file"
     elif kind == "model" and number in (20, 25):
         fault = "holds training information" if number == 20 else "holds functions"
     elif number not in MESSAGES[kind].plain and place != ("tensor", 14):
         fault = f"has the unknown field {number}"
-    elif not data and not isinstance(value, int) and len(value) > MAX_TEXT:
+    elif not is_data and not isinstance(value, int) and len(value) > MAX_TEXT:
         fault = f"has a text of {len(value)} bytes; at most {MAX_TEXT} are read"
     elif place == ("node", 4) and _text(value) == "Loop":
         fault = "may never end; unroll it, or use Scan"

@@ -108,28 +108,20 @@ class Manifest:
         """Read the manifest of a bundle or of a training run; BundleError names the key that is wrong."""
         top = Fields(data)
         motion = read_contract(top.fields("motion"))
-        golden = None
-        if "golden" in top:
-            golden_fields = top.fields("golden")
-            tolerance = golden_fields.number("tolerance", 0.0, 1.0)
-            golden = Golden(golden_fields.text("file"), tolerance, golden_fields.mapping("run"))
+        golden = _golden(top.fields("golden")) if "golden" in top else None
         texts: dict[str, Any] = {key: top.text(key) for key in ("name", "verb", "model", "loop")}
-        records = ("config", "licence", "training", "quality", "parity")
-        others: dict[str, Any] = {key: top.mapping(key) for key in records}
         return Manifest(
             **texts,
-            **others,
+            **_records(top),
+            **_entries(top),
             version=top.text("version") if "version" in top else "",
             motion=motion,
             defaults=top.fields("defaults").data,
-            settings={name: entry.data for name, entry in top.entries("settings")},
+            settings={feature: values.data for feature, values in top.entries("settings")},
             text=top.mapping("text") if "text" in top else None,
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             common=_common(top.fields("common")) if "common" in top else {},
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
-            graphs={role: _graph(fields) for role, fields in top.entries("graphs")},
-            tables={name: _table(fields) for name, fields in top.entries("tables")},
-            files={name: _file(name, fields) for name, fields in top.entries("files")},
             golden=golden,
             source=top.data,
         )
@@ -160,22 +152,41 @@ class Manifest:
         return manifest
 
 
+def _records(top: Fields) -> dict[str, Any]:
+    """What is told of the model and its training, and not read by this package."""
+    return {key: top.mapping(key) for key in ("config", "licence", "training", "quality", "parity")}
+
+
+def _entries(top: Fields) -> dict[str, Any]:
+    """The graphs, tables and files, by role or name."""
+    return {
+        "graphs": {role: _graph(fields) for role, fields in top.entries("graphs")},
+        "tables": {name: _table(fields) for name, fields in top.entries("tables")},
+        "files": {name: _file(name, fields) for name, fields in top.entries("files")},
+    }
+
+
 def read_contract(data: Fields) -> MotionContract:
     """The motion contract that :meth:`MotionContract.to_json` wrote; BundleError names the key that is wrong."""
     name = data.one_of("representation", REPRESENTATIONS)
     channels = data.texts("channels")
-    units = data.items("units")
     if not 1 <= len(channels) <= MAX_CHANNELS:
         raise data.fault(f"1 to {MAX_CHANNELS} names", len(channels), "channels")
     if lacking := [channel for channel in REPRESENTATIONS[name].required if channel not in channels]:
         raise BundleError(f"manifest, {data.at('channels')}: {name} needs {', '.join(lacking)}")
-    if len(units) != len(channels) or any(unit not in UNITS for unit in units):
-        raise data.fault(f"one of {', '.join(UNITS)} for each of {len(channels)} channels", units, "units")
+    units = _units(data, len(channels))
     fps = data.number("fps", 1, 1000)
     mean = data.numbers("mean", len(channels))
     std = data.numbers("std", len(channels), low=0.0)
     skeleton = _skeleton(data.fields("skeleton"), channels) if "skeleton" in data else None
-    return MotionContract(name, channels, tuple(units), fps, mean, std, skeleton)
+    return MotionContract(name, channels, units, fps, mean, std, skeleton)
+
+
+def _units(data: Fields, channels: int) -> tuple[str, ...]:
+    units = data.items("units")
+    if len(units) != channels or any(unit not in UNITS for unit in units):
+        raise data.fault(f"one of {', '.join(UNITS)} for each of {channels} channels", units, "units")
+    return tuple(units)
 
 
 def _skeleton(data: Fields, channels: tuple[str, ...]) -> Skeleton:
@@ -197,6 +208,11 @@ def _skeleton(data: Fields, channels: tuple[str, ...]) -> Skeleton:
         return Skeleton.from_json(data.data)
     except MotionError as error:
         raise BundleError(f"manifest, {data.path}: {error}") from error
+
+
+def _golden(data: Fields) -> Golden:
+    tolerance = data.number("tolerance", 0.0, 1.0)
+    return Golden(data.text("file"), tolerance, data.mapping("run"))
 
 
 def _control(data: Fields, channels: int) -> Control:

@@ -58,31 +58,29 @@ class Archive:
 
     def __init__(self, source: Path | bytes) -> None:
         self._source = source
+        infos = self._contents()
+        _check({info.orig_filename: info.file_size for info in infos})
+        for info in infos:
+            _check_member(info)
+        self._infos = {info.filename: info for info in infos}
+        if len(self._infos) != len(infos):
+            raise BundleError("the zip contains a file twice")
+        self.names = frozenset(self._infos)
+
+    def _contents(self) -> list[zipfile.ZipInfo]:
+        """The table of contents; BundleError before it is read if it is that of more files than a bundle has."""
         try:
             with self._file() as file:
                 file.seek(max(0, file.seek(0, io.SEEK_END) - 42))
                 end = file.read()
                 if end[-22:-18] != b"PK\x05\x06" or end[:4] == b"PK\x06\x07":
                     raise zipfile.BadZipFile("its end is not that of a plain zip")
-                # how long the table of contents is, before it is read
-                small = int.from_bytes(end[-10:-6], "little") <= MAX_FILES * 1024
-                infos = zipfile.ZipFile(file).infolist() if small else []
+                # the end says how many bytes the table of contents has
+                if int.from_bytes(end[-10:-6], "little") <= MAX_FILES * 1024:
+                    return zipfile.ZipFile(file).infolist()
         except _DAMAGE as error:
             raise BundleError(f"not a zip that can be read ({error})") from error
-        if not small:
-            raise BundleError(f"it holds too many files; a bundle has at most {MAX_FILES}")
-        _check({info.orig_filename: info.file_size for info in infos})
-        for info in infos:
-            if stat.S_IFMT(info.external_attr >> 16) not in {0, stat.S_IFREG}:
-                raise BundleError(f"{info.filename!r} is not a plain file")
-            if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED} or info.flag_bits & 1:
-                raise BundleError(f"{info.filename!r} is encrypted, or not compressed with deflate")
-            if info.file_size > max(1 << 20, 100 * info.compress_size):  # weights hardly shrink; a bomb does by 1000
-                raise BundleError(f"{info.filename!r} unpacks to more than 100 times its size")
-        self._infos = {info.filename: info for info in infos}
-        if len(self._infos) != len(infos):
-            raise BundleError("the zip contains a file twice")
-        self.names = frozenset(self._infos)
+        raise BundleError(f"it holds too many files; a bundle has at most {MAX_FILES}")
 
     def read(self, name: str, limit: int) -> bytes:
         """As :meth:`Folder.read`; the limit holds whatever size the zip announces."""
@@ -94,6 +92,16 @@ class Archive:
 
     def _file(self) -> BinaryIO:
         return io.BytesIO(self._source) if isinstance(self._source, bytes) else self._source.open("rb")
+
+
+def _check_member(info: zipfile.ZipInfo) -> None:
+    """BundleError for a link or a device, another compression than deflate, and for a bomb."""
+    if stat.S_IFMT(info.external_attr >> 16) not in {0, stat.S_IFREG}:
+        raise BundleError(f"{info.filename!r} is not a plain file")
+    if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED} or info.flag_bits & 1:
+        raise BundleError(f"{info.filename!r} is encrypted, or not compressed with deflate")
+    if info.file_size > max(1 << 20, 100 * info.compress_size):  # weights hardly shrink; a bomb does by 1000
+        raise BundleError(f"{info.filename!r} unpacks to more than 100 times its size")
 
 
 def _check(sizes: Mapping[str, int]) -> None:
