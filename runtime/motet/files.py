@@ -46,6 +46,7 @@ def write_whole(file: File, content: str | bytes) -> None:
     """Write atomically: to a temporary sibling, then rename. A link is followed, the mode of a replaced file is kept.
     OutputError if the file cannot be written. A file object just gets the content."""
     try:
+        # a file object is the caller's to close and to place
         data = content.encode() if isinstance(content, str) else content
         if not isinstance(file, str | Path):
             file.write(data)
@@ -65,6 +66,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary = temporary_beside(path)
         try:
             yield temporary
+            # the mode of the file that is replaced
             if path.exists():
                 shutil.copymode(path, temporary)
             temporary.replace(path)
@@ -81,6 +83,7 @@ def new_folder(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     temporary = temporary_beside(path)
     try:
+        # a link that leads nowhere does not exist, but is in the way
         if path.exists() or path.is_symlink():
             raise OutputError(f"cannot write {path}: it exists; remove it first or choose another folder")
         temporary.mkdir(parents=True)

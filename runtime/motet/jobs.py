@@ -33,6 +33,7 @@ def in_order(function: Callable[[T], R], items: Iterable[T], jobs: int | None, f
     most four results for each process wait, so memory does not grow. What the function raises ends all; what is
     interrupted starts no more. MotetError where a process was killed.
     """
+    # few things are done sooner than a process starts
     first = list(islice(rest := iter(items), few))
     jobs = cores() if jobs is None else jobs
     if jobs < 2 or len(first) < few:
@@ -41,6 +42,7 @@ def in_order(function: Callable[[T], R], items: Iterable[T], jobs: int | None, f
     with ProcessPoolExecutor(jobs, initializer=_begin, initargs=(pickle.dumps(function),)) as pool:
         waiting: deque[Future[R]] = deque()
         try:
+            # a queue of results in order: the oldest is waited for when enough are under way
             for item in chain(first, rest):
                 waiting.append(pool.submit(_do, item))
                 if len(waiting) > 4 * jobs:

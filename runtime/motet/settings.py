@@ -46,6 +46,7 @@ class Settings:
     """Of each setting by name: whether it is a whole number, and its range."""
 
     def __init_subclass__(cls) -> None:
+        # fields without a range, such as class variables, are no settings
         hints = get_type_hints(cls, include_extras=True).items()
         ranges = {name: get_args(hint) for name, hint in hints if get_origin(hint) is Annotated}
         cls.RANGES = {name: (kind is int, limits) for name, (kind, limits) in ranges.items()}
@@ -58,6 +59,7 @@ class Settings:
     def read(cls, values: Mapping[str, Any], path: str) -> Self:
         """The settings of a manifest's object at ``path``, and defaults for those that it does not name. BundleError
         with the key of one that is unknown, missing, or out of range."""
+        # first the names, then the values, which the class itself checks
         for name in values:
             if name not in cls.RANGES:
                 raise BundleError(f"manifest, {path}.{name}: is unknown; expected one of {', '.join(cls.RANGES)}")
@@ -75,6 +77,7 @@ class Settings:
         if name not in cls.RANGES:
             raise SettingError(f"there is no setting {name!r}, only {', '.join(cls.RANGES)}")
         whole, (low, high, unit) = cls.RANGES[name]
+        # numbers of numpy count as Python's
         number = value.item() if isinstance(value, np.generic) else value
         if not is_number(number) or not low <= number <= high:
             raise SettingError(f"{name} must be between {low:g} and {f'{high:g} {unit}'.strip()}, not {value}")

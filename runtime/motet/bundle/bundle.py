@@ -58,6 +58,7 @@ class Bundle:
     @staticmethod
     def open(name_or_path: str | Path) -> "Bundle":
         """Open a default bundle by name, or a folder or zip by path; BundleError if missing or damaged."""
+        # errors name the path, once
         path = find_bundle(name_or_path)
         try:
             return Bundle(path, Folder(path) if path.is_dir() else Archive(path))
@@ -75,6 +76,7 @@ class Bundle:
     def read(self, name: str) -> bytes:
         """One file's bytes, checked against the manifest's size and sha256."""
         with self.named():
+            # only what the manifest lists is read
             declared = self.manifest.files.get(name)
             if declared is None:
                 raise BundleError(f"{name!r} is not in its manifest")
@@ -134,6 +136,7 @@ class Bundle:
 def find_bundle(name_or_path: str | Path) -> Path:
     """Path of an installed bundle's name or of an existing folder or zip; BundleError lists the known names."""
     name = str(name_or_path)
+    # motet's own first: the others need a look through all installed packages
     known = {path.stem: path for path in DEFAULT_BUNDLES.glob("*.zip")}
     if name in known or name in (known := list_bundles()):
         return known[name]
@@ -176,9 +179,11 @@ def write_bundle(path: str | Path, manifest: Json, files: Mapping[str, bytes]) -
     BundleError for a manifest that could not be read back.
     """
     path = Path(path)
+    # in the order of names, so that equal bundles are equal bytes
     files = dict(sorted(files.items()))
     entries = {name: entry(data)._asdict() for name, data in files.items()}
     text = (json.dumps({"format": FORMAT, **manifest, "files": entries}, indent=1) + "\n").encode()
+    # refuse a manifest that could not be read back
     Manifest.of_bundle(text)
     if path.suffix == ".zip":
         write_whole(path, archive_bytes({MANIFEST: text, **files}))

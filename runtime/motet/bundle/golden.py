@@ -43,10 +43,12 @@ def vectors(model: Replayable, feeds: Mapping[str, Arrays], run_inputs: Arrays, 
     """The golden vectors of a model: of its graphs from the ``feeds`` of each role, of a run, and of the meaning of
     ``frames`` (T, D)."""
     arrays: dict[str, Arrays] = {}
+    # a call of each graph, a run of the whole, and the meaning of its numbers
     for role, inputs in feeds.items():
         arrays |= {f"{role}.in": inputs, f"{role}.out": model.graphs[role](inputs)}
     arrays |= {"run.in": run_inputs, "run.out": model.replay(run_inputs, settings)}
     arrays |= {f"{MEANING}.in": {"frames": frames}, f"{MEANING}.out": model.meaning(frames)}
+    # each array is a member of the archive
     members: dict[str, bytes] = {}
     for prefix, part in arrays.items():
         for name, array in part.items():
@@ -62,15 +64,18 @@ def replay(model: Replayable, data: bytes, golden: Golden) -> dict[str, float]:
     """
     arrays = read(data)
     differences = {}
+    # the graphs one by one: where they agree, a difference below is in the loop
     for role, graph in model.graphs.items():
         differences[role] = difference(graph(_part(arrays, f"{role}.in.")), _part(arrays, f"{role}.out."))
     try:
+        # the whole run
         run = model.replay(_part(arrays, "run.in."), golden.run)
     except (KeyError, TypeError, IndexError, ValueError) as error:
         raise BundleError(f"the golden run cannot be replayed: {error}") from error
     differences["run"] = difference(run, _part(arrays, "run.out."))
     if any(name.startswith(f"{MEANING}.") for name in arrays):
         differences[MEANING] = _meaning_difference(model, arrays)
+    # the verdict comes last, so that the first name is the innermost that is off
     for name, off in differences.items():
         if not off <= golden.tolerance:
             raise BundleError(f"golden vectors, {name}: off by {off:.2e}, the tolerance is {golden.tolerance:g}")
@@ -98,6 +103,7 @@ def difference(actual: Arrays, expected: Arrays) -> float:
         if array.dtype.kind in "bi":
             largest = largest if np.array_equal(actual[name], array) else math.inf
         elif array.size:
+            # relative to the size of the value, or of all of them where it is near 0
             wanted = array.astype(np.float64)
             scale = np.maximum(max(1.0, math.sqrt(np.mean(np.square(wanted)))), np.abs(wanted))
             largest = max(largest, float((np.abs(actual[name] - wanted) / scale).max()))

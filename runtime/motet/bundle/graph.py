@@ -48,6 +48,7 @@ class SessionOptions:
         checked_int("threads", self.threads, 1, MAX_THREADS)
         if isinstance(self.providers, str):
             raise SettingError(f"providers must be a tuple of names, such as ({self.providers!r},)")
+        # a provider that this build lacks is refused, with the package that has it
         available = onnxruntime.get_available_providers()
         for provider in self.providers:
             if provider not in available:
@@ -55,6 +56,7 @@ class SessionOptions:
                 remedy = f"; in place of onnxruntime:  pip install {package}" if package else ""
                 known = ", ".join(available)
                 raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {known}{remedy}")
+        # options are one mapping for each provider, or none
         of_each = self.provider_options
         if isinstance(of_each, Mapping) or not all(isinstance(options, Mapping) for options in of_each):
             raise SettingError(f"provider_options must hold a mapping for each provider, not {of_each!r:.60}")
@@ -159,8 +161,10 @@ class GraphSpec:
     @staticmethod
     def read(data: Fields) -> "GraphSpec":
         """The inverse of :meth:`to_json`; BundleError if it contradicts itself."""
+        # the tensors
         inputs = tuple(map(TensorSpec.read, data.list_of_fields("inputs")))
         outputs = tuple(map(TensorSpec.read, data.list_of_fields("outputs")))
+        # which of them are fed back, and how large those are before the first step
         fed = data.optional("feedback")
         feedback = {name: fed.text(name) for name in fed.data}
         starts = data.optional("start")
@@ -173,12 +177,15 @@ class GraphSpec:
 
     def _check(self, path: str) -> None:
         """BundleError where names, feedback or start contradict the tensors. path: of the graph in the manifest."""
+        # names are unique
         for tensors in (self.inputs, self.outputs):
             if len({spec.name for spec in tensors}) != len(tensors):
                 raise BundleError(f"manifest, {path}: two tensors have the same name")
+        # outputs that are fed back fit their inputs
         for name, source in self.feedback.items():
             if not _may_feed(self.output(source), self.input(name)):
                 raise BundleError(f"manifest, {path}.feedback: {source!r} does not fit the input {name!r}")
+        # states before the first step fit, too
         for name, sizes in self.start.items():
             is_fed = _may_start(sizes, self.input(name).shape[1:]) and name in self.feedback
             if not is_fed:
@@ -234,6 +241,7 @@ class OnnxGraph:
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
             raise BundleError(f"ONNX Runtime rejected the graph: {str(error).partition(chr(10))[0]}") from error
         self._outputs = [tensor.name for tensor in spec.outputs]
+        # the graph has the tensors that the manifest promises
         _check_contract("input", self._session.get_inputs(), spec.inputs)
         _check_contract("output", self._session.get_outputs(), spec.outputs)
 
@@ -252,6 +260,7 @@ class OnnxGraph:
             outputs = dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
         except Exception as error:
             raise BundleError(f"the graph cannot be run: {str(error).partition(chr(10))[0]}") from error
+        # numbers that are not finite, or whose squares would not be, end here
         for name, array in outputs.items():
             if array.dtype.kind == "f" and not -LARGEST <= array.min(initial=0) <= array.max(initial=0) <= LARGEST:
                 raise BundleError(f"the graph's output {name!r} is not finite, or beyond {LARGEST:g}")
@@ -296,12 +305,14 @@ def bind(
     provided: tensors that another graph gives. All other inputs must be fed back, and how they start be known.
     BundleError names the role, the tensor and what is expected.
     """
+    # the tensors that the caller will use, with the sizes that they share
     for wanted, find in ((inputs, spec.input), (outputs, spec.output)):
         for name, shape in wanted.items():
             try:
                 bind_tensor(find(name), shape.lstrip("*"), "int64" if shape.startswith("*") else "float32", sizes)
             except BundleError as error:
                 raise BundleError(f"manifest, graphs.{role}: {error}") from error
+    # all other inputs feed themselves
     for tensor in spec.inputs:
         if tensor in provided or tensor.name in inputs:
             continue
@@ -312,6 +323,7 @@ def bind(
 
 def bind_tensor(tensor: TensorSpec, shape: str, dtype: str, sizes: Sizes) -> None:
     """Check one tensor, whose shape is put as :func:`bind` has it; BundleError says what is expected."""
+    # a letter whose size is known stands for this size in the message
     axes = shape.split()
     expected = tuple(sizes.get(axis, axis) if axis.isupper() else axis for axis in axes)
     fits = tensor.dtype == dtype and len(tensor.shape) == len(axes)
@@ -324,4 +336,5 @@ def bind_tensor(tensor: TensorSpec, shape: str, dtype: str, sizes: Sizes) -> Non
             fits &= isinstance(size, str)
     if not fits:
         raise BundleError(f"{tensor.name!r} is {tensor.dtype} {list(tensor.shape)}, expected {dtype} {list(expected)}")
+    # sizes read here hold for the tensors that follow
     sizes.update({a: s for a, s in zip(axes, tensor.shape, strict=True) if a.isupper() and isinstance(s, int)})

@@ -57,6 +57,7 @@ def check_graph(model: bytes) -> None:
     waiting = [("model", memoryview(model), "the graph", 0)]
     count = 0
     while waiting:
+        # messages wait on a list, not on the stack, which a deep graph would exhaust
         kind, data, outer, depth = waiting.pop()
         if depth > MAX_DEPTH:
             raise BundleError(f"the graph is nested more than {MAX_DEPTH} messages deep")
@@ -65,6 +66,7 @@ def check_graph(model: bytes) -> None:
             count += 1
             if count > MAX_FIELDS:
                 raise BundleError(f"the graph has more than {MAX_FIELDS} fields")
+            # messages are looked into later; of plain fields each is judged here
             if number in MESSAGES[kind].nested:
                 inner.append((MESSAGES[kind].nested[number], _bytes(value)))
             elif fault := _fault(kind, number, value):
@@ -82,6 +84,7 @@ def fields(message: memoryview) -> Iterator[tuple[int, Value]]:
     """
     place = 0
     while place < len(message):
+        # a tag has the number of the field and how its value is written
         tag, place = _varint(message, place)
         number = tag >> 3
         wire = tag & 7

@@ -113,7 +113,6 @@ class Manifest:
         return Manifest(
             **texts,
             **_records(top),
-            **_entries(top),
             version=top.text("version") if "version" in top else "",
             motion=motion,
             defaults=top.fields("defaults").data,
@@ -122,6 +121,7 @@ class Manifest:
             vocabulary=top.texts("vocabulary") if "vocabulary" in top else (),
             common=_common(top.fields("common")) if "common" in top else {},
             control=_control(top.fields("control"), len(motion.channels)) if "control" in top else None,
+            **_entries(top),
             golden=golden,
             source=top.data,
         )
@@ -129,6 +129,7 @@ class Manifest:
     @staticmethod
     def of_bundle(text: bytes) -> "Manifest":
         """Read the ``manifest.json`` of a bundle; BundleError for another format, and where it contradicts itself."""
+        # the format first, since all else depends on it
         data = parse(text)
         version = data.get("format") if isinstance(data, dict) else None
         if version in (1, 2) and not isinstance(version, bool):
@@ -138,9 +139,11 @@ class Manifest:
             )
         if version != FORMAT:
             raise BundleError(f"it has the format {version!r}; this motet reads format {FORMAT}")
+        # a training run has no graphs and golden vectors, a bundle must
         manifest = Manifest.from_json(data)
         if manifest.golden is None or not (manifest.graphs or manifest.tables):
             raise BundleError("manifest: it needs graphs or tables, and golden vectors")
+        # every file that the manifest names must be in its list, which has the sizes and hashes
         named = {
             **{f"graphs.{role}.file": g.file for role, g in manifest.graphs.items()},
             **{f"tables.{name}.file": t.file for name, t in manifest.tables.items()},
@@ -168,6 +171,7 @@ def _entries(top: Fields) -> dict[str, Any]:
 
 def read_contract(data: Fields) -> MotionContract:
     """The motion contract that :meth:`MotionContract.to_json` wrote; BundleError names the key that is wrong."""
+    # the channels, which the rest is measured against
     name = data.one_of("representation", REPRESENTATIONS)
     channels = data.texts("channels")
     if not 1 <= len(channels) <= MAX_CHANNELS:
@@ -175,6 +179,7 @@ def read_contract(data: Fields) -> MotionContract:
     if lacking := [channel for channel in REPRESENTATIONS[name].required if channel not in channels]:
         raise BundleError(f"manifest, {data.at('channels')}: {name} needs {', '.join(lacking)}")
     units = _units(data, len(channels))
+    # the scale of their numbers, and the figure
     fps = data.number("fps", 1, 1000)
     mean = data.numbers("mean", len(channels))
     std = data.numbers("std", len(channels), low=0.0)
@@ -200,6 +205,7 @@ def _skeleton(data: Fields, channels: tuple[str, ...]) -> Skeleton:
         joint.numbers("offset", 3)
         joint.numbers("axis", 3)
         joint.text("order")
+    # the root is a joint by this name in every representation
     known = {joint.text("name") for joint in joints} | {"root"}
     unknown = [name for name in channels if name.rpartition(".")[0] not in known]
     if unknown:
@@ -218,6 +224,7 @@ def _golden(data: Fields) -> Golden:
 def _control(data: Fields, channels: int) -> Control:
     labels = data.texts("labels")
     starts = data.fields("starts")
+    # each label has frames to start from
     if not labels or set(starts.data) != set(labels):
         raise data.fault(f"frames for each of {', '.join(labels)}", list(starts.data), "starts")
     return Control(labels, {label: starts.table(label, channels) for label in labels})

@@ -35,6 +35,7 @@ class Folder:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
+            # no member is followed or opened before all are known to be plain files
             states = {member.name: member.lstat() for member in path.iterdir()}
         except OSError as error:
             raise BundleError(f"cannot read the folder: {error.strerror}") from error
@@ -58,6 +59,7 @@ class Archive:
 
     def __init__(self, source: Path | bytes) -> None:
         self._source = source
+        # the table of contents is checked before any member is unpacked
         infos = self._contents()
         _check({info.orig_filename: info.file_size for info in infos})
         for info in infos:
@@ -122,6 +124,7 @@ def array_of(content: bytes, name: str, dtypes: Collection[str]) -> NDArray[Any]
     """
     file = io.BytesIO(content)
     try:
+        # the bytes after the header must be those that it announces
         version = np.lib.format.read_magic(file)
         shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
         rest = content[file.tell() :]

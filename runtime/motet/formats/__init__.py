@@ -164,6 +164,7 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
     FormatError for an unknown extension, a missing file, one that is not a motion, and an option that the format does
     not take or the file contradicts.
     """
+    # a clip or figure in the path counts unless one is given by name
     file, named_clip, named_figure = split_part(file, format)
     kind = _format(file, format, READABLE, "read")
     path = place_of(file)
@@ -210,6 +211,7 @@ def _in_unit(path: Path, motion: Motion, unit_name: str | float, loose: bool) ->
     unit = metres(unit_name)
     if motion.skeleton is None:
         raise FormatError(path, "a file without a skeleton has no length unit")
+    # the file's own unit, where it states one, decides
     stated_unit = motion.skeleton.metres_per_unit
     height = motion.skeleton.height
     if stated_unit is None:
@@ -260,6 +262,7 @@ def read_character(file: File) -> Character:
     The name of a rig in :data:`motet.figures.humanoid.RIGS`, such as "mixamo", gives that rig unless a file of that
     name exists. FormatError like :func:`read_motion`.
     """
+    # a word without an extension is a rig of motet's own
     if isinstance(file, str | Path) and not Path(file).suffix and not Path(file).exists():
         try:
             return _character(rig(str(file)))
@@ -291,6 +294,7 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     """
     if motion.skeleton and _same_figure(motion.skeleton, character.rest.skeleton):
         return motion
+    # over the humanoid, which every human figure is brought to
     humanoid_motion = on_humanoid(motion)
     joint_map = character.joint_map
     has_nodes = character.nodes is not None
@@ -338,8 +342,10 @@ def write_motion(
                 "writing several motions into one file requires onto= and a character's .glb, .gltf or .vrm"
             )
         check_writable(file, format)
+        # the motion itself, or on another figure's skeleton
         character = None if like is None else _character(like)
         return write_on(file, motion if character is None else put_onto(motion, character), character, format=format)
+    # or with the character's mesh, as one of its animations
     check_writable(file, format, ONTO)
     if not isinstance(onto, Character):
         _format(onto, None, BODIES, "write onto")
@@ -388,6 +394,7 @@ def check_writable(file: File, format: str | None = None, allowed: tuple[str, ..
 
 
 def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str) -> Format:
+    # the format that the caller names, or else the extension
     extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)

@@ -42,8 +42,10 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     if asf is None and not isinstance(file, str | Path):
         raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
+    # the lines before the first frame state the unit and the rate
     header, unit, stated_fps = _header(path, lines, skeleton)
     text.check_rate(path, stated_fps, fps)
+    # the first frame says which bones every frame has
     layout = _layout(path, words_of(lines, header), skeleton.dofs)
     values = _frames(path, lines, header, layout, partial)
     channels = _channels(layout, skeleton.dofs)
@@ -63,7 +65,9 @@ def skeleton_for(stem: str, skeletons: Mapping[str, T]) -> T | None:
 
 
 def _find_asf(path: Path) -> Path:
+    # CMU's 39_14.amc goes with 39.asf
     stems = dict.fromkeys([path.stem, path.stem.split("_")[0]])
+    # beside the motion, or in the folder that CMU keeps skeletons in
     for folder in (path.parent, path.parent.parent / "asf"):
         try:
             files = sorted(folder.iterdir()) if folder.is_dir() else []
@@ -240,6 +244,7 @@ def _dofs_of(motion: Motion, joint: Joint) -> tuple[str, ...]:
 
 def _frame_lines(motion: Motion, dofs: Dofs) -> list[str]:
     """The lines of an AMC file: the header, and of each frame its number and a line for each bone."""
+    # bones in the order in which the motion first names them
     bones = list(dict.fromkeys(channel.rpartition(".")[0] for channel in motion.channels))
     unit = "rad" if "rad" in motion.units and "deg" not in motion.units else "deg"
     channels = _channels(bones, dofs)

@@ -64,11 +64,13 @@ def read_skeleton(path: str | Path) -> Asf:
 @lru_cache(maxsize=16)
 def _skeleton(path: Path, text: str) -> Asf:
     """A folder mostly holds motions of a few people: each skeleton is parsed once."""
+    # the units, which the rest is in
     sections = _sections(path, text)
     units = _units(sections.get("units", []))
     angle = units["angle"].lower()[:3]
     if angle not in ("deg", "rad"):
         raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
+    # bones, then the tree of joints that they span
     bones = _read_bones(path, sections, 1.0 if angle == "deg" else 180 / np.pi)
     joints = _joints(bones)
     if lost := bones.keys() - {joint.name for joint in joints}:
@@ -106,6 +108,7 @@ def _sections(path: Path, text: str) -> dict[str, Lines]:
 
 def _read_bones(path: Path, sections: Mapping[str, Lines], factor: float) -> dict[str, _Bone]:
     """All bones with their children, by name. factor: degrees in the file's unit of angles."""
+    # bones in the order of the file, and then the hierarchy, which names them
     bones = {"root": _root(path, sections["root"], factor)}
     for begin, block in _blocks(path, sections.get("bonedata", [])):
         bone = _bone(path, begin, block, factor)
@@ -219,6 +222,7 @@ def _joints(bones: dict[str, _Bone]) -> list[Joint]:
         name, parent, offset = waiting.pop()
         bone = bones[name]
         here = len(joints)
+        # the first angle is applied first, so it is the last letter of the order
         turns = "".join(dof[1] for dof in reversed(bone.dofs) if dof[0] == "r")
         joints.append(Joint(name, parent, offset, complete_order(turns), bone.axis))
         # the root's reach is where it is, not where its children start
@@ -239,6 +243,7 @@ def words_of(lines: list[str], header: int = 0) -> Iterator[Line]:
 def asf_text(asf: Asf) -> str:
     """An ASF file, angles in degrees. The root must be called "root" and names must have no blanks."""
     root, *bones = _bones(asf)
+    # one unit of length has a name in this format: CMU's
     unit = 0.45 if asf.skeleton.metres_per_unit == CMU_METRES else 1.0
     bone_data = "".join(_bone_text(bone, i) for i, bone in enumerate(bones, start=1))
     hierarchy = ""
@@ -266,6 +271,7 @@ def asf_text(asf: Asf) -> str:
 
 def _bone_text(bone: _Bone, number: int) -> str:
     """The lines of a bone in :bonedata."""
+    # a bone of length 0 still needs a direction
     length = float(np.linalg.norm(bone.reach))
     direction = [value / length for value in bone.reach] if length else (0.0, 1.0, 0.0)
     dofs = f"    dof {' '.join(bone.dofs)}\n" if bone.dofs else ""

@@ -44,8 +44,10 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
     """
     path = place_of(file)
     lines = text.read_text(file).split("\n")
+    # the skeletons, each from a ROOT
     figures, motion_line = _hierarchy(path, lines)
     number = text.chosen(path, _figure_names(figures), figure, "figure")
+    # the number of frames and their rate
     header = _motion_header(path, lines, motion_line)
     # a line holds the channels of all figures, one after the other
     widths = [len(_channel_names(nodes)) for nodes in figures]
@@ -87,6 +89,7 @@ def _frames(path: Path, lines: list[str], header: "_Header", width: int, partial
 
 def _complete_lines(lines: list[str], start: int, width: int) -> list[str]:
     """The lines without a last frame that has not all of its values."""
+    # blank lines at the end do not count
     last = len(lines) - 1
     while last > start and not lines[last].strip():
         last -= 1
@@ -193,6 +196,7 @@ class _Hierarchy:
         if self.is_declared or bool(self.open_nodes) == (kind == "root"):
             reason = f"{quoted(statement)} does not belong here: expected trees of joints"
             raise FormatError(self.path, reason, line)
+        # a ROOT begins another figure, whose names are its own
         if kind == "root":
             self.figures.append([])
             self.names = text.Names()
@@ -249,6 +253,7 @@ def _fps(path: Path, word: str, line: int) -> float:
     if not seconds > 0:
         raise FormatError(path, f"frame time {word} s is out of range: expected more than 0", line)
     fps = text.frame_rate(1 / seconds, path, line)
+    # half a unit of the last digit that is written, and a little more
     precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
     possible = []
     for rate in (round(fps) - 1, round(fps), round(fps) + 1):
@@ -290,6 +295,7 @@ def write(file: File, motion: Motion) -> None:
     names = text.plain_names(skeleton_of(motion).names, r"[^\w.-]")
     translated = {0, *map(skeleton_of(motion).index, moving)}
     motion = text.with_names(motion, names)
+    # the hierarchy gives the order of joints in every frame
     lines, joints = _tree(motion, translated)
     rows = _rows(motion, joints, translated)
     head = ["HIERARCHY", *lines, "MOTION", f"Frames: {len(motion)}", f"Frame Time: {1 / motion.fps!r}"]

@@ -37,6 +37,7 @@ def read(file: File) -> Motion:
     header: list[str] = []
     channels = Channels([], [])
     values = array("d")  # row after row
+    # a comment with the rate, the header, then a frame in each row
     for line, row in _rows(file):
         if row[0].startswith("#"):
             fps = _stated_rate(path, ",".join(row), line) or fps
@@ -74,6 +75,7 @@ def _rows(file: File) -> Iterator[tuple[int, list[str]]]:
 
 def _rate_of_times(path: Path, times: Array) -> float:
     """The frame rate of times (T,) in seconds; FormatError where they are not evenly spaced."""
+    # without a rate, the times must be spaced within a hundredth
     steps = np.diff(times)
     if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
         raise FormatError(path, f"times are not evenly spaced: add a comment line '{COMMENT}30'")
@@ -106,6 +108,7 @@ def write(file: File, motion: Motion) -> None:
     text.write(f"{COMMENT}{motion.fps!r}\n")
     writer = csv.writer(text, lineterminator="\n")
     titles = map("{} [{}]".format, motion.channels, motion.units)
+    # the header names units, so that the table reads back without loss
     writer.writerow(["time", *titles])
     for frame, row in enumerate(motion.values.tolist()):
         writer.writerow([repr(frame / motion.fps), *map(repr, row)])

@@ -37,10 +37,13 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
     joints in "length". FormatError names what the file lacks, and the extra if ufbx is not installed.
     rest, figure: see :func:`motet.formats.gltf.read`; rest may be an FBX file, for its rest pose.
     """
+    # the file is read once, though ufbx may run twice
     content = BytesIO(read_bytes(file, FBX_MAX_BYTES))
     content.name = str(place_of(file))  # used in error messages
+    # the first take's document lists all takes, and mostly is the one that is read
     document = as_gltf(content, 0 if clip is None else None)
     take, figure = _choice(content, _takes(document), clip, figure)
+    # another take needs another run
     if take or clip is not None:
         content.seek(0)
         document = as_gltf(content, take)
@@ -87,6 +90,7 @@ def as_gltf(file: File, take: int | None = None) -> BytesIO:
     content = read_bytes(file, FBX_MAX_BYTES)
     if find_spec("ufbx") is None:
         raise FormatError(path, "FBX files need the package ufbx: install the extra with  pip install 'motet[fbx]'")
+    # a process of its own, since untrusted files may crash ufbx
     command = [sys.executable, "-P", str(PROGRAM), "-1" if take is None else str(take)]
     try:
         done = subprocess.run(command, input=content, capture_output=True, timeout=FBX_SECONDS, check=False)

@@ -119,10 +119,12 @@ class Scene:
     def __init__(self, content: bytes) -> None:
         self.size = len(content)
         self.scene = keep(_load(content))
+        # nodes by number, without the root that every file has
         self.nodes = [node for node in each(self.scene.nodes) if not node.is_root]
         self.at = {node.typed_id: i for i, node in enumerate(self.nodes)}
         self.parents = [self.at.get(keep(node.parent).typed_id, -1) for node in self.nodes]
         self.bound: dict[int, Any] = {}
+        # the bones of skins, and then those without
         self.skins = [self._skin(skin) for skin in each(self.scene.skin_deformers)]
         self.skins += self._bare(set().union(*self.skins))
         self.near = self._above(set().union(*self.skins)) or set(self.at.values())
@@ -199,8 +201,10 @@ def frame_times(scene: Scene, take: Take) -> list[float]:
     ValueError for over 100,000 frames times nodes and one more for every four bytes of file, so small files stay cheap,
     and for over ten million, an hour of 90 nodes at 30 fps.
     """
+    # where the keys are
     first = min((curve.min_time for curve in take.curves), default=0.0)
     last = max((curve.max_time for curve in take.curves), default=0.0)
+    # within the take's own range, unless that is empty
     begin = max(first, take.stack.time_begin)
     end = min(last, take.stack.time_end)
     begin, end = (begin, end) if begin < end else (first, max(first, last))
@@ -214,6 +218,7 @@ def frame_rate(scene: Scene, take: Take, highest: float = 1000.0) -> tuple[float
     """The file's, or that of the take's keys if most of its curves are denser; 30 if neither is known or below the
     highest. And where it is not the file's, what the file states and which rate is taken."""
     stated = scene.scene.settings.frames_per_second
+    # the median of all curves, so that a few with other rates do not count
     rates = sorted(key_rate(curve, highest) for curve in take.curves)
     keyed = rates[len(rates) // 2] if rates else 0.0
     if keyed > 1.01 * stated:
@@ -233,6 +238,7 @@ def key_rate(curve: Any, highest: float) -> float:
 
 def as_gltf(scene: Scene, take: Take | None) -> Json:
     """The skeleton and a take of it, as a glTF document with its buffer embedded."""
+    # nodes at rest, as a tree
     rest = scene.rest()
     nodes = [_node(scene, i, rest[i]) for i in range(len(scene.nodes))]
     for i, parent in enumerate(scene.parents):
@@ -258,6 +264,7 @@ def _node(scene: Scene, i: int, rest: Matrix) -> Json:
 
 def _animation(scene: Scene, take: Take, rest: list[Matrix]) -> Json:
     """The parts of a document with a take's tracks, a key for each frame."""
+    # all numbers go into one array: first the times, then a track after the other
     times = frame_times(scene, take)
     values = array("f", [time - times[0] for time in times])
     accessors = [{"bufferView": 0, "componentType": 5126, "count": len(times), "type": "SCALAR"}]
@@ -309,6 +316,7 @@ def main(number: int) -> Json:
 
         most = 2**28 + 32 * len(content)
         resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    # the skeleton, the takes that move it, and one of these
     scene = Scene(content)
     moving = takes(scene)
     take = moving[number] if 0 <= number < len(moving) else None

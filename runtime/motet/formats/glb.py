@@ -54,6 +54,7 @@ class Buffer:
 
         bounded: with their minimum and maximum, required for times and corners.
         """
+        # each array gets a view of its own, filled up to four bytes
         content = np.ascontiguousarray(values, dtype=dtype)
         if not np.isfinite(content).all():
             raise MotionError("values of this motion exceed glTF's 32-bit numbers")
@@ -80,6 +81,7 @@ class Buffer:
 
 def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
+    # glTF's unit is the metre; a skeleton without a unit keeps its own
     if skeleton_of(motion).metres_per_unit is not None:
         motion = motion.scaled(1.0)
     buffer = Buffer()
@@ -120,6 +122,7 @@ def with_body(
 
 def container(document: Json, content: bytes | bytearray) -> bytes:
     """A GLB file of a JSON object and the binary part."""
+    # both chunks end at a multiple of four bytes
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(content))
@@ -151,6 +154,7 @@ def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]
     """The animation of tracks from the motion's first frame; its arrays go into the buffer."""
     if not len(motion):
         raise MotionError("this motion has no frames, and glTF cannot hold an empty animation")
+    # tracks of equally many frames share their times
     times = {len(motion): buffer.add(np.arange(len(motion)) / motion.fps, bounded=True)}
     samplers: list[Json] = []
     channels: list[Json] = []
@@ -227,6 +231,7 @@ def _triangles(prisms: int) -> NDArray[Any]:
 
 def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
     """Corners and normals (2 * CORNERS + 2, 3): tip and ring at the start, ring and tip at the end."""
+    # a prism about the bone; one without length stands upright
     axis = end - start
     length = float(np.linalg.norm(axis))
     axis = axis / length if length else np.array([0.0, 1.0, 0.0])
@@ -250,6 +255,7 @@ def _ring(axis: Array) -> Array:
 
 def _with_fingers() -> Skeleton:
     """The humanoid with VRM's fingers after its joints."""
+    # fingers hang on the hands, mirrored for the right one
     joints = {joint.name: joint for joint in HUMANOID.joints}
     for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
         for part, (parent, (x, y, z), order) in FINGERS.items():

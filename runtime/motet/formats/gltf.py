@@ -62,6 +62,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
     the translation of the root and of moving joints in "length". FormatError names what the file lacks.
     """
     with broken(place_of(file)):
+        # the clip and the figure that are read
         scene = _scene(file)
         gltf = scene.gltf
         stance = {} if rest is None else _stance(rest)
@@ -69,6 +70,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
         take = _take(scene, *choice(gltf.path, parts, clip, figure))
         if stance and not stance.keys() & set(take.figure.names):
             raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
+        # every angle is counted from the rest pose of the nodes, whatever their own axes
         rest_turns, rest_places = _rested(take, stance)
         skeleton = skeleton_at(_joint_names(gltf, take.figure), take.figure.parents, rest_places)
         turned = product(take.turns, inverse(rest_turns))
@@ -122,6 +124,7 @@ class _Scene:
 
 def _scene(file: File) -> _Scene:
     gltf = parse(file)
+    # figures in the order of the file's nodes, and the animations that move them
     animations = gltf.objects("animations")
     parts = figures(gltf, set().union(*map(moved, animations)))
     parts.sort(key=lambda joints: gltf.order[_top(gltf, joints)])
@@ -178,6 +181,7 @@ def _take(scene: _Scene, index: int | None, place: int | None) -> _Take:
     fps = 30.0
     if index is not None:
         tracks, fps = _tracks(gltf, animation, scene.names[index], near)
+    # at rest, and in each frame
     joints = list(figure.nodes)
     _, rest_turns, rest_places = (part[0, joints] for part in gltf.world(near))
     linear, turns, places = (part[:, joints] for part in gltf.world(near, tracks))
@@ -239,6 +243,7 @@ def skeleton_at(names: Sequence[str], parents: Sequence[int], places: Array) -> 
     """The skeleton in metres of joints at places (J, 3) at rest; MotionError if they do not form one."""
     above = [places[parent] if parent >= 0 else np.zeros(3) for parent in parents]
     offsets = [(float(x), float(y), float(z)) for x, y, z in places - above]
+    # offsets are differences of places: in this skeleton no joint is turned
     joints = tuple(Joint(*joint) for joint in zip(names, parents, offsets, strict=True))
     return Skeleton(joints, metres_per_unit=1.0)
 
@@ -265,6 +270,7 @@ def figures(gltf: Gltf, moved: NodeSet) -> list[NodeSet]:
     moved: the nodes that its animations move. Skins belong to one figure if one is below the other, or both are below a
     moved node. Where the skins' joints are no human's, and are one together with moved nodes, these are joints, too.
     """
+    # joints are those of the humanoid and of skins
     humanoid = set(gltf.humanoid().values())
     sets = [humanoid, *_skins(gltf)]
     joints_of_all = set().union(*sets)
@@ -343,6 +349,7 @@ def _animated(gltf: Gltf, moved: NodeSet, roots: Mapping[int, int]) -> NodeSet:
         is_light = "KHR_lights_punctual" in properties.get("extensions", {})
         return is_light or any(kind in properties for kind in kinds)
 
+    # cameras and lights move, but are no bones
     bones = {node for node in moved if not is_thing(node, "camera")}
     below: NodeSet = set()
     for node in gltf.order:
@@ -371,6 +378,7 @@ def _roots(gltf: Gltf) -> dict[int, int]:
 
 def _top(gltf: Gltf, part: NodeSet) -> int:
     """The lowest common ancestor of a part: that of its first and last node in branch order."""
+    # all of a part is between its first and its last node, in the order of branches
     first = min(part, key=gltf.order.__getitem__)
     last = max(part, key=gltf.order.__getitem__)
     line = above(gltf, [first])
@@ -392,6 +400,7 @@ def above(gltf: Gltf, nodes: Iterable[int]) -> NodeSet:
 
 def likeliest(gltf: Gltf, groups: list[NodeSet], moved: NodeSet) -> NodeSet:
     """The figure with the most moving nodes, counting its ancestors, or else with the most joints."""
+    # the most moving nodes, then the most joints
     best = max(groups, key=lambda joints: (len(above(gltf, joints) & moved), len(joints)))
     if len(groups) > 1:
         name = quoted(gltf.name(_top(gltf, best)))
@@ -437,6 +446,7 @@ def _channels(animation: Json) -> Iterator[tuple[Json, int, str]]:
 
 def _tracks(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> tuple[Tracks, float]:
     """The values of some nodes at every frame of the animation ``name``, and its frame rate."""
+    # keys at times of their own, read at the times of frames
     keys = _keys(gltf, animation, name, nodes)
     frame_times, fps = _frame_times(gltf, name, [times for times, _, _ in keys.values()])
     tracks = {}
@@ -504,6 +514,7 @@ def _step(times: Array) -> float:
 
     Times are 32-bit numbers, so a step between two is rough: it is measured over all whole steps of the track.
     """
+    # a step may be missing where a key was left out
     gaps = np.diff(times)
     step = float(np.median(gaps))
     if step > 0:

@@ -67,6 +67,7 @@ class Nodes:
         """
         if motion.skeleton and motion.skeleton.metres_per_unit != 1:
             motion = motion.scaled(1.0)
+        # the motion in its own frames, of which each node needs its parent's
         rotations = local_rotations(motion)
         translations = local_translations(motion)
         for i, node in enumerate(self.joints):
@@ -79,6 +80,7 @@ class Nodes:
 
     def _node_rotations(self, node: int, rotations: Array) -> Array:
         """Quaternions (T, 4) of a node in its parent for rotations (T, 3, 3) of its joint from rest."""
+        # the frame of the node's parent
         parent = self.gltf.parents[node]
         # the rotation nearest to the parent's linear map
         left, _, right = np.linalg.svd(self.linear[parent] if parent >= 0 else np.eye(3))
@@ -117,12 +119,14 @@ def read_character(file: File) -> Character:
     """Read a character to put motions onto; FormatError like :func:`motet.formats.gltf.read`."""
     path = place_of(file)
     with broken(path):
+        # the figure that moves, in the world at rest
         gltf = parse(file)
         all_moved = set().union(*map(moved, gltf.objects("animations")))
         figure = figure_of(gltf, likeliest(gltf, figures(gltf, all_moved), all_moved))
         linear, _, places = (part[0] for part in gltf.world())
         joints = list(figure.nodes)
         skeleton = skeleton_at(figure.names, figure.parents, places[joints])
+        # frames of joints must be invertible to write tracks for their nodes
         if not np.abs(np.linalg.det(linear[joints])).min() > 0:
             raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
         nodes = Nodes(gltf, figure.nodes, skeleton, linear, places)
@@ -136,6 +140,7 @@ def _joint_map(nodes: Nodes) -> JointMap | None:
         return None
     if missing := [bone for bone in REQUIRED if bone not in bones]:
         raise FormatError(nodes.gltf.path, f"its VRM humanoid lacks bones that VRM requires: {', '.join(missing)}")
+    # the bones of the spine and the neck, upwards; others one by one
     spine = tuple(bones[bone] for bone in ("spine", "chest", "upperChest") if bone in bones)
     neck = (bones["neck"],) if "neck" in bones else ()
     joints = {bone: bones[bone] for bone in BONES if bone in bones and bones[bone] not in (*spine, *neck)}
@@ -219,6 +224,7 @@ def _placed_primitives(gltf: Gltf) -> Iterator[tuple[int, Json]]:
 
 def _skinned(nodes: Nodes, skin: Json, points: Array, joints: NDArray[np.intp], weights: Array) -> Skinned:
     """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
+    # each joint moves every point, weighted; then the sum of weights is divided out
     linear, places = _bound(nodes, skin)
     moved = np.zeros(points.shape)
     for joint, weight in zip(joints.T, weights.T, strict=True):
@@ -335,6 +341,7 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
         log.warning("%s: its nodes have no names, by which a clip plays: use --onto (onto=), %s", gltf.path, remedy)
     number_of = _numbers_in_clip(nodes)
     buffer = Buffer()
+    # only the joints, with a body of motet's own
     tracks = ((number_of[node], path, values) for node, path, values in nodes.tracks(motion))
     clip = animation(buffer, "motion", motion, tracks)
     skin = {"joints": [number_of[node] for node in joints]}

@@ -80,6 +80,7 @@ class Gltf:
     @cached_property
     def parents(self) -> tuple[int, ...]:
         """The parent of each node, -1 for a root; FormatError if the nodes do not form trees."""
+        # each node has one parent at most
         nodes = self.objects("nodes")
         parents = [-1] * len(nodes)
         for index, node in enumerate(nodes):
@@ -93,6 +94,7 @@ class Gltf:
     def order(self) -> dict[int, int]:
         """Each node's place in an order of all, parents first, branch by branch; iterating gives that order."""
         order: dict[int, int] = {}
+        # from the roots on; nodes of a cycle are never reached
         waiting = [node for node, parent in enumerate(self.parents) if parent == -1][::-1]
         while waiting:
             node = waiting.pop()
@@ -123,6 +125,7 @@ class Gltf:
         """A node's translation (3), rotation as a quaternion (4), scalar last, and scale (3) at rest, each by name."""
         properties = self.objects("nodes")[node]
         if "matrix" in properties:
+            # a matrix is column by column, and without shear
             matrix = np.array(properties["matrix"], np.float64).reshape(4, 4).T
             scale = np.linalg.norm(matrix[:3, :3], axis=0)
             turn = rotmat_to_quat(matrix[:3, :3] / np.where(scale > 0, scale, 1.0))
@@ -214,6 +217,7 @@ class Gltf:
 
     def _rows(self, index: int, part: Json, kind: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Elements (count, width) of a part of an accessor, which names a view; FormatError beyond its buffer."""
+        # where the rows are, and whether all of them are in the buffer
         size = kind.itemsize * width
         content, start, stride = self._view(part["bufferView"])
         start = start + part.get("byteOffset", 0)
@@ -228,6 +232,7 @@ class Gltf:
 
     def _view(self, index: int) -> tuple[bytes, int, int]:
         """A buffer, the start of a view of it, and the stride in bytes; 0 if dense."""
+        # a plain view is part of a buffer; a packed one is unpacked once
         view = self.objects("bufferViews")[index]
         extensions = view.get("extensions", {})
         packings = (f"{maker}_meshopt_compression" for maker in ("EXT", "KHR"))
@@ -274,6 +279,7 @@ def parse(file: File) -> Gltf:
     """Read a file's parts; FormatError if it is not glTF 2.0, is truncated, or lacks its buffers."""
     path = place_of(file)
     content = read_bytes(file)
+    # a binary file has both parts; a text file names the buffers
     text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, b"")
     try:
         document = json.loads(text)

@@ -37,6 +37,7 @@ def read(file: File) -> Motion:
     """
     path = place_of(file)
     joints, rows = _joints_and_rows(file)
+    # a motion has joints, each once, and frames
     if len(set(joints)) != len(joints) or not all(joints):
         raise FormatError(path, "joint names in the JointOrder must be unique and not empty")
     if not joints or not len(rows):
@@ -69,6 +70,7 @@ def _joints_and_rows(file: File) -> tuple[list[str], Array]:
 
 def _rate_of_times(path: Path, times: Array) -> float:
     """The frame rate of times (T,) in seconds; FormatError where they are not evenly spaced."""
+    # steps may differ from their mean by half of it
     steps = np.diff(times)
     if not len(steps):
         raise FormatError(path, "cannot tell the frame rate from a single frame")
@@ -150,6 +152,7 @@ def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -
     """Time step, root position and rotation, and the joints' angles of one frame."""
     values: list[float] = []
     for tag, count in {"Timestep": 1, "RootPosition": 3, "RootRotation": 3, "JointPosition": joints}.items():
+        # each part of a frame has its number of values
         words = (element.findtext(tag) or "").split()
         if len(words) != count:
             raise FormatError(path, f"frame {number}: {tag} needs {count} values, not {len(words)}")

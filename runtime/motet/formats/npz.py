@@ -110,10 +110,12 @@ def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
     KeyError if there is none of that name, ValueError if it is too large, of another type or does not fit its size;
     a damaged archive makes zipfile and its unpackers raise errors of a dozen types.
     """
+    # the size that the archive declares, before anything is unpacked
     info = archive.getinfo(f"{name}.npy")
     if info.file_size > NPZ_MAX_BYTES:
         raise ValueError(f"array {name!r} has {info.file_size} bytes: expected at most {NPZ_MAX_BYTES}")
     with archive.open(info) as stream:
+        # the array's own header must fit it
         shape, by_columns, dtype = _header(stream)
         size = info.file_size - stream.tell()
         if dtype.kind not in kinds or math.prod(shape) * dtype.itemsize != size:
@@ -162,6 +164,7 @@ def _smpl(
 ) -> Motion:
     # rotations in their parents' frames
     turned = _joints(path, archive, parts, size)
+    # where the root is, in metres
     trans = _path_of_root(path, archive, names, len(turned))
     rate = _rate(path, archive, names, fps)
 
@@ -181,6 +184,7 @@ def _joints(path: Path, archive: zipfile.ZipFile, parts: tuple[str, ...], size: 
         shape = _header(stream)[0]
     if not shape:
         raise FormatError(path, f"{parts[0]} is a single number: expected its frames")
+    # a small file must not become a large motion
     if shape[0] * len(AMASS_JOINTS) >= most_poses(size):
         raise FormatError(path, f"{shape[0]} frames are too many for a file of {size} bytes")
     each = [_rotations(path, part, array(archive, part, "fiu").astype(np.float64)) for part in parts]
@@ -197,6 +201,7 @@ def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames:
     if place is None:
         raise FormatError(path, "no translation of the root: expected an array trans or transl")
     trans = array(archive, place, "fiu").astype(np.float64)
+    # the root has a place in each frame
     if trans.shape != (frames, 3) or not np.isfinite(trans).all():
         raise FormatError(path, f"{place} must be ({frames}, 3) finite numbers, not {trans.shape}")
     return trans

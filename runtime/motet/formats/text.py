@@ -122,6 +122,7 @@ def check_rate(path: Path, stated: float | None, expected: float | None) -> None
 def numbers(words: Sequence[str], path: Path, line: int | None) -> list[float]:
     """Finite numbers; FormatError with file and line for any other word."""
     if finite(words) is None:
+        # the first word at fault, and why it may be there
         wrong = next(word for word in words if finite([word]) is None)
         comma = ": decimals are written with a point, not a comma" if re.fullmatch(r"[-+]?\d*,\d+", wrong) else ""
         raise FormatError(path, f"{quoted(wrong)} is not a finite number{comma}", line)
@@ -179,6 +180,7 @@ class Names:
 
     def unique(self, name: str) -> str:
         """``name``, with a numeric suffix if it is taken; the result is then taken too."""
+        # the next free suffix of a name is remembered: thousands may share one
         candidate = name
         while candidate in self._taken:
             suffix = self._next.get(name, 2)
@@ -197,6 +199,7 @@ def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
 def with_names(motion: Motion, names: Sequence[str]) -> Motion:
     """The motion with its skeleton's joints renamed, one name for each."""
     skeleton = skeleton_of(motion)
+    # channels follow the names of their joints
     new = dict(zip(skeleton.names, names, strict=True))
     joints = tuple(replace(joint, name=new[joint.name]) for joint in skeleton.joints)
     parts = (channel.rpartition(".") for channel in motion.channels)
@@ -307,12 +310,14 @@ def choice(path: Path, parts: Contents, clip: Clip, figure: Figure) -> tuple[int
     Of a figure without a clip the first clip that moves it. A clip may be the name of a figure. FormatError like
     :func:`chosen`, and for a clip that does not move the figure.
     """
+    # the name of a figure may stand in a clip's place
     titles = tuple(parts.figures)
     if figure is None and is_name_of(clip, titles) and not is_name_of(clip, parts.clips):
         figure = clip
         clip = None
     if figure is None:
         return (chosen(path, parts.clips, clip) if parts.clips or clip is not None else None), None
+    # with a figure, the clip must move it
     place = chosen(path, titles, figure, "figure")
     moving = parts.figures[titles[place]]
     if clip is None:
@@ -330,6 +335,7 @@ def _does_not_move(path: Path, clip: str, figure: str, moving: Sequence[str]) ->
 
 def _nearest_first(clip: str, names: Sequence[str]) -> list[str]:
     """Names of clips, first those that an unknown one is a part of or is spelt like."""
+    # names that hold the text, those that are spelt like it, then all others
     wanted = clip.casefold()
     known = names[:1000]
     holding = [name for name in known if wanted and wanted in name.casefold()]
@@ -346,6 +352,7 @@ def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]
 
     if not isinstance(file, str | Path) or MARK not in str(file) or _exists(Path(file)):
         return file, None
+    # every mark may be the one: in names of files it is allowed
     parts = str(file).split(MARK)
     ways: list[tuple[Path, str]] = []
     for i in range(1, len(parts)):
