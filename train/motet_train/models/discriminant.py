@@ -31,8 +31,8 @@ def discriminate(net: JointEmbedding, seen: Views) -> None:
     mean = flat.mean(dim=0)
 
     # what does not matter: differences between views of a motion, and between recordings of an action
-    of_views = _covariance((views - motions[:, :, None]).flatten(0, 2))
-    within = of_views + ACTIONS * _covariance(_around(flat, seen.groups))
+    within = _covariance((views - motions[:, :, None]).flatten(0, 2))
+    within += ACTIONS * _covariance(_around(flat, seen.groups))
     within += RIDGE * within.diagonal().mean() * torch.eye(len(within))
 
     # the directions in which motions differ most, relative to that

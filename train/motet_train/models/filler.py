@@ -73,6 +73,12 @@ class Block(nn.Module):
         return x + mlp
 
 
+def _frequencies(count: int) -> Tensor:
+    """Those of waves of 4 to 100 frames, radians a frame."""
+    waves = torch.logspace(0, 1, count, base=100.0 / 4) * 4
+    return 2 * torch.pi / waves
+
+
 class Filler(Net):
     """Placed frames before, plainly through and after a gap to those that fill it. mean, scale: (E,) of such frames."""
 
@@ -94,14 +100,13 @@ class Filler(Net):
         self.outward = zero_linear(width, config.channels)
         self.places = SixdPlaces(config.tree)
 
-        # what mirrors frames, and the waves of distances, of 4 to 100 frames
+        # what mirrors frames, and the waves of distances
         sides = mirror()
-        waves = torch.logspace(0, 1, config.waves, base=100.0 / 4) * 4
         constants(
             self,
             mirrored=torch.from_numpy(sides.columns),
             signs=torch.from_numpy(sides.signs),
-            frequencies=2 * torch.pi / waves,
+            frequencies=_frequencies(config.waves),
         )
 
     def forward(self, past: Tensor, plain: Tensor, after: Tensor) -> Tensor:

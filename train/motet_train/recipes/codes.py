@@ -82,10 +82,15 @@ def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions:
 
     learner = _learner(net, job, motions)
     about = manifest(job, corpus, asdict(net.config), data, by)
+    _add_parts(about, codec, actions)
+    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(shown)),))
+
+
+def _add_parts(about: dict[str, Any], codec: Run, actions: Run) -> None:
+    """Add to a manifest the actions of a run, and how it and a codec were trained."""
     about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
     for part, run in (("codec", codec), ("actions", actions)):
         about["training"][part] = origin(run.manifest["training"])
-    return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(shown)),))
 
 
 def _untrained(config: CodeModelConfig, codec: MotionCodec, actions: ActionNet, memory: Tensor) -> MotionCodes:
@@ -185,12 +190,17 @@ def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float, ended:
     frames = frames[: len(frames) // hop * hop]
     if not len(frames):
         return np.empty((0, codec.config.groups + 1), dtype=np.int64)
-    poses = poses_of(frames, fps)
-    poses = np.concatenate([poses, 2 * poses[-1:] - poses[-2:-1]])  # the root keeps its pace after the end
-    _, moves, _ = with_way(frames, poses, codec.book.numpy().astype(np.float64), hop)
     body = codec.to_codes(codec.encode(torch.from_numpy(frames).float()[None]))[0].numpy()
-    codes = np.concatenate([moves[:, None], body], axis=1)
+    codes = np.concatenate([_moves(codec, frames, fps)[:, None], body], axis=1)
     if ended:
         codes = np.pad(codes, ((0, 1), (0, 0)))
         codes[-1, 0] = codec.config.moves
     return codes
+
+
+def _moves(codec: MotionCodec, frames: NDArray[np.float64], fps: float) -> Codes:
+    """The root moves (N,) of frames (T, D) of whole steps."""
+    poses = poses_of(frames, fps)
+    poses = np.concatenate([poses, 2 * poses[-1:] - poses[-2:-1]])  # the root keeps its pace after the end
+    _, moves, _ = with_way(frames, poses, codec.book.numpy().astype(np.float64), codec.config.hop)
+    return moves

@@ -77,7 +77,6 @@ def train_known(store: Store, job: Job, data: str, by: str, writer: Run) -> Run:
     corpus = divided(store, mirror=True, by=by)
     writer_net = _writer_net(writer, corpus, data)
     space, known, tried = _learned_space(store, corpus, job)
-    np.savez(job.folder / TRIED, **tried._asdict())
     net = KnownMotions.of(writer_net, space, known)
 
     # the manifest is the writer's where the model is
@@ -116,6 +115,7 @@ def _learned_space(store: Store, corpus: Divided, job: Job) -> tuple[JointEmbedd
     examples = corpus.examples(corpus.parts.train)
     views = search.seen_by(space, examples, visits, job.about.seed, whole=True)
     tried = _tried(corpus, examples, space, views, visits)
+    np.savez(job.folder / TRIED, **tried._asdict())
     return space, _known(corpus, examples, space, views, visits.kept), tried
 
 
@@ -123,8 +123,7 @@ def _known(corpus: Divided, examples: Examples, space: JointEmbedding, views: Vi
     """Fit a space to some examples; what it then knows. views: of these examples, the last one whole."""
     # disguised views show which differences do not matter, so the whole one is left out
     discriminate(space, replace(views, seen=views.seen[:, :, :-1]))
-    kept_views = torch.cat([views.seen[:, :, :kept], views.seen[:, :, -1:]], dim=2)
-    vectors = _embedded(space, kept_views.flatten(0, 1))
+    vectors = _embedded(space, _kept(views.seen, kept))
 
     # the action of each motion, then of each mirrored one; what it shows, and sentences about it
     actions = actions_of(corpus.store, examples.records)
@@ -151,6 +150,11 @@ def _shown_by_actions(store: Store, actions: Actions) -> list[Shown]:
     """What each action shows, by its sentences and its title."""
     titles = {action: store.records[record].action for (record, _), action in actions.of.items()}
     return [shown_by(wordings, titles[action]) for action, wordings in enumerate(actions.sentences)]
+
+
+def _kept(seen: Tensor, count: int) -> Tensor:
+    """Of views (M, N, K, S) of motions the first ones and the last: (M N, count + 1, S)."""
+    return torch.cat([seen[:, :, :count], seen[:, :, -1:]], dim=2).flatten(0, 1)
 
 
 @torch.no_grad()

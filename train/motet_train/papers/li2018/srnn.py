@@ -149,10 +149,8 @@ class SRNN(Taught):
             "edges": (sum(EDGES.values()), 2 * config.units),
             "nodes": (sum(NODES.values()), 2 * config.units),
         }
-        order = torch.tensor(list(chain.from_iterable(config.parts)))
-        constants(
-            self, places=order.argsort(), **dict(zip(channels, map(torch.tensor, channels.values()), strict=True))
-        )
+        places = torch.tensor(list(chain.from_iterable(config.parts))).argsort()
+        constants(self, places=places, **dict(zip(channels, map(torch.tensor, channels.values()), strict=True)))
 
     def begin(self, seed: Tensor) -> State:
         """The RNNs have seen all seed frames, of which there are at least two, but the last."""
