@@ -150,7 +150,7 @@ class SRNN(Taught):
             "nodes": (sum(NODES.values()), 2 * config.units),
         }
         places = torch.tensor(list(chain.from_iterable(config.parts))).argsort()
-        constants(self, places=places, **dict(zip(channels, map(torch.tensor, channels.values()), strict=True)))
+        constants(self, places=places, **{name: torch.tensor(parts) for name, parts in channels.items()})
 
     def begin(self, seed: Tensor) -> State:
         """The RNNs have seen all seed frames, of which there are at least two, but the last."""
