@@ -211,10 +211,15 @@ def frame_mirror(contract: MotionContract) -> FrameMirror:
 
 def _padded(rows: Sequence[tuple[Floats, bool, Ids]]) -> Batch:
     """One batch of rows: frames (T, D), whether the motion ends with them, and the ids of a sentence."""
-    frames, lengths = padded([frames for frames, _, _ in rows], "float32")
-    sentences, _ = padded([sentence for _, _, sentence in rows], "int64")
-    ended = torch.tensor([end for _, end, _ in rows])
-    return Batch(torch.from_numpy(frames), torch.from_numpy(lengths), torch.from_numpy(sentences), ended)
+    frames, lengths = padded_tensors([frames for frames, _, _ in rows], "float32")
+    sentences, _ = padded_tensors([sentence for _, _, sentence in rows], "int64")
+    return Batch(frames, lengths, sentences, torch.tensor([end for _, end, _ in rows]))
+
+
+def padded_tensors(rows: Sequence[NDArray[Any]], dtype: str) -> tuple[Tensor, Tensor]:
+    """Rows (T, ...) of any lengths, padded on the right, (B, T, ...); and their lengths (B,)."""
+    table, lengths = padded(rows, dtype)
+    return torch.from_numpy(table), torch.from_numpy(lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,8 +276,8 @@ class Views:
 
 def _one_of_each(sentences: Sequence[Sequence[Ids]], rng: np.random.Generator) -> Tensor:
     """A random sentence of each motion, (B, W) int64."""
-    ids, _ = padded([choices[int(rng.integers(len(choices)))] for choices in sentences], "int64")
-    return torch.from_numpy(ids)
+    ids, _ = padded_tensors([choices[int(rng.integers(len(choices)))] for choices in sentences], "int64")
+    return ids
 
 
 def views(
@@ -298,8 +303,7 @@ def views(
         if mirror is not None:
             excerpts += [mirror(excerpt) for excerpt in excerpts]
         # the net sees all views of a motion at once
-        rows, lengths = padded(excerpts, "float32")
-        seen.append(see(torch.from_numpy(rows), torch.from_numpy(lengths)))
+        seen.append(see(*padded_tensors(excerpts, "float32")))
     sentences = (examples.sentences,) if mirror is None else (examples.sentences, examples.mirrored)
     # (N, M K, S) becomes (M, N, K, S)
     by_motion = torch.stack(seen).reshape(len(seen), len(sentences), count + whole, -1)

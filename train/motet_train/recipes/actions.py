@@ -11,9 +11,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.models.language import padded
 from motet.text.vocabulary import RULES, Vocabulary
-from motet_train.data.batches import Ids, Rows
+from motet_train.data.batches import Ids, Rows, padded_tensors
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions, actions_of
 from motet_train.data.store import Store
@@ -144,7 +143,7 @@ class ActionSentences:
                 if any(map(vocabulary.meant, RULES.words(sentence))):
                     actions_by_sentence.setdefault(sentence, set()).add(action)
         ids = _encoded(vocabulary, actions_by_sentence)
-        self.unseen = padded(ids, "int64") if ids else None
+        self.unseen = padded_tensors(ids, "int64") if ids else None
         self.alike = torch.zeros(len(ids), len(actions), dtype=torch.bool)
         for row, sentence_actions in enumerate(actions_by_sentence.values()):
             self.alike[row, list(sentence_actions)] = True
@@ -156,8 +155,7 @@ class ActionSentences:
         for action in actions:
             sentences = self.known[action]
             ids.append(sentences[rng.integers(len(sentences))])
-        words, lengths = padded(ids, "int64")
-        return SentenceBatch(torch.from_numpy(words), torch.from_numpy(lengths), torch.from_numpy(actions))
+        return SentenceBatch(*padded_tensors(ids, "int64"), torch.from_numpy(actions))
 
     @torch.no_grad()
     def measured(self, net: ActionNet) -> dict[str, float]:
@@ -165,7 +163,7 @@ class ActionSentences:
         likely action is one of these (understood)."""
         if self.unseen is None:
             return {}
-        words, lengths = (torch.from_numpy(part).to(net.mean.device) for part in self.unseen)
+        words, lengths = (part.to(net.mean.device) for part in self.unseen)
         # each sentence may be about several actions
         log_probabilities = net(words, lengths).cpu()
         best = log_probabilities.argmax(dim=1)

@@ -7,10 +7,9 @@ from functools import partial
 import torch
 from torch.nn import functional
 
-from motet.models.language import padded
 from motet.representation.contract import named
 from motet.text.vocabulary import RULES
-from motet_train.data.batches import Examples, Views, views
+from motet_train.data.batches import Examples, Views, padded_tensors, views
 from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.sentences import usable
 from motet_train.data.store import Store
@@ -79,11 +78,10 @@ def config_for(store: Store, corpus: Divided, recipe: Recipe) -> JointEmbeddingC
 def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed: int, whole: bool = False) -> Views:
     """The views of examples that a net is trained on. whole: also of each motion as it is."""
     store = examples.store
-    shortest, longest = visits.windows
     cut = partial(
         seen_as,
         disguise=visits.disguise,
-        windows=(shortest, longest),
+        windows=visits.windows,
         channels=store.channels,
         fps=store.fps,
     )
@@ -109,9 +107,7 @@ class _UnseenSentences:
 
     def __init__(self, corpus: Divided, records: tuple[int, ...]) -> None:
         entries = [corpus.store.records[record] for record in records]
-        frames, lengths = padded([corpus.store.sequence(record) for record in records], "float32")
-        self.motions = torch.from_numpy(frames), torch.from_numpy(lengths)
-
+        self.motions = padded_tensors([corpus.store.sequence(record) for record in records], "float32")
         self.groups = torch.tensor(description_groups(entries))
 
         # the sentences with a known word, and the row of each one's motion
@@ -123,8 +119,7 @@ class _UnseenSentences:
                 if usable(sentence) and not known.isdisjoint(RULES.words(sentence)):
                     ids.append(corpus.vocabulary.encode(sentence)[0])
                     rows.append(row)
-        words, counts = padded(ids, "int64")
-        self.texts = torch.from_numpy(words), torch.from_numpy(counts)
+        self.texts = padded_tensors(ids, "int64")
         self.rows = torch.tensor(rows)
 
     @torch.no_grad()
