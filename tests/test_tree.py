@@ -82,7 +82,7 @@ ONE_WAY = {
 
 CEILINGS = {
     "motet": 3_200,
-    "motet.bench": 5_200,
+    "motet.bench": 5_300,
     "motet.bundle": 10_300,
     "motet.cli": 16_700,
     "motet.compose": 7_600,
@@ -98,7 +98,7 @@ CEILINGS = {
     "motet.papers": 7_300,
     "motet.predict": 5_400,
     "motet.representation": 9_500,
-    "motet.search": 3_500,
+    "motet.search": 3_600,
     "motet.serve": 17_000,
     "motet.steering": 35_200,
     "motet.text": 5_300,

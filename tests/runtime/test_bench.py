@@ -265,4 +265,4 @@ def test_rows_of_a_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_units() -> None:
     assert Case("a", lambda: None, "us").value(0.5) == 5e5
     assert Case("a", lambda: None, "things/s", 8).value(0.5) == 16
-    assert Times.of(Taken(np.array([0.1, 0.3]), 0.5)).processor == pytest.approx(250)
+    assert Times.of([Taken(np.array([0.1, 0.3]), 0.5)]).processor == pytest.approx(250)

@@ -21,7 +21,7 @@ KNOWN = Known(
     actions=np.array([0, 1, 2, 3], np.int16),
     shown=np.array([[2, 0, 0], [2, 0, 0], [1, 2, 0], [0, 0, 2]], np.uint8),
     sentences=SENTENCES,
-    said=np.array([0, 1, 1, 2, 3], np.int16),
+    sentence_actions=np.array([0, 1, 1, 2, 3], np.int16),
     names=np.array([[1, 0, 0], [1, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.uint8),
     ways=np.array([[0, 0, 1], [0, 0, 1], [1, 0, 1], [2, 0, 1], [0, 0, 0]], np.int16),
     settings=AnswerSettings(near=4, outside=0.2),
@@ -31,7 +31,7 @@ TABLES = {
     "known_actions": KNOWN.actions,
     "known_shown": KNOWN.shown,
     "known_sentences": np.frombuffer("\n".join(SENTENCES).encode(), np.uint8),
-    "known_said": KNOWN.said,
+    "known_said": KNOWN.sentence_actions,
     "known_names": KNOWN.names,
     "known_ways": KNOWN.ways,
 }

@@ -148,7 +148,7 @@ def predict_cases(model: PredictModel, file: Path | None = None) -> list[Case]:
     ]
     if motion.skeleton is None:
         return cases
-    joints = [replace(one, offset=(*(1.1 * np.array(one.offset)),)) for one in motion.skeleton.joints]
+    joints = [replace(joint, offset=(*(1.1 * np.array(joint.offset)),)) for joint in motion.skeleton.joints]
     other = replace(motion, skeleton=replace(motion.skeleton, joints=tuple(joints))).resample(100.0)
     session = model.stream(other)
 

@@ -49,11 +49,12 @@ class Times:
     processor: float
 
     @staticmethod
-    def of(seconds: "Taken") -> "Times":
-        """Of the seconds that calls took."""
-        wall = 1e3 * seconds.wall
+    def of(rounds: "Sequence[Taken]") -> "Times":
+        """Of the calls of all rounds."""
+        wall = 1e3 * np.concatenate([calls.wall for calls in rounds])
+        processor = 1e3 * sum(calls.processor for calls in rounds) / len(wall)
         p95, p99 = np.percentile(wall, (95, 99)).tolist()
-        return Times(float(np.median(wall)), float(wall.mean()), p95, p99, 1e3 * seconds.processor / len(wall))
+        return Times(float(np.median(wall)), float(wall.mean()), p95, p99, processor)
 
 
 @dataclass(frozen=True)
@@ -110,32 +111,43 @@ def taken(call: Call, seconds: float, least: int = 2) -> Taken:
 def compared(cases: Mapping[str, Sequence[Case]], seconds: float) -> list[Row]:
     """The rows of our cases, the first, beside those of others by the same names, measured in turn for about
     ``seconds`` each. A ratio is the median of those of the rounds. Who fails at a row is left out of it."""
-    names = dict.fromkeys(case.name for case in next(iter(cases.values())))
-    return [
-        _row({rival: [case for case in of if case.name == name] for rival, of in cases.items()}, seconds)
-        for name in names
-    ]
+    rows = list[Row]()
+    for name in dict.fromkeys(case.name for case in next(iter(cases.values()))):
+        of_name = dict[str, Sequence[Case]]()
+        for rival, rival_cases in cases.items():
+            of_name[rival] = [case for case in rival_cases if case.name == name]
+        rows.append(_row(of_name, seconds))
+    return rows
 
 
 def _row(cases: Mapping[str, Sequence[Case]], seconds: float) -> Row:
+    """The row of our cases of one name, the first, beside those of others."""
     us = next(iter(cases))
-    chosen = {rival: case for rival, of in cases.items() if (case := _fastest(rival, of, seconds, must=rival == us))}
-    rounds = [{rival: taken(case.call, seconds / ROUNDS) for rival, case in chosen.items()} for _ in range(ROUNDS)]
-    middle = [{rival: np.median(calls.wall) / chosen[rival].count for rival, calls in of.items()} for of in rounds]
-    times = {rival: Times.of(_joined([of[rival] for of in rounds])) for rival in chosen}
-    worked = {rival: times[rival].processor / case.count for rival, case in chosen.items()}
-    beside = {
-        rival: Beside(
-            case.value(times[rival].median / 1e3),
-            float(np.median([of[rival] / of[us] for of in middle])),
-            worked[rival] / max(worked[us], 1e-9),  # its clock may be a coarse one
-            times[rival].p99,
-        )
-        for rival, case in chosen.items()
-        if rival != us
-    }
-    case = chosen[us]
-    return Row(case.name, case.value(times[us].median / 1e3), case.unit, case.count, times[us], beside)
+    chosen = dict[str, Case]()
+    for rival, rival_cases in cases.items():
+        fastest = _fastest(rival, rival_cases, seconds, must=rival == us)
+        if fastest is not None:
+            chosen[rival] = fastest
+    # all in turn, so that what else runs disturbs all alike
+    rounds = {rival: list[Taken]() for rival in chosen}
+    for _ in range(ROUNDS):
+        for rival, case in chosen.items():
+            rounds[rival].append(taken(case.call, seconds / ROUNDS))
+    ours = chosen.pop(us)
+    beside = {rival: _beside(case, rounds[rival], ours, rounds[us]) for rival, case in chosen.items()}
+    times = Times.of(rounds[us])
+    return Row(ours.name, ours.value(times.median / 1e3), ours.unit, ours.count, times, beside)
+
+
+def _beside(case: Case, rounds: Sequence[Taken], ours: Case, our_rounds: Sequence[Taken]) -> Beside:
+    """A case of torch's beside ours, each by its rounds."""
+    ratios = list[float]()
+    for calls, our_calls in zip(rounds, our_rounds, strict=True):
+        ratios.append((np.median(calls.wall) / case.count) / (np.median(our_calls.wall) / ours.count))
+    times = Times.of(rounds)
+    worked = times.processor / case.count
+    our_work = max(Times.of(our_rounds).processor / ours.count, 1e-9)  # its clock may be a coarse one
+    return Beside(case.value(times.median / 1e3), float(np.median(ratios)), worked / our_work, times.p99)
 
 
 def _fastest(rival: str, cases: Sequence[Case], seconds: float, must: bool) -> Case | None:
@@ -148,7 +160,3 @@ def _fastest(rival: str, cases: Sequence[Case], seconds: float, must: bool) -> C
         log.warning("%s: %s is left out: %s", cases[0].name, rival, str(error).strip().partition("\n")[0])
         return None
     return cases[int(np.argmax(speed))]
-
-
-def _joined(parts: Sequence[Taken]) -> Taken:
-    return Taken(np.concatenate([part.wall for part in parts]), sum(part.processor for part in parts))

@@ -64,12 +64,11 @@ def profiled(options: SessionOptions, call_of: Callable[[SessionOptions], Call],
         taken = time.perf_counter() - start
         del call
         gc.collect()  # a session writes its profile when it ends
-        events = [
-            event
-            for file, since in zip(sorted(Path(folder).iterdir()), begun, strict=True)
-            for event in json.loads(file.read_text(encoding="utf-8"))
-            if event["ts"] / 1e6 > start - PAUSE - since
-        ]
+        events = list[dict[str, Any]]()
+        for file, since in zip(sorted(Path(folder).iterdir()), begun, strict=True):
+            earliest = start - PAUSE - since
+            recorded = json.loads(file.read_text(encoding="utf-8"))
+            events += [event for event in recorded if event["ts"] / 1e6 > earliest]
     return _summed(events, taken, count)
 
 
@@ -82,7 +81,7 @@ def with_profiles(
 ) -> list[Row]:
     """The rows with operations, the share of the machine's ceiling, and where the time goes, by profiles of
     ``seconds``."""
-    found = []
+    profiled_rows = []
     for row in rows:
 
         def call_of(options_of_call: SessionOptions, name: str = row.name, batch: int = row.batch) -> Call:
@@ -92,8 +91,8 @@ def with_profiles(
         share = None
         if profile.operations and row.times is not None:
             share = profile.operations / row.times.median / 1e6 / machine.peak(options.threads)
-        found.append(replace(row, gflop=profile.operations / 1e9, share=share, parts=profile.parts))
-    return found
+        profiled_rows.append(replace(row, gflop=profile.operations / 1e9, share=share, parts=profile.parts))
+    return profiled_rows
 
 
 def _summed(events: list[dict[str, Any]], taken: float, count: int) -> Profile:

@@ -214,17 +214,22 @@ class DescribeModel(LanguageModel):
         least = self.known.settings.sure
         answers = list[list[Description]]()
         for start in range(0, len(motions), AT_ONCE):
-            frames = [self.frames(motion) for motion in motions[start : start + AT_ONCE]]
-            # one by one: padding changes how sums round
-            vectors = [self.contexts([values], "space")[0] for values in frames]
-            lengths = [len(values) / self.fps for values in frames]
-            paths = [path_of(values, self.contract) for values in frames]
-            seen = [Seen(*row) for row in zip(vectors, lengths, *zip(*paths, strict=True), strict=True)]
-            for row in self.known.answers(seen, count):
-                likely = [(text, math.log(max(chance, LEAST)), chance) for text, chance in row]
-                answers.append([Description(*scored, scored[2] >= least) for scored in likely])
+            for row in self.known.answers(self._seen(motions[start : start + AT_ONCE]), count):
+                descriptions = []
+                for text, chance in row:
+                    descriptions.append(Description(text, math.log(max(chance, LEAST)), chance, chance >= least))
+                answers.append(descriptions)
             progress(len(answers), len(motions))
         return answers
+
+    def _seen(self, motions: Sequence[Motion]) -> list[Seen]:
+        """Motions as known ones are compared with them."""
+        seen = list[Seen]()
+        for motion in motions:
+            frames = self.frames(motion)
+            (vector,) = self.contexts([frames], "space")  # alone: padding changes how sums round
+            seen.append(Seen(vector, len(frames) / self.fps, *path_of(frames, self.contract)))
+        return seen
 
     def timeline(self, motion: Motion, *, progress: Progress = silent) -> list[Part]:
         """What happens in a motion of any length: consecutive parts, each with its best description.
@@ -237,23 +242,30 @@ class DescribeModel(LanguageModel):
         MotionError like :meth:`frames`, except for long motions.
         """
         motion = self.on_figure(motion).resample(self.fps)
+        cuts_of = self._written_cuts if self.known is None else self._known_cuts
+        return self._parts(motion, cuts_of(motion, progress))
+
+    def _known_cuts(self, motion: Motion, progress: Progress) -> list[int]:
+        """The frames at which the kind of action changes, by known motions."""
+        assert self.known is not None
+        settings = self.known.settings
+        spans = windows(len(motion), motion.fps, TimelineSettings(settings.window, settings.hop))
+        return edges(spans, best_path(self._kinds(motion, spans, progress), settings.change * 0.5 / settings.hop))
+
+    def _written_cuts(self, motion: Motion, progress: Progress) -> list[int]:
+        """The frames at which the sentence that is written changes."""
         settings = self.settings(TimelineSettings)
-        beam = self.LOOPS["beam"]
-        if self.known is not None:
-            known_settings = self.known.settings
-            spans = windows(len(motion), motion.fps, TimelineSettings(known_settings.window, known_settings.hop))
-            path = best_path(self._kinds(motion, spans, progress), known_settings.change * 0.5 / known_settings.hop)
-            return self._parts(motion, edges(spans, path))
         spans = windows(len(motion), motion.fps, settings)
-        # windows have one length, and so are one group
+        # the best sentence of each window; windows have one length, and so are one group
+        beam = self.LOOPS["beam"]
         encoded = self._encoded([self.frames(motion[start:stop]) for start, stop in spans])
         likeliest = self._hypotheses(beam, encoded, beam.defaults(self.manifest.defaults))
         ids = self.vocabulary.ids
         sentences = [(ids[SOS], *best.ids, ids[EOS]) for best, *_ in likeliest]
+        # each sentence scored for the windows around its own
         near = round(settings.near / settings.hop)
-        step = self.graphs["step"]
-        scores = near_scores(step, encoded[0].contexts, sentences, near, progress)
-        return self._parts(motion, edges(spans, best_path(scores, settings.change)))
+        scores = near_scores(self.graphs["step"], encoded[0].contexts, sentences, near, progress)
+        return edges(spans, best_path(scores, settings.change))
 
     def _kinds(self, motion: Motion, spans: Sequence[tuple[int, int]], progress: Progress) -> Iterator[Array]:
         """Of each window in turn the log-probabilities (Q,) of the sets of kinds of action."""

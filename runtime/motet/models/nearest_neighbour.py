@@ -87,16 +87,17 @@ class Known:
     """T known motions with A actions and S sentences, which name K kinds of action.
 
     vectors: (T, V, E) int8, V views of each motion, unit vectors times 127. actions: (T,) that of each motion.
-    shown: (A, K) 2 where an action shows a kind, 1 where one may say so, else 0. sentences: S of them. said: (S,) the
-    action that each is about. names: (S, K) whether it names a kind. ways: (S, 3), where it says that somebody goes,
-    the degrees that it gives, and whether it is about going and nothing else. All as in the bundle's tables.
+    shown: (A, K) 2 where an action shows a kind, 1 where one may say so, else 0. sentences: S of them.
+    sentence_actions: (S,) the action that each is about. names: (S, K) whether it names a kind. ways: (S, 3), where it
+    says that somebody goes, the degrees that it gives, and whether it is about going and nothing else. All as in the
+    bundle's tables.
     """
 
     vectors: NDArray[np.int8]
     actions: NDArray[np.int16]
     shown: NDArray[np.uint8]
     sentences: tuple[str, ...]
-    said: NDArray[np.int16]
+    sentence_actions: NDArray[np.int16]
     names: NDArray[np.uint8]
     ways: NDArray[np.int16]
     settings: AnswerSettings = AnswerSettings()
@@ -131,10 +132,10 @@ class Known:
         return right
 
     @cached_property
-    def _told(self) -> Array:
+    def _named(self) -> Array:
         """Which sets of kinds sentences about which actions name (A, Q)."""
         names = np.zeros(self._right.shape)
-        names[self.said, self._kinds[1]] = 1
+        names[self.sentence_actions, self._kinds[1]] = 1
         return names
 
     def near(self, vectors: Floats) -> tuple[Array, Array]:
@@ -154,7 +155,7 @@ class Known:
     def shares(self, counted: Array) -> Array:
         """Of each set of kinds (N, Q) the share of near motions that it is right about; 0 where none of them is said to
         show it."""
-        return np.where(counted @ self._told > 0, counted @ self._right, 0.0)
+        return np.where(counted @ self._named > 0, counted @ self._right, 0.0)
 
     def answers(self, seen: Sequence[Seen], count: int = 1) -> list[list[Answer]]:
         """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of
@@ -185,9 +186,9 @@ class Known:
     def _sentence(self, kinds: int, counted: Array, seen: Seen) -> str:
         """The sentence that names a set of kinds: one whose way fits if there is any, and of these the one of the
         action that counts most. If it is about going, what it lacks of the way is added."""
-        rows = np.flatnonzero((self._kinds[1] == kinds) & (counted[self.said] > 0))
+        rows = np.flatnonzero((self._kinds[1] == kinds) & (counted[self.sentence_actions] > 0))
         fits, side = self._fits(rows, seen.turn)
-        best = int(rows[np.lexsort((-counted[self.said[rows]], -fits))[0]])
+        best = int(rows[np.lexsort((-counted[self.sentence_actions[rows]], -fits))[0]])
         text = self.sentences[best]
         way, _, going = self.ways[best]
         if going and seen.ahead <= -self.settings.backwards and not BACKWARDS.search(text):
@@ -251,9 +252,10 @@ def known_of(model: BundleModel) -> Known:
         table("known_ways", "SENTENCES 3", "int16"),
         model.settings(AnswerSettings),
     )
-    for name, rows in (("known_actions", known.actions), ("known_said", known.said)):
+    for name, rows in (("known_actions", known.actions), ("known_said", known.sentence_actions)):
         if not len(rows) or rows.min() < 0 or rows.max() >= len(known.shown):
             raise BundleError(f"manifest, tables: {name!r} has numbers that are none of {len(known.shown)} actions")
-    if len(text) != len(known.said) or not known.vectors.size:
-        raise BundleError(f"manifest, tables: 'known_sentences' has {len(text)} lines, expected {len(known.said)}")
+    count = len(known.sentence_actions)
+    if len(text) != count or not known.vectors.size:
+        raise BundleError(f"manifest, tables: 'known_sentences' has {len(text)} lines, expected {count}")
     return known

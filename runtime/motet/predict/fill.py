@@ -121,27 +121,23 @@ class FillModel(BundleModel):
 
     def _span(self, motion: Motion, gap: Gap) -> tuple[int, int]:
         """The frames of a gap."""
-        try:
-            start, stop = map(float, gap)
-        except (TypeError, ValueError) as error:
-            raise MotionError(f"a gap is two numbers in seconds, such as (1.0, 2.0), not {gap!r}") from error
+        start, stop = _seconds_of(gap)
         text = f"the gap {start:g}:{stop:g} s"
         whole = f"the motion of {motion.duration:g} s"
-        if not (np.isfinite([start, stop]).all() and start < stop):
-            raise MotionError(f"{text} is empty: it must start before it stops")
         if start < 0 or stop > motion.duration + 0.5 / motion.fps:
             raise MotionError(f"{text} is not within {whole}")
         first = round(start * motion.fps)
         last = round(stop * motion.fps)
-        after = "a gap needs frames after it (motet predict continues)"
-        for wrong, reason in (
-            (first == last, f"has no frame at {motion.fps:g} fps: make it longer"),
-            (first == 0, f"is at the very start of {whole}: a gap needs frames before it"),
-            (last >= len(motion), f"is at the very end of {whole}: {after}"),
-            (stop - start > self.seconds + 1e-9, f"is too long: at most {self.seconds:g} s can be filled"),
-        ):
-            if wrong:
-                raise MotionError(f"{text} {reason}")
+        if first == last:
+            raise MotionError(f"{text} has no frame at {motion.fps:g} fps: make it longer")
+        if first == 0:
+            raise MotionError(f"{text} is at the very start of {whole}: a gap needs frames before it")
+        if last >= len(motion):
+            raise MotionError(
+                f"{text} is at the very end of {whole}: a gap needs frames after it (motet predict continues)"
+            )
+        if stop - start > self.seconds + 1e-9:
+            raise MotionError(f"{text} is too long: at most {self.seconds:g} s can be filled")
         return first, last
 
     def join(self, first: Motion, second: Motion, *, seconds: float = JOIN_SECONDS) -> Motion:
@@ -254,3 +250,14 @@ class FillModel(BundleModel):
         figure = on_humanoid(sides)
         frames = placed(figure)
         return sides, figure, frames[: len(past)], frames[len(past) :]
+
+
+def _seconds_of(gap: Gap) -> tuple[float, float]:
+    """The start and the stop of a gap in seconds; MotionError for anything else, and for one that is empty."""
+    try:
+        start, stop = map(float, gap)
+    except (TypeError, ValueError) as error:
+        raise MotionError(f"a gap is two numbers in seconds, such as (1.0, 2.0), not {gap!r}") from error
+    if not (np.isfinite([start, stop]).all() and start < stop):
+        raise MotionError(f"the gap {start:g}:{stop:g} s is empty: it must start before it stops")
+    return start, stop

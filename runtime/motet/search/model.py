@@ -135,7 +135,7 @@ class Member:
     @property
     def name(self) -> str:
         """The path, with the clip if there is one."""
-        return f"{self.path}{MARK}{self.clip}" if self.clip else self.path
+        return f"{self.path}{MARK}{self.clip}" if self.clip else str(self.path)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -261,8 +261,8 @@ class Index:
         while done < len(scores):
             best = self.model.loop.run(scores, count)[done:].tolist()
             yield from best
-            done = done + len(best)
-            count = 16 * count
+            done += len(best)
+            count *= 16
 
 
 def direction(model: SearchModel, motion: Motion) -> Floats:
@@ -299,8 +299,8 @@ def _renewed(
         rows += known.get(file.state) or next(embedded)
         progress(done, len(paths))
     members, vectors = zip(*rows, strict=True)
-    known_paths = sorted({path for path, _, _ in known})
-    vanished = tuple(folder / path for path in known_paths if not (folder / path).exists())
+    known_paths = [folder / path for path in sorted({path for path, _, _ in known})]
+    vanished = tuple(path for path in known_paths if not path.exists())
     return Index(model, folder, members, np.concatenate(vectors), vanished, unit, shard)
 
 
@@ -329,21 +329,24 @@ def _embedded(folder: Path, file: Member, model: SearchModel, unit: str | float 
         names = clips(path)
     except MotetError:  # it is said when the file is read
         names = ()
-    entries = []
-    for member in [replace(file, clip=name) for name in names] if len(names) > 1 else [file]:
-        try:
-            motion = read_motion(path, unit=unit, clip=member.clip or None)
-            in_place = is_in_place(motion)
-            motion = with_travel(motion) if in_place else motion
-            parts = model.windows(motion, model.settings(IndexSettings).window)
-            vectors = model.embed([part for _, part in parts])
-            windows = tuple((start, start + part.duration) for start, part in parts)
-            entries.append((replace(member, windows=windows, in_place=in_place), vectors))
-        except MotetError as error:
-            hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
-            fault = str(error).removeprefix(f"{path}: ") + hint
-            entries.append((replace(member, fault=fault), np.empty((0, model.sizes["E"]), np.float32)))
-    return entries
+    members = [replace(file, clip=name) for name in names] if len(names) > 1 else [file]
+    return [_embedded_member(path, member, model, unit) for member in members]
+
+
+def _embedded_member(path: Path, member: Member, model: SearchModel, unit: str | float | None) -> tuple[Member, Floats]:
+    """A member with its windows and their vectors, or with the reason for none."""
+    try:
+        motion = read_motion(path, unit=unit, clip=member.clip or None)
+        in_place = is_in_place(motion)
+        motion = with_travel(motion) if in_place else motion
+        parts = model.windows(motion, model.settings(IndexSettings).window)
+        vectors = model.embed([part for _, part in parts])
+    except MotetError as error:
+        hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
+        fault = str(error).removeprefix(f"{path}: ") + hint
+        return replace(member, fault=fault), np.empty((0, model.sizes["E"]), np.float32)
+    windows = tuple((start, start + part.duration) for start, part in parts)
+    return replace(member, windows=windows, in_place=in_place), vectors
 
 
 def _keep(index: Index, file: Path, needed: bool) -> None:
