@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 121
+MOST_LARGE_FUNCTIONS = 116
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 33
+MOST_BANNED_NAMES = 30
 MOST_TUPLE_ASSIGNMENTS = 5
-MOST_NESTED_COMPREHENSIONS = 23
+MOST_NESTED_COMPREHENSIONS = 17
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
