@@ -248,15 +248,15 @@ class TDBNConfig:
         rbm = Learning(1000, temperature=(1.0, 1.0))
         crbm = Learning(100, temperature=(1.0, 1.0))
         net = TDBNConfig(root_rotation=False, control_units=7, gait_units=20, rbm=rbm, crbm=crbm)
-        return replace(net.pure().unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
+        return replace(net.unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
 
     def pure(self) -> "TDBNConfig":
         """The recipe whose windows borrow nothing, with its choice among six nets on two RBMs."""
         return replace(self, borrowed_past=0.0, borrowed_control=0.0, onset=100.0, restarts=2, tries=3, rounds=1)
 
     def unclamped(self) -> "TDBNConfig":
-        """The same recipe with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
-        return replace(self, clamped=False, restarts=1, tries=1, rounds=1)
+        """:meth:`pure` with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
+        return replace(self.pure(), clamped=False, restarts=1, tries=1)
 
 
 class TDBN(ControlNet):
