@@ -168,6 +168,7 @@ def _held_or_faded(
 
 def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float) -> tuple[Part, Part]:
     """How far the point that bears a foot has moved over the ground since the last tick, along x and z."""
+    # the point that bears the foot: its move is what the lock takes away, so heel and toes may turn about it
     heel, ball, tip = sole
     # the ball bears the foot, unless the heel or the tip is lower by ``bears``
     move_x = ball[0] - sole_before[3]

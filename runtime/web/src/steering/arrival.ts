@@ -1,4 +1,4 @@
-/* Figures that go along paths and arrive at their ends, as motet/steering/arrival.py says. Metres, seconds, radians; x and z. */
+/* Figures that go along paths and arrive at their ends, as motet/steering/paths.py says. Metres, seconds, radians; x and z. */
 import type { arrivalSettings } from "../generated.js";
 import type { Playback } from "./matching.js";
 import type { Settings } from "../settings.js";

@@ -1,4 +1,4 @@
-/* Commands of figures that are on their way to a point, and of those that keep apart, tick by tick: motet/steering/path_following.py. */
+/* Commands of figures that are on their way to a point, and of those that keep apart, tick by tick: motet/steering/paths.py. */
 import { aside, keptApart } from "./avoidance.js";
 import { faces, onward, settle } from "./arrival.js";
 import type { Command, Gaits } from "./gaits.js";
