@@ -47,7 +47,7 @@ from motet_train.runs import About, Run
 SETTINGS = """
 [model]
 hidden_per_part = 8
-own = 3
+unrolled = 3
 rbm = {epochs = 2, rate = 0.01}
 crbm = {epochs = 2, rate = 0.01}
 """
