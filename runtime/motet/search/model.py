@@ -299,8 +299,8 @@ def _renewed(
         rows += known.get(file.state) or next(embedded)
         progress(done, len(paths))
     members, vectors = zip(*rows, strict=True)
-    known_paths = [folder / path for path in sorted({path for path, _, _ in known})]
-    vanished = tuple(path for path in known_paths if not path.exists())
+    known_paths = sorted({path for path, _, _ in known})
+    vanished = tuple(folder / path for path in known_paths if not (folder / path).exists())
     return Index(model, folder, members, np.concatenate(vectors), vanished, unit, shard)
 
 
