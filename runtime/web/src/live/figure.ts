@@ -1,11 +1,10 @@
 /* The model of a live page, and its figures. */
 import { doing, type Doing } from "../steering/actionLayer.js";
 import { type Act, motionOf } from "../steering/acts.js";
-import type { Going } from "../steering/arrival.js";
 import { ControlModel } from "../steering/model.js";
 import type { Manifest } from "../bundle/bundle.js";
 import { HUMANOID, SIDES } from "../figures/humanoid/bones.js";
-import { lead } from "../steering/pathFollowing.js";
+import { type Going, lead } from "../steering/paths.js";
 import type { Tables } from "../steering/matching.js";
 import { worldOf } from "../motion/motion.js";
 import type { Pose as Ground } from "../motion/planar.js";

@@ -11,7 +11,7 @@ import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
 import { stick } from "./stick.js";
 import { type Act, actOf, numbersOf } from "../steering/acts.js";
-import type { Going } from "../steering/arrival.js";
+import type { Going } from "../steering/paths.js";
 import { onceOf, orderOf, saysAll } from "./words.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */

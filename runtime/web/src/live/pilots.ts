@@ -1,5 +1,5 @@
 /* Who steers the first figure while no hand does: a figure of eight, a point to go to, or an order. */
-import { type Going, sent } from "../steering/arrival.js";
+import { type Going, sent } from "../steering/paths.js";
 import { type Asked, type Figure, inRange } from "./figure.js";
 import { fastest, type Net, towards, usual } from "./crowd.js";
 

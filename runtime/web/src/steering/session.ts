@@ -2,14 +2,13 @@
 import { CONTROL, TARGETS } from "../generated.js";
 import { doing, type Doing, noAct } from "./actionLayer.js";
 import { type Act, actOf, numbersOf } from "./acts.js";
-import { type Point, sent } from "./arrival.js";
 import type { ControlModel, StartSettings } from "./model.js";
 import { ControlError } from "../errors.js";
 import { after, eventsOf, type FigureEvent } from "./events.js";
 import { newLock } from "./footLock.js";
 import { type Command, changed } from "./gaits.js";
 import { BONES, SIDES } from "../figures/humanoid/bones.js";
-import { lead } from "./pathFollowing.js";
+import { lead, type Point, sent } from "./paths.js";
 import type { Target } from "./matching.js";
 import type { Motion } from "../motion/motion.js";
 import type { Pose } from "../representation/poses.js";

@@ -8,7 +8,7 @@ import type {
   reachSettings,
 } from "../generated.js";
 import { type Acting, type ActingModel, begin, laid, noAct } from "./actionLayer.js";
-import type { Going } from "./arrival.js";
+import type { Going } from "./paths.js";
 import type { Happenings } from "./events.js";
 import { held, type Lock, newLock } from "./footLock.js";
 import type { Command, Gaits } from "./gaits.js";
