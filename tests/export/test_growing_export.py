@@ -130,7 +130,7 @@ def test_a_step_that_grows_is_that_of_torch(net: Transformer, step: bytes) -> No
     limits = Limits(*(WORDS.index(word) for word in (SOS, EOS)), 3, [WORDS.index(word) for word in (PAD, SOS, UNK)])
     contexts = np.random.default_rng(0).normal(size=(5, WIDTH)).astype(np.float32)
     every = [ids for length in range(4) for ids in product(range(len(SPECIALS), len(WORDS)), repeat=length)]
-    for context, found in zip(contexts, beam_search(graph, contexts, limits, len(every)), strict=True):
+    for context, found in zip(contexts, beam_search(graph, {"context": contexts}, limits, len(every)), strict=True):
         wanted = {ids: log_probability(net, context, ids, limits) for ids in every}
         assert found[0].ids == max(wanted, key=wanted.__getitem__)
         for ids, score, _ in found:

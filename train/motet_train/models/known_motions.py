@@ -65,7 +65,8 @@ class KnownMotions(Net):
         net.scale = writer.scale.clone()
         # fill them
         for name in net.known_tables:
-            table = letters if name == "sentences" else torch.from_numpy(getattr(known, name))
+            field = "sentence_actions" if name == "said" else name
+            table = letters if name == "sentences" else torch.from_numpy(getattr(known, field))
             getattr(net, f"known_{name}").copy_(table)
         return net
 
