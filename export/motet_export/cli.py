@@ -55,11 +55,10 @@ def _rewrite(bundle: Bundle, out: Path, back: bool, golden: bool) -> None:
 
 def _runs(folder: Path, out: Path) -> dict[Path, Run]:
     """The runs to export, by the path of the bundle: a single run, or those in the subfolders that are models."""
-    verbs = {kind.VERB for kind in KINDS}
     runs = {}
     for manifest in sorted(folder.glob(f"*/{MANIFEST}")):
         run = Run.load(manifest.parent)
-        if run.manifest["verb"] in verbs:
+        if run.manifest["verb"] in KINDS:
             runs[out / f"{manifest.parent.name}.zip"] = run
     if (folder / MANIFEST).is_file() or not runs:
         return {out: Run.load(folder)}

@@ -211,7 +211,7 @@ def test_bad_input_gets_one_message_and_writes_nothing(
 
 def test_the_runtime_imports_neither_torch_nor_onnx() -> None:
     heavy = "{'torch', 'onnx', 'scipy', 'matplotlib'}"
-    code = f"import motet, motet.cli.motions, motet.cli.files, sys; print(sorted({heavy} & set(sys.modules)))"
+    code = f"import motet, motet.cli.predict, motet.cli.convert, sys; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

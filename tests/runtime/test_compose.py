@@ -11,8 +11,8 @@ from command_line import run
 
 import motet
 from motet import Moment
-from motet.compose.compose import met
-from motet.compose.plans import parse_plan, read_plan
+from motet.composition.compose import met
+from motet.composition.plans import parse_plan, read_plan
 from motet.motion import HUMANOID, Motion, positions
 from motet.motion.rotations import Array
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motet.compose.keys import Key, Moves
+from motet.composition.keys import Key, Moves
 from motet.errors import MotionError
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from motet.bundle.fields import LARGEST, Fields
@@ -25,6 +24,10 @@ PACKAGES = {
 """The builds of ONNX Runtime that have a provider which the plain one lacks, by its name in small letters."""
 
 
+CPU = "CPUExecutionProvider"
+"""The provider that every build of ONNX Runtime has."""
+
+
 @dataclass(frozen=True)
 class SessionOptions:
     """Options of every session of a model; the default is one thread of the CPU.
@@ -40,7 +43,7 @@ class SessionOptions:
     """
 
     threads: int = 1
-    providers: tuple[str, ...] = ("CPUExecutionProvider",)
+    providers: tuple[str, ...] = (CPU,)
     provider_options: tuple[Mapping[str, str], ...] = ()
     configure: Callable[[Any], None] | None = None
 
@@ -48,13 +51,11 @@ class SessionOptions:
         checked_int("threads", self.threads, 1, MAX_THREADS)
         if isinstance(self.providers, str):
             raise SettingError(f"providers must be a tuple of names, such as ({self.providers!r},)")
-        # a provider that this build lacks is refused, with the package that has it
-        available = onnxruntime.get_available_providers()
         for provider in self.providers:
-            if provider not in available:
-                package = PACKAGES.get(provider.removesuffix("ExecutionProvider").lower())
+            if provider != CPU and provider not in _available():
+                package = PACKAGES.get(_short(provider))
                 remedy = f"; in place of onnxruntime:  pip install {package}" if package else ""
-                known = ", ".join(available)
+                known = ", ".join(_available())
                 raise SettingError(f"ONNX Runtime has no provider {provider!r} here; available: {known}{remedy}")
         # options are one mapping for each provider, or none
         of_each = self.provider_options
@@ -65,6 +66,8 @@ class SessionOptions:
 
     def session(self, model: bytes) -> Any:
         """A session of ONNX Runtime for a model in memory; raises what ONNX Runtime raises."""
+        import onnxruntime
+
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = int(self.threads)
         options.inter_op_num_threads = 1
@@ -75,6 +78,23 @@ class SessionOptions:
         options.add_session_config_entry("session.load_model_format", "ONNX")  # the one that was checked
         provider_options = [dict(provider) for provider in self.provider_options] or None
         return onnxruntime.InferenceSession(model, options, list(self.providers), provider_options, enable_fallback=0)
+
+
+def _available() -> list[str]:
+    """The providers of this build of ONNX Runtime, which is imported as late as here: it takes a tenth of a second."""
+    import onnxruntime
+
+    providers: list[str] = onnxruntime.get_available_providers()
+    return providers
+
+
+def _short(provider: str) -> str:
+    return provider.removesuffix("ExecutionProvider").lower()
+
+
+def provider_of(name: str) -> str:
+    """A provider of this build by its name in letters of any case, with or without its ending; else the name."""
+    return next((provider for provider in _available() if _short(provider) == _short(name)), name)
 
 
 Arrays = Mapping[str, NDArray[Any]]

@@ -10,26 +10,25 @@ from typing import Any
 
 import click
 
-from motet.cli.options import StderrHandler, log
 from motet.errors import MotetError
 
 COMMANDS = {
-    "describe": ("motet.cli.language", "", "Describe motions in ranked sentences."),
-    "generate": ("motet.cli.language", "", "Generate motions from sentences."),
-    "compose": ("motet.cli.language", "", "Compose motions: prompts, places and poses at given times."),
-    "predict": ("motet.cli.motions", "", "Predict how motions continue."),
-    "fill": ("motet.cli.motions", "", "Fill gaps of motions, and close loops."),
-    "join": ("motet.cli.motions", "", "Join two motions by a transition."),
-    "control": ("motet.cli.motions", "", "Run a script such as 'walk 3s, run 3s'."),
+    "describe": ("motet.cli.describe", "", "Describe motions in ranked sentences."),
+    "generate": ("motet.cli.generate", "", "Generate motions from sentences."),
+    "compose": ("motet.cli.compose", "", "Compose motions: prompts, places and poses at given times."),
+    "predict": ("motet.cli.predict", "", "Predict how motions continue."),
+    "fill": ("motet.cli.fill", "", "Fill gaps of motions, and close loops."),
+    "join": ("motet.cli.fill", "", "Join two motions by a transition."),
+    "control": ("motet.cli.control", "", "Run a script such as 'walk 3s, run 3s'."),
     "live": ("motet.cli.live", "", "Steer figures live: in a page, by a server, onto an avatar."),
-    "demo": ("motet.cli.live", "", "Write a folder of pages that show what the models do."),
+    "demo": ("motet.cli.demo", "", "Write a folder of pages that show what the models do."),
     "serve": ("motet.cli.serve", "serve", "Serve models over HTTP."),
-    "search": ("motet.cli.vectors", "", "Find motions in a folder by a sentence or a motion."),
-    "embed": ("motet.cli.vectors", "", "Write context vectors of motions or sentences."),
-    "check": ("motet.cli.files", "", "Say what motion files hold and how they are understood."),
-    "convert": ("motet.cli.files", "", "Convert motion files to other formats, rates, units."),
+    "search": ("motet.cli.search", "", "Find motions in a folder by a sentence or a motion."),
+    "embed": ("motet.cli.embed", "", "Write context vectors of motions or sentences."),
+    "check": ("motet.cli.check", "", "Say what motion files hold and how they are understood."),
+    "convert": ("motet.cli.convert", "", "Convert motion files to other formats, rates, units."),
     "merge": ("motet.cli.many", "", "Merge the answers that --parts wrote."),
-    "view": ("motet.cli.files", "", "Write a web page that plays a motion."),
+    "view": ("motet.cli.convert", "", "Write a web page that plays a motion."),
     "bundle": ("motet.cli.bundles", "", "List, inspect, verify and pack models (bundles)."),
     "bench": ("motet.cli.bench", "", "Measure how fast a model runs here."),
     "prepare": ("motet_train.cli.prepare", "train", "Turn motions and sentences into a store to train on."),
@@ -49,6 +48,14 @@ NEEDS = {
     "export": ("torch", "tqdm", "onnx", "onnxscript"),
 }
 """Extra -> the packages by which it is recognised."""
+
+
+class StderrHandler(logging.Handler):
+    """One line on stderr for each record."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print it."""
+        click.echo(f"motet: {self.format(record)}", err=True)
 
 
 class Commands(click.Group):
@@ -122,5 +129,6 @@ def missing(extra: str) -> list[str]:
 @click.version_option(package_name="motet")
 def main(quiet: bool, verbose: bool) -> None:
     """Models of human motion that describe, generate, predict and control."""
+    log = logging.getLogger("motet")
     log.handlers = [StderrHandler()]
     log.setLevel(logging.ERROR if quiet else logging.INFO if verbose else logging.WARNING)

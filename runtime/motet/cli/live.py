@@ -1,4 +1,4 @@
-"""``motet live``: a steered figure, as a page, by a server, or as messages for an avatar; ``motet demo``: pages."""
+"""``motet live``: a steered figure, as a page, by a server, or as messages for an avatar."""
 
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,6 @@ from motet.cli import missing
 from motet.cli.options import bundle_option, session_options
 from motet.files import check_place
 from motet.generate.base import GenerateModel
-from motet.live.demo import write_demo
 from motet.live.page import write_live_page
 from motet.models.load import load_as
 from motet.steering.model import SteerModel
@@ -64,19 +63,6 @@ def live(
         _serve(model, target, host, port=port, characters=characters, origins=origins, words=words)
     elif target is not None and script is not None:
         _follow(model, target, script)
-
-
-@click.command()
-@click.option("-o", "--out", type=click.Path(path_type=Path), required=True, help="New folder to write.")
-def demo(out: Path) -> None:
-    """Write a folder of pages that show what the models do, for any browser, offline: open its index.html.
-
-    \b
-    motet demo -o demo
-    """
-    write_demo(out)
-    size = sum(page.stat().st_size for page in out.iterdir())
-    click.echo(f"{out / 'index.html'}: {size / 1e6:.1f} MB in all")
 
 
 def _check(out: Path | None, port: int | None, osc: str | None, script: str | None) -> None:

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-import onnxruntime
 
-from motet.bundle.graph import MAX_THREADS, SessionOptions
+from motet.bundle.graph import MAX_THREADS, SessionOptions, provider_of
 from motet.corpus.answers import Answer, named
 from motet.errors import (
     ControlWarning,
@@ -52,21 +51,10 @@ def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )
     @functools.wraps(command)
     def with_session(*args: Any, threads: int, providers: tuple[str, ...], **kwargs: Any) -> Any:
-        # ONNX Runtime's names, in letters of any case and without their ending
-        available: list[str] = onnxruntime.get_available_providers()
-        known = {name.removesuffix("ExecutionProvider").lower(): name for name in available}
-        chosen = [known.get(name.removesuffix("ExecutionProvider").lower(), name) for name in providers or ("CPU",)]
-        return command(*args, session=SessionOptions(threads, tuple(chosen)), **kwargs)
+        session = SessionOptions(threads, tuple(map(provider_of, providers))) if providers else SessionOptions(threads)
+        return command(*args, session=session, **kwargs)
 
     return with_session
-
-
-class StderrHandler(logging.Handler):
-    """One line on stderr for each record."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print it."""
-        click.echo(f"motet: {self.format(record)}", err=True)
 
 
 @contextmanager

@@ -2,54 +2,61 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import Literal, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Literal, TypeVar, cast, overload
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.golden import replay
 from motet.bundle.graph import Arrays, Graph, SessionOptions
 from motet.bundle.manifest import Manifest
 from motet.errors import ArgumentError, BundleError, quoted
-from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
-from motet.models.describe import DescribeModel
-from motet.papers.mixture_model import MixtureModel
-from motet.papers.tdbn_control import TdbnModel
-from motet.predict.fill import FillModel
-from motet.predict.model import PredictModel
-from motet.search.model import SearchModel
-from motet.steering.model import SteerModel
 
-# fmt: off
-KINDS: tuple[type[BundleModel], ...] = (
-    CodesModel, DescribeModel, FillModel, MixtureModel, PredictModel, SearchModel, SteerModel, TdbnModel,
-)
-# fmt: on
-"""All kinds of models; benchmarks and comparisons register a function for each."""
+if TYPE_CHECKING:
+    from motet.generate.model import CodesModel
+    from motet.models.describe import DescribeModel
+    from motet.papers.mixture_model import MixtureModel
+    from motet.papers.tdbn_control import TdbnModel
+    from motet.predict.fill import FillModel
+    from motet.predict.model import PredictModel
+    from motet.search.model import SearchModel
+    from motet.steering.model import SteerModel
+
+KINDS = {
+    "control": {"matching": "steering.model.SteerModel", "session": "papers.tdbn_control.TdbnModel"},
+    "describe": {"beam": "models.describe.DescribeModel", "consensus": "models.describe.DescribeModel"},
+    "fill": {"between": "predict.fill.FillModel"},
+    "generate": {"codes": "generate.model.CodesModel", "mixture": "papers.mixture_model.MixtureModel"},
+    "predict": {"free_run": "predict.model.PredictModel"},
+    "search": {"nearest": "search.model.SearchModel"},
+}
+"""Verb -> loop of decoding -> the class of the model, imported where a bundle needs it; benchmarks and comparisons
+register a function for each."""
 
 Kind = TypeVar("Kind", bound=BundleModel)
 
 
 @overload
-def load(name_or_path: Literal["control"], options: SessionOptions | None = None) -> SteerModel: ...
+def load(name_or_path: Literal["control"], options: SessionOptions | None = None) -> "SteerModel": ...
 @overload
-def load(name_or_path: Literal["convseq2seq"], options: SessionOptions | None = None) -> PredictModel: ...
+def load(name_or_path: Literal["convseq2seq"], options: SessionOptions | None = None) -> "PredictModel": ...
 @overload
-def load(name_or_path: Literal["motion-to-language"], options: SessionOptions | None = None) -> DescribeModel: ...
+def load(name_or_path: Literal["motion-to-language"], options: SessionOptions | None = None) -> "DescribeModel": ...
 @overload
-def load(name_or_path: Literal["tdbn"], options: SessionOptions | None = None) -> TdbnModel: ...
+def load(name_or_path: Literal["tdbn"], options: SessionOptions | None = None) -> "TdbnModel": ...
 @overload
-def load(name_or_path: Literal["describe"], options: SessionOptions | None = None) -> DescribeModel: ...
+def load(name_or_path: Literal["describe"], options: SessionOptions | None = None) -> "DescribeModel": ...
 @overload
-def load(name_or_path: Literal["fill"], options: SessionOptions | None = None) -> FillModel: ...
+def load(name_or_path: Literal["fill"], options: SessionOptions | None = None) -> "FillModel": ...
 @overload
-def load(name_or_path: Literal["generate"], options: SessionOptions | None = None) -> CodesModel: ...
+def load(name_or_path: Literal["generate"], options: SessionOptions | None = None) -> "CodesModel": ...
 @overload
-def load(name_or_path: Literal["language-to-motion"], options: SessionOptions | None = None) -> MixtureModel: ...
+def load(name_or_path: Literal["language-to-motion"], options: SessionOptions | None = None) -> "MixtureModel": ...
 @overload
-def load(name_or_path: Literal["predict"], options: SessionOptions | None = None) -> PredictModel: ...
+def load(name_or_path: Literal["predict"], options: SessionOptions | None = None) -> "PredictModel": ...
 @overload
-def load(name_or_path: Literal["search"], options: SessionOptions | None = None) -> SearchModel: ...
+def load(name_or_path: Literal["search"], options: SessionOptions | None = None) -> "SearchModel": ...
 @overload
 def load(name_or_path: str | Path, options: SessionOptions | None = None) -> BundleModel: ...
 def load(name_or_path: str | Path, options: SessionOptions | None = None) -> BundleModel:
@@ -87,17 +94,15 @@ def build(manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None
 
 def kind_of(manifest: Manifest) -> type[BundleModel]:
     """The class of a manifest's verb and loop; BundleError for an unknown verb, or a loop of another verb."""
-    by_loop: dict[str, type[BundleModel]] = {}
-    for kind in KINDS:
-        if manifest.verb == kind.VERB:
-            by_loop |= dict.fromkeys(kind.LOOPS, kind)
-    if not by_loop:
-        verbs = ", ".join(sorted({kind.VERB for kind in KINDS}))
-        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {verbs}")
+    if manifest.verb not in KINDS:
+        raise BundleError(f"manifest, verb: {manifest.verb!r} is unknown; expected one of {', '.join(KINDS)}")
+    by_loop = KINDS[manifest.verb]
     if manifest.loop not in by_loop:
         loops = ", ".join(by_loop)
         raise BundleError(f"manifest, loop: {manifest.loop!r} does not {manifest.verb}; expected one of {loops}")
-    return by_loop[manifest.loop]
+    module, _, name = by_loop[manifest.loop].rpartition(".")
+    kind: type[BundleModel] = getattr(import_module(f"motet.{module}"), name)
+    return kind
 
 
 @dataclass(frozen=True)

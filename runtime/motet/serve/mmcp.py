@@ -15,9 +15,9 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from motet.compose.compose import compose
-from motet.compose.keys import Key, Moves
-from motet.compose.plans import APART, Moment
+from motet.composition.compose import compose
+from motet.composition.keys import Key, Moves
+from motet.composition.plans import APART, Moment
 from motet.errors import DecodingError, MotetError, MotionError
 from motet.figures.humanoid import HUMANOID, Figure, from_humanoid, leg_length
 from motet.generate.model import CodesModel

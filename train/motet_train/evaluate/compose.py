@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from motet.compose.compose import Met, compose, met, moved
-from motet.compose.plans import Moment, parse_plan
+from motet.composition.compose import Met, compose, met, moved
+from motet.composition.plans import Moment, parse_plan
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.generate.model import CodesModel

@@ -14,9 +14,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from motet.compose.keys import Key, Moves
-from motet.compose.plans import Moment, parse_plan, time_line
-from motet.compose.steered_segments import Leg, Walk, gait_of, walked
+from motet.composition.keys import Key, Moves
+from motet.composition.plans import Moment, parse_plan, time_line
+from motet.composition.steered_segments import Leg, Walk, gait_of, walked
 from motet.errors import MotionError, SettingError, needs
 from motet.figures.feet.hold import hold_feet
 from motet.figures.humanoid import BONES, HUMANOID, on_humanoid, sole_points

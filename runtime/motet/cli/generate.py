@@ -1,106 +1,23 @@
-"""``motet describe``, ``generate`` and ``compose``: from motion files to sentences, and back."""
+"""``motet generate``: motions from sentences."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.many import Many, many_options, print_list
 from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
-from motet.cli.reading import read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
-from motet.compose.compose import compose as composition_of
-from motet.compose.plans import parse_plan, read_plan
-from motet.corpus.answers import Answer, Describe, Timeline, to_json
-from motet.formats import READS, read_motion
+from motet.formats import read_motion
 from motet.generate.base import PLAYED, Generated, GenerateModel
 from motet.generate.model import CodesModel, Story
 from motet.models.load import load_as
-from motet.models.nearest_neighbour import NOTHING
 from motet.motion.looping import looped
 from motet.text.clauses import Passage
-
-
-@click.command(
-    help=f"""Describe motion files: sentences, the best first, each with its log-probability or, from a bundle of known
-    motions, the probability that it is right; with --draws, with how well it agrees with all sentences drawn (0 to 1).
-    A sentence after "?" is one that the model is not sure of; a bundle of known motions says "{NOTHING}" of a motion
-    like none of them.
-
-    Motions over 30 s are described in windows; with --timeline, motions of any length are cut
-    where what is done changes. Any human figure will do. Of a file of several clips all are described, or the one of
-    --clip or MOTION.glb#CLIP. Reads {READS}.
-    """
-)
-@click.argument("motions", nargs=-1, required=True, type=Path, metavar="MOTION|FOLDER|ZIP...")
-@bundle_option("describe")
-@click.option("--beams", type=click.IntRange(1, 100), help="Sentences to print. [default: the bundle's]")
-@click.option(
-    "--draws",
-    type=click.IntRange(0, 1000),
-    help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's; of describe: beam search]",
-)
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the samples.")
-@click.option("--timeline", is_flag=True, help="One sentence for each part of a motion, with its times.")
-@session_options
-@read_options
-@many_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list: each window or part with its input and seconds.")
-def describe(
-    motions: tuple[Path, ...],
-    bundle: str,
-    beams: int | None,
-    draws: int | None,
-    seed: int,
-    timeline: bool,
-    session: SessionOptions,
-    many: Many,
-    as_json: bool,
-) -> None:
-    """Describe motion files."""
-    if timeline and (beams, draws) != (None, None):
-        raise click.UsageError("--timeline gives one sentence for each part: it goes with neither --beams nor --draws")
-    settings = {"beams": beams, "draws": draws or None, "decoding": "beam" if draws == 0 else None, "seed": seed}
-    options = many.read.options, bundle, session
-    verb = Timeline(*options) if timeline else Describe(*options, settings)
-    sources = many.sources(motions)
-    if many.parts:
-        many.write_part(verb, sources, motions, "describing")
-    answers = many.answers(verb, sources, "describing")
-    if as_json:
-        rows = chain.from_iterable(answer.rows for answer in answers)
-        print_list(map(to_json, rows))
-    else:
-        for answer in answers:
-            for line in _told_of(answer, len(sources) > 1):
-                click.echo(line)
-    many.read.say_resampled(lambda: verb.model.fps)
-    many.tries.finish()
-
-
-def _told_of(answer: Answer, several: bool) -> Iterator[str]:
-    """The sentences of a motion, after its name if there are several."""
-    if several and answer.rows:
-        yield str(answer.source)
-    for row in answer.rows:
-        if "hypotheses" not in row:
-            yield f"{row['start']:.1f}-{row['stop']:.1f} s  {_told(row)}"
-            continue
-        if len(answer.rows) > 1:
-            yield f"{row['start']:.1f} to {row['stop']:.1f} s"
-        for hypothesis in row["hypotheses"]:
-            yield f"{hypothesis['score']:8.2f}  {_told(hypothesis)}"
-
-
-def _told(hypothesis: Mapping[str, Any]) -> str:
-    sure = hypothesis["confident"] or hypothesis["text"] == NOTHING
-    return str(hypothesis["text"]) if sure else f"? {hypothesis['text']}"
 
 
 @click.command()
@@ -236,7 +153,7 @@ def _written(
     hypotheses = []
     for result, place in results:
         motion = result.playable(output.fps or PLAYED, plant)
-        captions = _captions(result.passages) if isinstance(result, Story) else None
+        captions = captions_of(result.passages) if isinstance(result, Story) else None
         motion = output.write(place, looped(motion) if loop else motion, text, captions)
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
@@ -247,7 +164,7 @@ def _written(
     return {"input": text, "hypotheses": hypotheses}
 
 
-def _captions(passages: Iterable[Passage]) -> list[tuple[float, str]]:
+def captions_of(passages: Iterable[Passage]) -> list[tuple[float, str]]:
     """What a page says when: the sentences of a story."""
     return [(passage.start, passage.text) for passage in passages]
 
@@ -259,17 +176,17 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
             score = "" if likelihood is None else f", log-likelihood {likelihood:.1f}"
             yield f"{hypothesis['output']}: {size(hypothesis['frames'], hypothesis['fps'])}{score}: {row['input']}"
             if hypothesis["action"]:
-                yield f"  as: {hypothesis['action']}{_sure(hypothesis)}"
+                yield f"  as: {hypothesis['action']}{confidence_of(hypothesis)}"
             if hypothesis["action"] and (numbers := _numbers(hypothesis)):
                 yield f"  {numbers}"
             for passage in hypothesis.get("passages", ()):
                 numbers = "" if hypothesis["action"] else _numbers(passage)
                 numbers = numbers and f"; {numbers}"
-                shown = "" if hypothesis["action"] else f" (as: {passage['action']}{_sure(passage)}{numbers})"
+                shown = "" if hypothesis["action"] else f" (as: {passage['action']}{confidence_of(passage)}{numbers})"
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"
 
 
-def _sure(shown: Mapping[str, Any]) -> str:
+def confidence_of(shown: Mapping[str, Any]) -> str:
     """How sure the model is of what it shows, and the words that are left out."""
     without = ", ".join(f"'{word}'" for word in shown["lacking"])
     sure = "" if shown["confidence"] is None else f", confidence {shown['confidence']:.2f}"
@@ -281,50 +198,3 @@ def _numbers(hypothesis: Mapping[str, Any]) -> str:
     shown = {kind: f": {value:.3g} shown" for kind, value in hypothesis["measured"].items()}
     numbers = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in hypothesis["asked"].items())
     return numbers and f"asked: {numbers}"
-
-
-@click.command()
-@click.argument("plan", metavar="PLAN")
-@out_option
-@bundle_option("generate")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is drawn.")
-@click.option("--strict", is_flag=True, help="Fail on a prompt that the model knows only in part.")
-@write_options
-@session_options
-@click.option("--json", "as_json", is_flag=True, help="Print an object with the passages and what was met.")
-def compose(
-    plan: str,
-    out: Path,
-    bundle: str,
-    seed: int,
-    strict: bool,
-    output: Output,
-    as_json: bool,
-    session: SessionOptions,
-) -> None:
-    """Write a motion for PLAN: prompts at their times, and where to be, which way to face and which pose to have when.
-
-    PLAN is a JSON file, a list of moments such as {"at": 3, "place": [0, 3], "facing": 90, "text": "a person waves"},
-    or a script: "0s a person walks; 3s at 0 3 facing 90 a person waves; 4.5s pose kick.bvh@1.2; 6s". Places are x and
-    z in metres; the first moment is the start, the last one the end.
-    """
-    output.check(out)
-    moments = read_plan(plan) if Path(plan).suffix.lower() == ".json" else parse_plan(plan)
-    model = load_as(CodesModel, bundle, session)
-    with noted():
-        composed = composition_of(model, moments, seed=seed, strict=strict)
-    label = " / ".join(passage.text for passage in composed.passages)
-    motion = output.write(out, composed.motion, label, _captions(composed.passages))
-    output.finish()
-    facts = {"output": str(out), "frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
-    passages = [asdict(passage) for passage in composed.passages]
-    met = [outcome._asdict() for outcome in composed.met]
-    if as_json:
-        click.echo(json.dumps({**facts, "passages": passages, "met": met}))
-        return
-    click.echo(f"{out}: {size(len(motion), motion.fps)}")
-    for passage in composed.passages:
-        action = f"{passage.action}{_sure(vars(passage))}"
-        click.echo(f"  {passage.start:.1f}-{passage.stop:.1f} s {passage.text} (as: {action})")
-    for each in composed.met:
-        click.echo(f"  {each}")
