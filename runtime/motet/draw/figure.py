@@ -5,6 +5,7 @@ bodies of every skeleton are of one size. Nothing here knows a naming scheme: th
 on a joint, sides from mirrored names.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -19,6 +20,10 @@ from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton, sides_of
 
 COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
 """sRGB of 0 to 255; ``player.html`` has the same."""
+
+YAW = np.radians(40.0)
+PITCH = np.radians(12.0)
+"""Where the camera of pictures is: from which side of what a figure faces at first, and how far above."""
 
 SAME_SPOT = 1e-6
 """A joint nearer than this to its parent is on the same spot."""
@@ -87,33 +92,47 @@ class Body:
     @cached_property
     def bones(self) -> tuple[Bone, ...]:
         """A bone to each joint apart from its parent, the flanks, and the skull in place of what is inside it."""
-        joints = self.skeleton.joints
-        lengths = np.linalg.norm(self.skeleton.offsets, axis=1) / self.height
-        rest = self._rest
-        # how much body hangs on each joint: along a limb lengths add up, where limbs meet their squares
-        squares = np.zeros(len(joints))
-        squares[self.head] = 0.15**2  # the length that a head counts for in the thickness of the neck
-        for i in range(len(joints) - 1, 0, -1):
-            squares[joints[i].parent] += (lengths[i] + np.sqrt(squares[i])) ** 2
-        beyond = np.sqrt(squares)
-        bones = []
-        for i, joint in enumerate(joints):
-            parent = joint.parent
-            side = self.sides[i]
-            in_skull = i == self.head and self.head_is_tip
-            if not i or lengths[i] <= SAME_SPOT or in_skull or (self._in_trunk[i] and side != MIDDLE):
-                continue
-            thick, thin = (float(max(0.014, 0.07 * length**0.65)) for length in (lengths[i] + beyond[i], beyond[i]))
-            on_trunk = self._in_trunk[parent]
-            bones.append(Bone(parent, i, thick, thin, MIDDLE if on_trunk else side, (parent, parent)))
-            # a limb that hangs on the trunk above the root gets a flank down to the root
-            if on_trunk and side != MIDDLE and beyond[i] > 0.2 and np.linalg.norm(rest[parent]) > SAME_SPOT:
-                bones.append(Bone(i, 0, 0.8 * thick, thick, MIDDLE, (parent, 0)))
+        bones: list[Bone] = []
+        for joint in range(1, len(self.skeleton.joints)):
+            if self._is_drawn(joint):
+                bones += self._bones_to(joint)
         if self.head:
-            jaw = len(joints)
-            carrier = joints[self.head].parent
+            jaw = len(self.skeleton.joints)
+            carrier = self.skeleton.joints[self.head].parent
             bones.append(Bone(jaw, jaw + 1, SKULL[0][1], SKULL[1][1], MIDDLE, (carrier, carrier)))
         return tuple(bones) or (Bone(0, 0, 0.07, 0.07, MIDDLE, (0, 0)),)
+
+    def _is_drawn(self, joint: int) -> bool:
+        """Whether a bone leads to a joint: it is apart from its parent, not in the skull, and no side of the trunk."""
+        in_skull = joint == self.head and self.head_is_tip
+        beside_trunk = self._in_trunk[joint] and self.sides[joint] != MIDDLE
+        return bool(self._lengths[joint] > SAME_SPOT and not in_skull and not beside_trunk)
+
+    def _bones_to(self, joint: int) -> Iterator[Bone]:
+        """The bone from a joint's parent, and a flank down to the root from a limb that hangs on the trunk above it."""
+        parent = self.skeleton.joints[joint].parent
+        beyond = self._beyond[joint]
+        thick = _radius(self._lengths[joint] + beyond)
+        thin = _radius(beyond)
+        side = MIDDLE if self._in_trunk[parent] else self.sides[joint]
+        yield Bone(parent, joint, thick, thin, side, (parent, parent))
+        hangs = self._in_trunk[parent] and self.sides[joint] != MIDDLE and beyond > 0.2
+        if hangs and np.linalg.norm(self._rest[parent]) > SAME_SPOT:
+            yield Bone(joint, 0, 0.8 * thick, thick, MIDDLE, (parent, 0))
+
+    @cached_property
+    def _lengths(self) -> Array:
+        lengths: Array = np.linalg.norm(self.skeleton.offsets, axis=1) / self.height
+        return lengths
+
+    @cached_property
+    def _beyond(self) -> Array:
+        """How much body hangs on each joint: along a limb lengths add up, where limbs meet their squares."""
+        squares = np.zeros(len(self._lengths))
+        squares[self.head] = 0.15**2  # the length that a head counts for in the thickness of the neck
+        for i in range(len(squares) - 1, 0, -1):
+            squares[self.skeleton.joints[i].parent] += (self._lengths[i] + np.sqrt(squares[i])) ** 2
+        return np.sqrt(squares)
 
     @cached_property
     def _rest(self) -> Array:
@@ -130,12 +149,18 @@ class Body:
         """The points that bones join (..., P, 3), from positions of the joints (..., J, 3), all in heights."""
         if not self.head:
             return joints
-        head, below = (joints[..., i, :] for i in (self.head, self.skeleton.joints[self.head].parent))
+        head = joints[..., self.head, :]
+        below = joints[..., self.skeleton.joints[self.head].parent, :]
         direction = head - below
         direction = direction / np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-9)
         middle = (head + below) / 2 if self.head_is_tip else head
         skull = np.stack([middle + along * direction for along, _ in SKULL], axis=-2)
         return np.concatenate([joints, skull], axis=-2)
+
+
+def _radius(beyond: float) -> float:
+    """The radius of a bone at a place with this much body beyond it."""
+    return float(max(0.014, 0.07 * beyond**0.65))
 
 
 @dataclass(frozen=True)
@@ -169,12 +194,16 @@ def figure_of(motion: Motion) -> Figure:
     # a figure that moves up and down stands on y = 0 if its lowest point is that near
     stands = f"{skeleton.names[0]}.ty" in motion.channels and abs(lowest) < 0.1
     points[:, :, 1] -= 0.0 if stands else lowest
-    heading = 0.0
-    sides = np.array(body.sides)
-    if LEFT in body.sides:
-        to_left = points[0, sides == LEFT].mean(axis=0) - points[0, sides == RIGHT].mean(axis=0)
-        heading = float(np.arctan2(-to_left[2], to_left[0]))
-    return Figure(body.points(points), body.bones, heading, motion.fps)
+    return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
+
+
+def _heading(points: Array, sides: tuple[str, ...]) -> float:
+    """Where joints (J, 3) face, at right angles to the way from those of the right to those of the left."""
+    if LEFT not in sides:
+        return 0.0
+    of_side = np.array(sides)
+    to_left = points[of_side == LEFT].mean(axis=0) - points[of_side == RIGHT].mean(axis=0)
+    return float(np.arctan2(-to_left[2], to_left[0]))
 
 
 def first_of(motion: Motion) -> int:
@@ -199,3 +228,11 @@ def below(skeleton: Skeleton, first: int) -> Skeleton:
     """The skeleton from a joint on, on which all later ones hang."""
     joints = (replace(joint, parent=max(joint.parent - first, -1)) for joint in skeleton.joints[first:])
     return replace(skeleton, joints=tuple(joints))
+
+
+def camera_axes(yaw: float) -> Array:
+    """The axes (3, 3) of a camera of pictures: to its right, up, and towards it; yaw in radians about y, 0 looks at
+    the +z side."""
+    toward = np.array([np.cos(PITCH) * np.sin(yaw), np.sin(PITCH), np.cos(PITCH) * np.cos(yaw)])
+    right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
+    return np.stack([right, np.cross(toward, right), toward])

@@ -10,17 +10,23 @@ import io
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
-from motet.draw.figure import COLOURS, Bone, figure_of
+from motet.draw.figure import COLOURS, YAW, Bone, camera_axes, figure_of
 from motet.files import File, write_whole
 from motet.motion.motion import Motion, resampled
 from motet.motion.rotations import Array
 
 Colour = tuple[int, int, int]
 
-YAW = np.radians(40.0)
-"""Camera yaw relative to the figure's facing direction."""
-
 BACK = (232, 235, 241)
+LINES = (150, 158, 176)
+SHADE = (166, 172, 186)
+
+LIGHT = np.array([0.35, 1.0, 0.45])
+"""Towards the light."""
+
+ANGLES = np.arange(12) * np.pi / 6
+CIRCLE = np.stack([np.cos(ANGLES), 0 * ANGLES, np.sin(ANGLES)], axis=1)
+"""On the ground."""
 
 DRAWN_LARGER = 3
 """Pictures are drawn larger by this factor and scaled down, for smooth edges."""
@@ -64,12 +70,7 @@ class Stage:
     def __init__(self, size: int, yaw: float) -> None:
         self.size = size
         self.pixels = size * DRAWN_LARGER
-        sin = np.sin(yaw)
-        cos = np.cos(yaw)
-        pitch = np.radians(12.0)
-        toward = np.array([np.cos(pitch) * sin, np.sin(pitch), np.cos(pitch) * cos])
-        right = np.array([cos, 0.0, -sin])
-        self.axes = np.stack([right, np.cross(toward, right), toward])
+        self.axes = camera_axes(yaw)
 
     def picture(self, points: Array, bones: tuple[Bone, ...], target: Array) -> Image.Image:
         """The points (P, 3), in heights, joined by bones, with the camera at ``target`` (x, z) on the ground."""
@@ -77,14 +78,12 @@ class Stage:
         draw = ImageDraw.Draw(image)
         local = points - [target[0], 0.0, target[1]]
         self._draw_ground(draw, target)
-        image.paste((166, 172, 186), mask=self._shadow(local, bones))
+        image.paste(SHADE, mask=self._shadow(local, bones))
+        # bones from the furthest to the nearest
         screen, scale = self._seen(local)
         for bone in sorted(bones, key=lambda bone: float(scale[bone.start] + scale[bone.end])):
             ends = [bone.start, bone.end]
-            radii = np.array([bone.start_radius, bone.end_radius]) * scale[ends]
-            for share, light in ((1.0, 0.68), (0.82, 0.86), (0.5, 1.0)):  # a rim, the side, and what faces the light
-                lifted = screen[ends] - np.array([0.25, 0.3]) * ((1 - share) * radii)[:, None]
-                _capsule(draw, lifted, share * radii, _mixed((0, 0, 0), COLOURS[bone.side], light))
+            _draw_bone(draw, screen[ends], np.array([bone.start_radius, bone.end_radius]) * scale[ends], bone.side)
         return image.resize((self.size, self.size), Image.Resampling.BOX)
 
     def _seen(self, places: Array) -> tuple[Array, Array]:
@@ -99,40 +98,54 @@ class Stage:
     def _draw_ground(self, draw: ImageDraw.ImageDraw, target: Array, cell: float = 0.5, reach: float = 2.2) -> None:
         """Lines of squares of ``cell`` heights, fainter the further they are from the target, up to ``reach``."""
         steps = np.arange(-reach, reach + cell, cell / 2)
-        for axis in (0, 1):
-            across = np.ceil((steps + target[axis]) / cell) * cell - target[axis]
+        middles = (steps[1:] + steps[:-1]) / 2
+        for axis in (0, 2):
+            across = np.ceil((steps + target[axis // 2]) / cell) * cell - target[axis // 2]
             for place in np.unique(np.round(across, 9)):
                 line = np.zeros((len(steps), 3))
-                line[:, 2 * axis] = place
-                line[:, 2 - 2 * axis] = steps
-                fade = np.clip(1 - np.hypot(place, (steps[1:] + steps[:-1]) / 2) / reach, 0, 1) ** 1.2
-                seen = self._seen(line)[0].tolist()
-                for start, end, part in zip(seen[:-1], seen[1:], fade.tolist(), strict=True):
-                    draw.line([*start, *end], fill=_mixed(BACK, (150, 158, 176), part), width=DRAWN_LARGER - 1)
+                line[:, axis] = place
+                line[:, 2 - axis] = steps
+                self._draw_line(draw, line, np.clip(1 - np.hypot(place, middles) / reach, 0, 1) ** 1.2)
+
+    def _draw_line(self, draw: ImageDraw.ImageDraw, line: Array, shares: Array) -> None:
+        """A line through places (N, 3), each piece of it as dark as its share (N - 1,) of 1."""
+        pixels = self._seen(line)[0].tolist()
+        for start, end, share in zip(pixels[:-1], pixels[1:], shares.tolist(), strict=True):
+            draw.line([*start, *end], fill=_mixed(BACK, LINES, share), width=DRAWN_LARGER - 1)
 
     def _shadow(self, points: Array, bones: tuple[Bone, ...]) -> Image.Image:
         """How much of a shadow there is at each pixel."""
         mask = Image.new("L", (self.pixels, self.pixels))
         draw = ImageDraw.Draw(mask)
-        light = np.array([0.35, 1.0, 0.45])
-        angles = np.arange(12) * np.pi / 6
-        circle = np.stack([np.cos(angles), 0 * angles, np.sin(angles)], axis=1)
-        flat = points - points[:, 1:2] * light / light[1]
+        flat = points - points[:, 1:2] * LIGHT / LIGHT[1]
         for bone in bones:
-            rings = (flat[bone.start] + bone.start_radius * circle, flat[bone.end] + bone.end_radius * circle)
-            start, end = (list(map(tuple, self._seen(ring)[0].tolist())) for ring in rings)
-            sides = ([start[i - 1], start[i], end[i], end[i - 1]] for i in range(len(circle)))
-            for corners in (*sides, start, end):
-                draw.polygon(corners, fill=255)
+            start = self._disc(flat[bone.start], bone.start_radius)
+            end = self._disc(flat[bone.end], bone.end_radius)
+            for i in range(len(start)):
+                draw.polygon([start[i - 1], start[i], end[i], end[i - 1]], fill=255)
+            draw.polygon(start, fill=255)
+            draw.polygon(end, fill=255)
         return mask.filter(ImageFilter.GaussianBlur(self.pixels / 160))
 
+    def _disc(self, middle: Array, radius: float) -> list[tuple[float, ...]]:
+        """Pixels around a disc that lies on the ground."""
+        return list(map(tuple, self._seen(middle + radius * CIRCLE)[0].tolist()))
 
-def _capsule(draw: ImageDraw.ImageDraw, ends: Array, radii: Array, colour: Colour) -> None:
+
+def _draw_bone(draw: ImageDraw.ImageDraw, ends: Array, radii: Array, side: str) -> None:
+    """A round bone between pixels (2, 2): a rim, the side, and what faces the light."""
+    for share, light in ((1.0, 0.68), (0.82, 0.86), (0.5, 1.0)):
+        lifted = ends - np.array([0.25, 0.3]) * ((1 - share) * radii)[:, None]
+        _draw_capsule(draw, lifted, share * radii, _mixed((0, 0, 0), COLOURS[side], light))
+
+
+def _draw_capsule(draw: ImageDraw.ImageDraw, ends: Array, radii: Array, colour: Colour) -> None:
     """Two discs at ``ends`` (2, 2), and all between them."""
     way = ends[1] - ends[0]
     beside = np.array([-way[1], way[0]]) / max(float(np.hypot(*way)), 1e-9)
-    (a, b), (c, d) = (ends + beside * radii[:, None]).tolist(), (ends - beside * radii[:, None]).tolist()
-    draw.polygon([tuple(corner) for corner in (a, b, d, c)], fill=colour)
+    a, b = map(tuple, (ends + beside * radii[:, None]).tolist())
+    c, d = map(tuple, (ends - beside * radii[:, None]).tolist())
+    draw.polygon([a, b, d, c], fill=colour)
     for (x, y), radius in zip(ends.tolist(), radii.tolist(), strict=True):
         draw.ellipse([x - radius, y - radius, x + radius, y + radius], fill=colour)
 

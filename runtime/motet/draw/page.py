@@ -61,77 +61,99 @@ def write_many(
     _write(file, [(skinned(motion, name in bare), name, None) for motion, name in shown], title)
 
 
-def _write(file: File, found: Sequence[tuple[Skinned, str, Captions | None]], title: str | None) -> None:
+def _write(file: File, shown: Sequence[tuple[Skinned, str, Captions | None]], title: str | None) -> None:
     title = place_of(file).stem if title is None else title
-    meshes = list(dict.fromkeys(figure.mesh for figure, _, _ in found))
-    bodies = [body_data(mesh, next(one.rest for one, _, _ in found if one.mesh is mesh)) for mesh in meshes]
-    figures = [{"body": meshes.index(one.mesh), **figure_data(one, name, captions)} for one, name, captions in found]
+    meshes: list[Mesh] = []
+    bodies = []
+    figures = []
+    for figure, name, captions in shown:
+        if figure.mesh not in meshes:  # bodies of people are one
+            meshes.append(figure.mesh)
+            bodies.append(body_data(figure.mesh, figure.rest))
+        figures.append({"body": meshes.index(figure.mesh), **figure_data(figure, name, captions)})
     write_whole(file, filled(source("motet.draw", "player.html"), title, {"bodies": bodies, "figures": figures}))
 
 
 def figure_data(figure: Skinned, name: str, captions: Captions | None = None) -> dict[str, Any]:
     """A figure in the player's format, ready for JSON; see the module's docstring."""
-    starts = [start for start, _ in captions or ()]
-    if not all(math.isfinite(start) for start in starts) or starts != sorted(starts):
-        raise MotionError(f"caption start times must not decrease: {starts}")
-    still = np.abs(figure.turns - np.eye(3)).max(axis=(0, 2, 3)) < 1e-6
-    quaternions = rotmat_to_quat(figure.turns[:, ~still])
-    moving = np.flatnonzero(np.ptp(figure.moves[:, 1:], axis=0).max(axis=-1) > 1e-5) + 1
-    step = float(max(1e-4, np.abs(figure.moves[:, moving]).max(initial=0) / SHORT))
     return {
         "name": name,
         "fps": figure.fps,
         "frames": len(figure.turns),
         "heading": figure.heading,
-        "captions": [[float(start), text] for start, text in captions or ()],
+        "captions": _captions_data(captions or ()),
         "parents": list(figure.parents),
         "offsets": np.round(figure.moves[0], 5).tolist(),
         "scales": np.round(figure.scales, 4).tolist(),
-        "root": _text(figure.moves[:, 0].astype("<f4")),
-        "turning": np.flatnonzero(~still).tolist(),
-        "turns": _text(np.round(quaternions * SHORT).astype("<i2")),
-        "step": step,
-        "moving": moving.tolist(),
-        "moves": _text(np.round(figure.moves[:, moving] / step).astype("<i2")),
+        "root": _text(figure.moves[:, 0], "<f4"),
+        **_turns_data(figure.turns),
+        **_moves_data(figure.moves),
     }
+
+
+def _captions_data(captions: Captions) -> list[list[Any]]:
+    starts = [start for start, _ in captions]
+    if not all(map(math.isfinite, starts)) or starts != sorted(starts):
+        raise MotionError(f"caption start times must not decrease: {starts}")
+    return [[float(start), text] for start, text in captions]
+
+
+def _turns_data(turns: Array) -> dict[str, Any]:
+    """The joints that turn, and their quaternions."""
+    turning = np.abs(turns - np.eye(3)).max(axis=(0, 2, 3)) >= 1e-6
+    quaternions = rotmat_to_quat(turns[:, turning])
+    return {"turning": np.flatnonzero(turning).tolist(), "turns": _text(np.round(quaternions * SHORT), "<i2")}
+
+
+def _moves_data(moves: Array) -> dict[str, Any]:
+    """The joints that move in their parents' frames, and their places there in steps."""
+    moving = np.flatnonzero(np.ptp(moves[:, 1:], axis=0).max(axis=-1) > 1e-5) + 1
+    step = float(max(1e-4, np.abs(moves[:, moving]).max(initial=0) / SHORT))
+    return {"step": step, "moving": moving.tolist(), "moves": _text(np.round(moves[:, moving] / step), "<i2")}
 
 
 def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
     """A mesh in heights and where its joints rest (K, 3), as pages hold them, see the module's docstring; of the body
     of people also coarser ones, each within the last, for shadows and for figures that are small."""
-    found: dict[str, Any] = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
+    body: dict[str, Any] = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
     if mesh is person():
-        within = found
+        finer = body
         for detail in COARSER:
-            within["coarse"] = within = _mesh_data(person(detail))
-    return found
+            coarse = _mesh_data(person(detail))
+            finer["coarse"] = coarse
+            finer = coarse
+    return body
 
 
 def _mesh_data(mesh: Mesh) -> dict[str, Any]:
     step = float(np.abs(mesh.places).max() / SHORT)
     return {
         "step": step,
-        "places": _text(np.round(mesh.places / step).astype("<i2")),
-        "normals": _text(np.round(mesh.normals * 127).astype("<i1")),
-        "joints": _text(mesh.joints.astype("<u2")),
-        "weights": _text(np.round(mesh.weights[:, 0] * 255).astype("<u1")),
-        "parts": _text(mesh.parts.astype("<u1")),
-        "triangles": _text(mesh.triangles.astype("<u4")),
+        "places": _text(np.round(mesh.places / step), "<i2"),
+        "normals": _text(np.round(mesh.normals * 127), "<i1"),
+        "joints": _text(mesh.joints, "<u2"),
+        "weights": _text(np.round(mesh.weights[:, 0] * 255), "<u1"),
+        "parts": _text(mesh.parts, "<u1"),
+        "triangles": _text(mesh.triangles, "<u4"),
     }
 
 
-def _text(values: NDArray[Any]) -> str:
-    return b64encode(np.ascontiguousarray(values).tobytes()).decode()
+def _text(values: NDArray[Any], kind: str) -> str:
+    return b64encode(values.astype(kind).tobytes()).decode()
 
 
 def filled(template: str, title: str, data: dict[str, Any], **parts: str) -> str:
     """The HTML of a template: ``{{TITLE}}``, ``{{DATA}}`` (as JSON), the parts of all pages, and ``parts`` by name."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     stage = "\n".join(source("motet.draw", file) for file in ("gl.js", "skin.js", "ground.js", "scene.js"))
-    found = {name: source("motet.draw", file) for name, file in (("STYLE", "page.css"), ("NUMBERS", "numbers.js"))}
-    found["STAGE"] = f"{source('motet.draw', 'stage.js')}\n{SCOPE.format(stage)}"
-    found |= {"TITLE": escape(title), "DATA": text, **parts}
-    return re.sub(r"\{\{([A-Z]+)\}\}", lambda place: found[place[1]], template)
+    texts = {
+        "STYLE": source("motet.draw", "page.css"),
+        "NUMBERS": source("motet.draw", "numbers.js"),
+        "STAGE": f"{source('motet.draw', 'stage.js')}\n{SCOPE.format(stage)}",
+        "TITLE": escape(title),
+        "DATA": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c"),
+        **parts,
+    }
+    return re.sub(r"\{\{([A-Z]+)\}\}", lambda place: texts[place[1]], template)
 
 
 def source(package: str, file: str) -> str:

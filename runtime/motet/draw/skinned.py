@@ -5,7 +5,8 @@ turns are those of the motion on the humanoid. All other figures, and skeletons 
 the round bones of :mod:`motet.draw.figure`. Lengths are in body heights.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -76,29 +77,29 @@ def _on_person(motion: Motion) -> Skinned | None:
     scales = np.ones((len(HUMANOID.joints), 3))
     if motion.skeleton != HUMANOID:
         try:
-            found = to_humanoid(motion)
+            retargeted = to_humanoid(motion)
         except MotionError:
             return None
-        if found.confidence < SURE_OF_JOINTS:
+        if retargeted.confidence < SURE_OF_JOINTS:
             return None
-        motion, scales = found.motion, _proportions(found.figure, motion)
-    mesh = person()
+        scales = _proportions(retargeted.figure, motion)
+        motion = retargeted.motion
     height = Body(HUMANOID).height
-    parents = [joint.parent for joint in HUMANOID.joints]
+    parents = tuple(joint.parent for joint in HUMANOID.joints)
+    # joints turn as the humanoid's, and are as far from their parents as theirs are
     turns = local_rotations(motion)
-    root = local_translations(motion)[:, 0]
-    moves = np.tile(HUMANOID.offsets * scales[parents], (len(motion), 1, 1))
-    moves[:, 0] = root
+    moves = np.tile(HUMANOID.offsets * scales[list(parents)], (len(motion), 1, 1))
+    moves[:, 0] = local_translations(motion)[:, 0]
     rest = (HUMANOID.rest_positions + HUMANOID.offsets[0]) / height
     heading = float(angle_of(turns[0, 0, 0, 2], turns[0, 0, 2, 2]))
-    return Skinned(mesh, rest, scales, tuple(parents), turns, moves / height, heading, motion.fps)
+    return Skinned(person(), rest, scales, parents, turns, moves / height, heading, motion.fps)
 
 
 @cache
 def person(detail: float = 1.0) -> Mesh:
     """The body of people in heights; see :func:`motet.draw.body.human_mesh`."""
     mesh = human_mesh(detail)
-    return Mesh(mesh.places / Body(HUMANOID).height, mesh.triangles, mesh.joints, mesh.weights, mesh.parts)
+    return replace(mesh, places=mesh.places / Body(HUMANOID).height)
 
 
 def _proportions(figure: Figure, motion: Motion) -> Array:
@@ -106,24 +107,34 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     the humanoid's joints, of which those of arms are x and of legs and trunk y."""
     body = figure.fitted.body
     places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
-    usual = HUMANOID.rest_positions
     scales = np.ones((len(HUMANOID.joints), 3))
     for bone, end, axis in LIMBS:
-        for side in (side for side in LEFT_RIGHT if sided(side, end) in body.joints):
-            own = places[:, body.joints[sided(side, bone)]] - places[:, body.joints[sided(side, end)]]
-            whole = usual[HUMANOID.index(sided(side, bone))] - usual[HUMANOID.index(sided(side, end))]
-            scales[HUMANOID.index(sided(side, bone)), axis] = _ratio(own, whole)
-    trunk = np.subtract(*(body.middle(places, part) for part in ("UpperArm", "UpperLeg")))
-    scales[[HUMANOID.index(bone) for bone in ("spine", "chest", "upperChest")], 1] = _ratio(trunk, np.array([0.48]))
+        for side in LEFT_RIGHT:
+            if sided(side, end) in body.joints:
+                ratio = _length_ratio(places, body.joints, sided(side, bone), sided(side, end))
+                scales[HUMANOID.index(sided(side, bone)), axis] = ratio
+    trunk = body.middle(places, "UpperArm") - body.middle(places, "UpperLeg")
+    scales[_indices("spine", "chest", "upperChest"), 1] = _ratio(trunk, np.array([0.48]))
     for part, bones in WIDTHS.items():
-        wide = _ratio(body.to_left(places, part), 2 * usual[HUMANOID.index(sided("left", part)), :1])
-        scales[[HUMANOID.index(bone) for bone in bones], 0] = wide
+        usual_wide = 2 * HUMANOID.rest_positions[HUMANOID.index(sided("left", part)), :1]
+        scales[_indices(*bones), 0] = _ratio(body.to_left(places, part), usual_wide)
     return scales
 
 
-def _ratio(own: Array, usual: Array) -> float:
+def _indices(*bones: str) -> list[int]:
+    return list(map(HUMANOID.index, bones))
+
+
+def _length_ratio(places: Array, joints: Mapping[str, int], start: str, end: str) -> float:
+    """How much longer a bone of a figure is than the humanoid's, from places of its joints (T, J, 3)."""
+    usual = HUMANOID.rest_positions
+    vectors = places[:, joints[start]] - places[:, joints[end]]
+    return _ratio(vectors, usual[HUMANOID.index(start)] - usual[HUMANOID.index(end)])
+
+
+def _ratio(vectors: Array, usual: Array) -> float:
     """How much longer vectors (T, 3), where they are nearly longest, are than one (3,); within what a body can be."""
-    longest = np.quantile(np.linalg.norm(own, axis=-1), 0.9)
+    longest = np.quantile(np.linalg.norm(vectors, axis=-1), 0.9)
     return float(np.clip(longest / np.linalg.norm(usual), 0.75, 1.33))
 
 
@@ -133,32 +144,49 @@ def _on_bones(motion: Motion) -> Skinned:
     first = first_of(motion)
     skeleton = below(skeleton_of(motion), first)
     body = Body(skeleton)
+    # the root as in the world, all others as in their parents
     turns = local_rotations(motion)[:, first:]
     moves = local_translations(motion)[:, first:] / body.height
     turns[:, 0] = global_transforms(motion)[0][:, first]
     moves[:, 0] = figure.points[:, 0]
-    stretched = np.ptp(moves, axis=0).max(axis=-1) > SAME_SPOT
     rest = body.points(skeleton.rest_positions / body.height)
-    bones = [
-        _capsule(bone, rest, bone.end if bone.end < len(stretched) and stretched[bone.end] else None)
-        for bone in body.bones
-    ]
-    scales = np.ones((len(skeleton.joints), 3))
+    mesh = _mesh_of_bones(body, rest, moves)
     parents = tuple(joint.parent for joint in skeleton.joints)
-    return Skinned(together(bones), rest[: len(parents)], scales, parents, turns, moves, figure.heading, figure.fps)
+    scales = np.ones((len(parents), 3))
+    return Skinned(mesh, rest[: len(parents)], scales, parents, turns, moves, figure.heading, figure.fps)
 
 
-def _capsule(bone: Bone, rest: Array, end: int | None, corners: int = 10) -> Mesh:
-    """A bone between points of a skeleton at rest (P, 3); end: the joint that carries its end, None for its carrier."""
-    axis = rest[bone.end] - rest[bone.start]
+def _mesh_of_bones(body: Body, rest: Array, moves: Array) -> Mesh:
+    """The bones of a body at rest (P, 3). moves: (T, J, 3) places of its joints in their parents' frames."""
+    # a bone whose end moves there is stretched: its end goes with that joint
+    is_stretched = np.ptp(moves, axis=0).max(axis=-1) > SAME_SPOT
+    bones = []
+    for bone in body.bones:
+        goes_along = bone.end < len(is_stretched) and is_stretched[bone.end]
+        bones.append(_capsule(bone, rest, bone.end if goes_along else bone.carriers[1]))
+    return together(bones)
+
+
+CAPS = np.radians([-80.0, -50.0, 0.0, 0.0, 50.0, 80.0])[:, None, None]
+"""Where the rings of a round bone are on the balls at its ends, from its start on."""
+
+
+def _capsule(bone: Bone, rest: Array, end_carrier: int, corners: int = 10) -> Mesh:
+    """A bone between points of a skeleton at rest (P, 3), whose end a joint carries."""
+    # three rings at each end
+    middles = rest[[bone.start] * 3 + [bone.end] * 3][:, None]
+    radii = np.repeat([bone.start_radius, bone.end_radius], 3)[:, None, None]
+    places, triangles = loft(middles + radii * _unit_rings(rest[bone.end] - rest[bone.start], corners))
+    carriers = np.repeat([bone.carriers[0], end_carrier], 3 * corners)
+    joints = np.stack([carriers, carriers], axis=1)
+    weights = np.tile([1.0, 0.0], (len(places), 1))
+    return Mesh(places, triangles, joints, weights, np.full(len(places), PARTS[bone.side]))
+
+
+def _unit_rings(axis: Array, corners: int) -> Array:
+    """Rings (6, C, 3) around an axis on balls of radius 1, upright where it has no length."""
     axis = unit(axis) if axis.any() else np.array([0.0, 1.0, 0.0])
     side = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
     around = ring(corners) @ np.stack([side, np.cross(axis, side)])
-    turns = np.radians([-80.0, -50.0, 0.0, 0.0, 50.0, 80.0])[:, None, None]
-    middles = rest[[bone.start] * 3 + [bone.end] * 3][:, None]
-    radii = np.repeat([bone.start_radius, bone.end_radius], 3)[:, None, None]
-    places, triangles = loft(middles + radii * (np.cos(turns) * around + np.sin(turns) * axis))
-    carriers = (bone.carriers[0], bone.carriers[1] if end is None else end)
-    rows = np.repeat(carriers, 3 * corners)
-    joints = np.stack([rows, rows], axis=1)
-    return Mesh(places, triangles, joints, np.tile([1.0, 0.0], (len(rows), 1)), np.full(len(rows), PARTS[bone.side]))
+    rings: Array = np.cos(CAPS) * around + np.sin(CAPS) * axis
+    return rings

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from motet.draw.body import DARK, LEFT_PART, MIDDLE_PART, RIGHT_PART, SHIRT, SKIN, TROUSERS
-from motet.draw.figure import COLOURS
-from motet.draw.mesh import normals_of
+from motet.draw.figure import COLOURS, YAW, camera_axes
+from motet.draw.mesh import Mesh, normals_of
 from motet.draw.skinned import Skinned, person, skinned
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
@@ -18,10 +18,10 @@ CLOTHES = {SHIRT: (112, 148, 190), TROUSERS: (70, 78, 98), SKIN: (232, 200, 176)
 INKS = {**CLOTHES, LEFT_PART: COLOURS[LEFT], RIGHT_PART: COLOURS[RIGHT], MIDDLE_PART: COLOURS[MIDDLE]}
 """The colours of a body's parts, as of the player."""
 
+COLOUR_TABLE = np.array([INKS[part] for part in range(len(INKS))])
+
 SUN = unit(np.array([0.42, 1.0, 0.5]))
-YAW = np.radians(40.0)
-PITCH = np.radians(12.0)
-"""From where it is seen: from which side of what it faces at first, and how far from above."""
+"""Towards the sun."""
 
 WIDE = 110
 TALL = 190
@@ -39,9 +39,9 @@ class Shape(NamedTuple):
 
 
 def strip(motion: Motion, poses: int = 5) -> str:
-    """The SVG of a motion in so many moments from its first frame to its last. MotionError as of the player's page."""
-    drawn = "".join(_drawn(shape, n) for n, shape in enumerate(shapes(motion, poses)))
-    return f'<svg viewBox="0 0 {WIDE * poses} {TALL}" xmlns="http://www.w3.org/2000/svg">{drawn}</svg>'
+    """The SVG of a motion in some of its poses, from its first frame to its last. MotionError as of the page."""
+    drawn = [_drawn(shape, number) for number, shape in enumerate(shapes(motion, poses))]
+    return f'<svg viewBox="0 0 {WIDE * poses} {TALL}" xmlns="http://www.w3.org/2000/svg">{"".join(drawn)}</svg>'
 
 
 def shapes(motion: Motion, poses: int) -> Iterator[Shape]:
@@ -56,32 +56,37 @@ def shapes(motion: Motion, poses: int) -> Iterator[Shape]:
 
 def _shape(figure: Skinned, corners: Array) -> Shape:
     """A figure with corners (V, 3) in heights."""
-    yaw = figure.heading + YAW
-    toward = np.array([np.cos(PITCH) * np.sin(yaw), np.sin(PITCH), np.cos(PITCH) * np.cos(yaw)])
-    right = np.array([np.cos(yaw), 0.0, -np.sin(yaw)])
-    axes = np.stack([right, np.cross(toward, right)], axis=1)
     triangles = figure.mesh.triangles
+    right, up, toward = camera_axes(figure.heading + YAW)
+    axes = np.stack([right, up], axis=1)
+    # the triangles that face the camera, the furthest first
     a, b, c = corners[triangles.T]
     normals = unit(np.cross(b - a, c - a))
     order = np.argsort((a + b + c) @ toward)
     shown = order[(normals @ toward)[order] > 0]
+    # the shadow is of those that face the sun
     flat = corners - corners[:, 1:2] * SUN / SUN[1]
-    round_ = unit(normals_of(corners, triangles)[triangles].sum(axis=1))
-    light = 0.55 + 0.1 * round_[:, 1] + 0.45 * np.maximum(round_ @ SUN, 0)
-    inks = np.array([INKS[part] for part in range(len(INKS))])[figure.mesh.parts[triangles[:, 0]]]
-    lit = np.clip(inks * light[:, None], 0, 255)
-    return Shape((corners @ axes)[triangles[shown]], lit[shown], (flat @ axes)[triangles[normals @ SUN > 0]])
+    shadow = (flat @ axes)[triangles[normals @ SUN > 0]]
+    return Shape((corners @ axes)[triangles[shown]], _lit(figure.mesh, corners)[shown], shadow)
 
 
-def _drawn(shape: Shape, n: int) -> str:
-    """The n-th pose, after its shadow."""
+def _lit(mesh: Mesh, corners: Array) -> Array:
+    """The colours of a mesh's triangles (F, 3) as light falls on them, whose corners are rounded off."""
+    normals = unit(normals_of(corners, mesh.triangles)[mesh.triangles].sum(axis=1))
+    light = 0.55 + 0.1 * normals[:, 1] + 0.45 * np.maximum(normals @ SUN, 0)
+    inks = COLOUR_TABLE[mesh.parts[mesh.triangles[:, 0]]]
+    return np.clip(inks * light[:, None], 0, 255)
+
+
+def _drawn(shape: Shape, number: int) -> str:
+    """A pose of the strip by its number, after its shadow."""
+    origin = [WIDE * (number + 0.5), TALL - 14]
     scale = WIDE / APART * np.array([1, -1])
-    triangles, shadow = (
-        _paths([WIDE * (n + 0.5), TALL - 14] + scale * part) for part in (shape.triangles, shape.shadow)
-    )
-    inks = (f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in shape.inks.astype(int).tolist())
-    body = (f'<path d="{path}" style="--c:{ink}"/>' for path, ink in zip(triangles, inks, strict=True))
-    return f'<path d="{"".join(shadow)}" opacity=".2"/><g class="body">{"".join(body)}</g>'
+    shadow = "".join(_paths(origin + scale * shape.shadow))
+    body = []
+    for path, ink in zip(_paths(origin + scale * shape.triangles), shape.inks.astype(np.uint8), strict=True):
+        body.append(f'<path d="{path}" style="--c:#{ink.tobytes().hex()}"/>')
+    return f'<path d="{shadow}" opacity=".2"/><g class="body">{"".join(body)}</g>'
 
 
 def _paths(corners: Array) -> list[str]:
