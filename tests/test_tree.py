@@ -10,12 +10,12 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 116
+MOST_LARGE_FUNCTIONS = 96
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
-MOST_BANNED_NAMES = 30
-MOST_TUPLE_ASSIGNMENTS = 5
-MOST_NESTED_COMPREHENSIONS = 16
+MOST_BANNED_NAMES = 16
+MOST_TUPLE_ASSIGNMENTS = 3
+MOST_NESTED_COMPREHENSIONS = 13
 """Of the whole tree, as many as there are: words of BANNED as names of variables and parameters, ``a, b = x, y``, and
 comprehensions in comprehensions or over several loops; only ever lowered."""
 
@@ -91,11 +91,11 @@ CEILINGS = {
     "motet.draw": 12_000,
     "motet.figures": 32_000,
     "motet.formats": 37_400,
-    "motet.generate": 25_900,
+    "motet.generate": 26_200,
     "motet.live": 5_700,
     "motet.models": 9_900,
     "motet.motion": 16_400,
-    "motet.papers": 7_300,
+    "motet.papers": 7_200,
     "motet.predict": 5_400,
     "motet.representation": 9_500,
     "motet.search": 3_600,

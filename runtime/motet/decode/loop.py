@@ -49,6 +49,7 @@ class Loop:
 State = dict[str, NDArray[Any]]
 Scores = NDArray[np.float64]
 Ids = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 def advance(step: Graph, state: State, inputs: Arrays) -> tuple[dict[str, NDArray[Any]], State]:
@@ -104,9 +105,14 @@ class Noise(Protocol):
         """Uniform numbers in [0, 1)."""
 
 
-def apart(noise: Noise, count: int) -> list[Noise]:
-    """Noise for each of several draws, whose first draws what it would draw alone; what is recorded is one for all."""
-    return [noise, *noise.spawn(count - 1)] if isinstance(noise, np.random.Generator) else [noise] * count
+def apart(noise: Sequence[Noise], count: int) -> list[Noise]:
+    """Noise for each of several draws of each row. The first draw of a row has what it would draw alone; what is
+    recorded is one for all."""
+    noise_of_draws: list[Noise] = []
+    for row in noise:
+        others = row.spawn(count - 1) if isinstance(row, np.random.Generator) else [row] * (count - 1)
+        noise_of_draws += [row, *others]
+    return noise_of_draws
 
 
 class Recorded:

@@ -28,6 +28,10 @@ PLAYED = 30.0
 """Frames per second of generated motions by default, whatever the model's own rate."""
 
 
+LoopValues = Mapping[str, float | None]
+"""Settings of a loop by name; None: the bundle's."""
+
+
 class LoopSettings(TypedDict, total=False):
     """Settings as far as the model's loop has them: :meth:`GenerateModel.generate`. None: the bundle's."""
 
@@ -175,36 +179,48 @@ class GenerateModel(LanguageModel):
         range or unknown to the loop. Unknown words are named by a TextWarning and in the result.
         """
         texts = texts_of(sentences)
-        drawing = {"hypotheses": hypotheses, **cast(Mapping[str, float | None], settings)}
+        drawing = {"hypotheses": hypotheses, **cast(LoopValues, settings)}
         seeds = seeds_of(seed, len(texts), DecodingError)
-        composed = {i for i, text in enumerate(texts) if self._composed(text, numbers, whole, drawing)}
-        single = [i for i in range(len(texts)) if i not in composed]
-        drawn = self._drawn([texts[i] for i in single], [seeds[i] for i in single], strict, drawing)
         motions: dict[int, list[Generated]] = {}
-        for i in single:
-            motions[i] = next(drawn)
+        for number, motions_of_text in self._motions(texts, seeds, strict, drawing, numbers, whole):
+            motions[number] = motions_of_text
             progress(len(motions), len(texts))
-        reading = {**drawing, "numbers": numbers, "whole": whole}
-        for i in sorted(composed):
-            motions[i] = self.composed(texts[i], seeds[i], strict, reading)
-            progress(len(motions), len(texts))
-        return motions[0] if isinstance(sentences, str) else [motions[i] for i in range(len(texts))]
+        return motions[0] if isinstance(sentences, str) else [motions[number] for number in range(len(texts))]
 
-    def _composed(self, sentence: str, numbers: bool, whole: bool, settings: Mapping[str, float | None]) -> bool:
+    def _composed(self, sentence: str, numbers: bool, whole: bool, settings: LoopValues) -> bool:
         """Whether a sentence is shown as a story: for its parts, its numbers, or the seconds of the settings."""
         if not whole and len(self.parts(sentence)) > 1:
             return True
         return numbers and bool(self.quantities(sentence).amounts)
 
+    def _motions(
+        self,
+        texts: Sequence[str],
+        seeds: Sequence[int],
+        strict: bool,
+        drawing: LoopValues,
+        numbers: bool,
+        whole: bool,
+    ) -> Iterator[tuple[int, list[Generated]]]:
+        """The number and the motions of each sentence: those drawn as a whole, then the stories."""
+        is_composed = [self._composed(text, numbers, whole, drawing) for text in texts]
+        yield from self._drawn(texts, seeds, strict, drawing, [i for i in range(len(texts)) if not is_composed[i]])
+        reading = {**drawing, "numbers": numbers, "whole": whole}
+        for i in range(len(texts)):
+            if is_composed[i]:
+                yield i, self.composed(texts[i], seeds[i], strict, reading)
+
     def _drawn(
-        self, texts: Sequence[str], seeds: Sequence[int], strict: bool, settings: Mapping[str, float | None]
-    ) -> Iterator[list[Generated]]:
-        """The motions of each sentence as a whole, drawn in batches."""
-        contexts, noise, chosen = self.drawing_inputs(texts, len(texts), seeds, strict, settings)
-        for start in range(0, len(texts), self.loop.batch):
+        self, texts: Sequence[str], seeds: Sequence[int], strict: bool, drawing: LoopValues, numbers: Sequence[int]
+    ) -> Iterator[tuple[int, list[Generated]]]:
+        """The motions of the sentences with these numbers, drawn as a whole and in batches."""
+        texts_drawn = [texts[i] for i in numbers]
+        seeds_drawn = [seeds[i] for i in numbers]
+        contexts, noise, chosen = self.drawing_inputs(texts_drawn, len(numbers), seeds_drawn, strict, drawing)
+        for start in range(0, len(numbers), self.loop.batch):
             batch = slice(start, start + self.loop.batch)
-            for text, row in zip(texts[batch], self.decode(contexts[batch], noise[batch], chosen), strict=True):
-                yield self.results(text, row)
+            for i, samples in zip(numbers[batch], self.decode(contexts[batch], noise[batch], chosen), strict=True):
+                yield i, self.results(texts[i], samples)
 
     def results(self, sentence: str, samples: Sequence[Sample]) -> list[Generated]:
         """The motions drawn for a sentence; a TextWarning where they show less than it says."""
@@ -225,7 +241,7 @@ class GenerateModel(LanguageModel):
         raise DecodingError(f"models of the loop {self.manifest.loop!r} show one sentence at a time")
 
     def drawing_inputs(
-        self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
+        self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: LoopValues
     ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
         """Contexts (N, C) of sentences, noise of ``rows`` rows, and all settings of the loop; see :meth:`generate`."""
         chosen = self._settled(settings)
@@ -235,7 +251,7 @@ class GenerateModel(LanguageModel):
             self.note(text, context, strict)
         return contexts, noise, chosen
 
-    def _settled(self, settings: Mapping[str, float | None]) -> dict[str, float]:
+    def _settled(self, settings: LoopValues) -> dict[str, float]:
         """All settings of the loop, the bundle's in place of None; DecodingError like :meth:`generate`."""
         if settings.get("seconds") == 0:
             raise DecodingError("seconds must be more than 0; omit them to let a motion end by itself")

@@ -163,8 +163,8 @@ class StreamingDecoder:
     def __init__(self, codec: Codec, context: Context | None = None) -> None:
         self.codec = codec
         self.codes = [] if context is None else list(context.codes)
-        self.given = None if context is None else context.frames[-2:]
-        self.count = max(0, len(self.codes) - 1)  # steps of which frames were given; the last is decoded to be joined
+        self.last_frames = None if context is None else context.frames[-2:]  # of the motion to be joined
+        self.count = max(0, len(self.codes) - 1)  # steps whose frames are out; the context's last is joined
         self.way = np.zeros((1, 3))
         self.pose = np.zeros((0, PATH))
         self.join: Inertialization | None = None
@@ -187,21 +187,25 @@ class StreamingDecoder:
         if until <= self.count:
             return np.empty((0, self.codec.decoder.spec.output("frames").size(-1)))
         # The steps, and those that the decoder looks back and ahead at; two rows, as a lone one is rounded differently.
-        start = max(0, self.count - self.codec.field.back)
-        steps = np.array(self.codes[start : until + self.codec.field.ahead])
+        field = self.codec.field
+        start = max(0, self.count - field.back)
+        steps = np.array(self.codes[start : until + field.ahead])
         decoded = self.codec.decoder({"codes": np.stack([steps, steps])})
         new = slice(self.count - start, until - start)
-        moves = decoded["moves"][0, new].astype(np.float64)
-        frames = decoded["frames"][0, new].astype(np.float64)
         self.count = until
         # The root, which the decoder gives as seen from the way, as rates.
-        rates = self._rates(moves, frames[..., :PATH])
-        frames = np.concatenate([rates, frames.reshape(len(rates), -1)[:, PATH:]], axis=1)
-        if self.given is not None:
+        frames = decoded["frames"][0, new].astype(np.float64)
+        rates = self._rates(decoded["moves"][0, new].astype(np.float64), frames[..., :PATH])
+        body = frames.reshape(len(rates), -1)[:, PATH:]
+        return self._joined(np.concatenate([rates, body], axis=1))
+
+    def _joined(self, frames: Array) -> Array:
+        """Decoded frames (T, D), joined to the motion that they continue."""
+        if self.last_frames is not None:
             # The first step is the motion's last one: the offset between the two fades from the frames after it.
             hop = self.codec.field.hop
-            self.join = Inertialization(self.given, frames[hop - 2 : hop], self.codec.fps, self.codec.half_life)
-            self.given = None
+            self.join = Inertialization(self.last_frames, frames[hop - 2 : hop], self.codec.fps, self.codec.half_life)
+            self.last_frames = None
             frames = frames[hop:]
         return frames if self.join is None else self.join(frames)
 

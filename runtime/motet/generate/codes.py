@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats, Graph
-from motet.decode.loop import Ids, Loop, Noise, Scores, advance, zero_state
+from motet.decode.loop import Flags, Ids, Loop, Noise, Scores, advance, zero_state
 from motet.generate.memory import Memory
 from motet.settings import Range, Settings
 
@@ -130,21 +130,30 @@ class Writer:
         self.done = self.done.copy()
 
         # Steps of some rows are remembered ones; -1 marks parts that are still to be drawn.
+        memory = self.source.memory
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
-        share = self.drawing.memory
-        for row in np.flatnonzero((uniform[:, 0] < share) | (steps > 0 and share > 0)).tolist():
-            if int(actions[row]) in self.source.memory.rows:
-                codes[row] = self._remembered(row, int(actions[row]), float(uniform[row, 1]), ends, steps, whole)
+        for row in self._remembering(uniform[:, 0], steps):
+            action = int(actions[row])
+            if action in memory.rows:
+                codes[row] = self._remembered(row, action, float(uniform[row, 1]), ends, steps, whole)
 
         # The others are drawn, and end no sooner than remembered motions.
-        memory = self.source.memory
-        shortest = np.array([memory.shortest.get(int(action), 0) for action in actions])
+        shortest = np.array([memory.shortest.get(action, 0) for action in actions.tolist()])
         is_early = self.age < (1 - memory.settings.skip) * shortest
         again = self._parts(known, uniform[:, 2:], codes, ends, is_early)
+
+        # Actions that begin again have age 0 at the next step.
         self.last = np.tile(codes, (2, 1))
         self.age = np.where(again, 0, self.age + 1)
         self.done = np.where(again, 0.0, self.done)
         return codes
+
+    def _remembering(self, uniform: Scores, steps: int) -> list[int]:
+        """The rows that continue with a remembered step, by uniform numbers (B,); all rows, where one begins an action
+        to show the most of it in a number of steps."""
+        share = self.drawing.memory
+        rows: list[int] = np.flatnonzero((uniform < share) | (steps > 0 and share > 0)).tolist()
+        return rows
 
     def _remembered(self, row: int, action: int, uniform: float, ends: bool, steps: int, whole: bool) -> Ids:
         """The codes (P,) of a remembered step at which a row continues; see :meth:`draw`."""
@@ -192,35 +201,40 @@ class Writer:
             if array.shape[axis] > WINDOW:
                 self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
 
-    def _parts(
-        self, known: Floats, uniform: Scores, codes: Ids, ends: bool, is_early: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
+    def _parts(self, known: Floats, uniform: Scores, codes: Ids, ends: bool, is_early: Flags) -> Flags:
         """Draw the parts of steps (B, P) one after the other, except in rows that are remembered already.
 
         is_early: rows (B,) that may not end yet. Returns the rows (B,) that begin their action again."""
-        end = self.source.end
-        top_p = self.drawing.top_p
-        again: NDArray[np.bool_] = (codes[:, 0] == end) & (not ends)
+        again: Flags = (codes[:, 0] == self.source.end) & (not ends)
         rows = np.flatnonzero((codes[:, 0] < 0) | again)
         if not len(rows):
             return again
         known = known[np.concatenate([rows, rows + len(codes)])]
         temperature = np.where(self.age == 0, self.drawing.first_temperature, self.drawing.temperature)[rows]
-        codes[rows] = 0
-        for part in range(self.source.parts):
-            chances = self._chances(known, codes[rows], part)
-            drawn = nucleus(chances, uniform[rows, part], temperature, top_p)
-            if part == 0:
-                # An end that may not be is drawn again from the other moves; the same number would give a neighbour.
-                never_ends = is_early[rows] | (not ends)
-                has_ended = drawn == end
-                again[rows] |= has_ended & (not ends)
-                chances[never_ends, end] = -np.inf
-                other = uniform[rows, part] * 1024 % 1
-                number = np.where(again[rows] | has_ended & never_ends, other, uniform[rows, part])
-                drawn = nucleus(chances, number, temperature, top_p)
-            codes[rows, part] = drawn
+        drawn = np.zeros((len(rows), self.source.parts), dtype=np.int64)
+        # The move first, as it may be an end; then the codes of the body.
+        never_ends = is_early[rows] | (not ends)
+        chances = self._chances(known, drawn, 0)
+        drawn[:, 0], ended = self._move(chances, uniform[rows, 0], temperature, never_ends, again[rows])
+        again[rows] |= ended & (not ends)
+        for part in range(1, self.source.parts):
+            chances = self._chances(known, drawn, part)
+            drawn[:, part] = nucleus(chances, uniform[rows, part], temperature, self.drawing.top_p)
+        codes[rows] = drawn
         return again
+
+    def _move(
+        self, chances: Scores, uniform: Scores, temperature: Scores, never_ends: Flags, again: Flags
+    ) -> tuple[Ids, Flags]:
+        """The move of rows (R,) from its log-probabilities (R, K), and whether it was an end, drawn again in rows that
+        never end. again: rows that have come to an end before."""
+        end = self.source.end
+        top_p = self.drawing.top_p
+        ended: Flags = nucleus(chances, uniform, temperature, top_p) == end
+        # An end that may not be is drawn again from the other moves; the same number would give a neighbour.
+        chances[never_ends, end] = -np.inf
+        number = np.where(again | ended & never_ends, uniform * 1024 % 1, uniform)
+        return nucleus(chances, number, temperature, top_p), ended
 
     def _chances(self, known: Floats, codes: Ids, part: int) -> Scores:
         """Guided log-probabilities (R, K) of a part of rows, from the parts (R, P) drawn before it."""

@@ -1,12 +1,13 @@
 """Continue a motion for any length with a motion-code model: lively, at its pace, feet held."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import islice, product
 
 import numpy as np
 
+from motet.decode.loop import Ids
 from motet.errors import DecodingError, MotionError
 from motet.figures.feet.contacts import GROUND_PERCENT, bell, feet_of, ground_of, windows
 from motet.figures.feet.hold import hold_feet
@@ -42,17 +43,19 @@ class Continuation:
         figure = model.contract.on_figure(whole)
         self.context = model.context(figure)
         # Frames of the context that were recorded, and those of the motion.
-        self.recorded = len(self.context.frames) - round(predicted * model.fps)
+        predicted_frames = round(predicted * model.fps)
+        self.recorded = len(self.context.frames) - predicted_frames
         if self.recorded < 2:
             raise MotionError(f"only {len(whole)} frames, some of them predicted: too few to continue from")
-        end = len(whole) - len(self.context.frames) + self.recorded
-        self.own = whole[:end]
+        end = len(whole) - predicted_frames
+        self.motion = whole[:end]
         self.figure = figure[:end]
         # The facing is smoothed over time: it is taken with the predicted frames, or it would lead another way.
-        place = last_place(self.figure)
-        self.pose = np.array([place[0], place[2], facing(figure)[end - 1]])
-        first = max(0, self.recorded - round(self.rules.pace_seen * model.fps))
-        self.pace = Pace.of(self.context.frames[first : self.recorded, :RATES], model.fps, self.rules)
+        x, _, z = last_place(self.figure)
+        self.pose = np.array([x, z, facing(figure)[end - 1]])
+        # The pace of the last recorded seconds.
+        recent = self.context.frames[: self.recorded, :RATES][-round(self.rules.pace_seen * model.fps) :]
+        self.pace = Pace.of(recent, model.fps, self.rules)
 
     def follow(self, count: int, seed: int) -> tuple[Motion, Motion]:
         """The next ``count`` frames, and the motion before them: :func:`brought_back`. With the same seed, a shorter
@@ -67,25 +70,31 @@ class Continuation:
         if contract.skeleton == HUMANOID:
             frames = self._on_ground(frames, len(before))
         following = contract.features(frames[len(before) : len(before) + count])
-        return brought_back(in_world(following, self.figure, self.pose)[0], self.own, self.figure)
+        return brought_back(in_world(following, self.figure, self.pose)[0], self.motion, self.figure)
 
     def _drawn(self, count: int, seed: int) -> Array:
         """Frames (count, D) after those of the context, at its pace and without a jump."""
         model = self.model
         hop = model.codec.field.hop
-        drawing = CodesSettings.read(model.defaults, "defaults")
-        continuer = Continuer(model.source, model.codec, drawing, self.rules)
-        codes = self.context.codes
-        predicted_steps = math.ceil((len(self.context.frames) - self.recorded) / hop)
-        steps = continuer.steps(codes, max(1, len(codes) - predicted_steps), self.pace, seed)
         decoder = model.decoder(self.context)
+        steps = self._steps(seed)
+        # As many steps as the frames would take, and more where they are played faster.
         frames = self.context.frames[-1:]
-        following = paced(frames, self.pace, model.fps, self.rules)
+        following = frames[:0]
         while len(following) < count:
             more = islice(steps, math.ceil((count - len(following)) / hop))
             frames = np.concatenate([frames, decoder.push(np.stack(list(more)))])
             following = paced(frames, self.pace, model.fps, self.rules)
         return following[: max(0, count)]
+
+    def _steps(self, seed: int) -> Iterator[Ids]:
+        """The steps of codes (P,) after those of the context, which is recognised by those that were recorded."""
+        model = self.model
+        codes = self.context.codes
+        predicted_frames = len(self.context.frames) - self.recorded
+        known = max(1, len(codes) - math.ceil(predicted_frames / model.codec.field.hop))
+        drawing = CodesSettings.read(model.defaults, "defaults")
+        return Continuer(model.source, model.codec, drawing, self.rules).steps(codes, known, self.pace, seed)
 
     def _on_ground(self, frames: Array, known: int) -> Array:
         """Frames (T, D), the first ``known`` of them recorded, on their ground and with planted feet; the planting
@@ -129,19 +138,26 @@ def paced(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) ->
     if pace.turn is None:
         return frames[1:]
     reach = round(rules.tempo_reach * fps)
-    # The playback rate before each frame, from 1 at the seam.
-    speed = averaged(np.linalg.norm(frames[:, : RATES - 1], axis=1), reach)
-    wanted_rate = np.clip(pace.speed / np.maximum(speed, 1e-3), 1 / rules.tempo, rules.tempo)
-    times = np.arange(len(frames))
-    rate = 1 + (wanted_rate[1:] - 1) * np.minimum(times[:-1] / (SETTLED * fps), 1.0)
+    rate = _playback_rate(frames, pace, fps, rules)
     # The times at which frames are shown, and the frames at whole times.
-    shown_at = np.concatenate([[0.0], np.cumsum(1 / rate)])
+    times = np.arange(len(frames))
+    shown_at = np.append(0.0, np.cumsum(1 / rate))
     last = max(0, math.floor(shown_at[max(0, len(frames) - 1 - reach)]))
     at = np.interp(np.arange(1, last + 1), shown_at, times)
     played = np.column_stack([np.interp(at, times, column) for column in frames.T])
-    if len(at):
+    # What is played faster is faster over the ground.
+    if last:
         played[:, :RATES] *= np.interp(at, times[1:], rate)[:, None]
     return played
+
+
+def _playback_rate(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) -> Array:
+    """The rate (T - 1,) at which frames (T, D) after the first are played to keep a pace, from 1 at the seam."""
+    speed = averaged(np.linalg.norm(frames[:, : RATES - 1], axis=1), round(rules.tempo_reach * fps))
+    wanted_rate = np.clip(pace.speed / np.maximum(speed, 1e-3), 1 / rules.tempo, rules.tempo)
+    settled = np.minimum(np.arange(len(frames) - 1) / (SETTLED * fps), 1.0)
+    rate: Array = 1 + (wanted_rate[1:] - 1) * settled
+    return rate
 
 
 def futures(
@@ -168,7 +184,7 @@ def futures(
         following, before = continuation.follow(math.ceil(count * model.fps / motion.fps) + 1, seed)
         following = at_rate(before, following, motion.fps)[:count]
         if append:
-            whole = recorded if before is continuation.own else model.contract.on_figure(recorded)
+            whole = recorded if before is continuation.motion else model.contract.on_figure(recorded)
             following = together(whole, following)
         motions.append(following)
         progress(len(motions), len(seeds))

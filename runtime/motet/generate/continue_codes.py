@@ -122,31 +122,37 @@ class Continuer(NamedTuple):
 
         known: how many of the codes the motion is recognised by; those after them were predicted.
         """
-        settings = self.settings
-        noise = np.random.Generator(np.random.PCG64(seed))
-        actions, ages, weights = self.likely(numbers_of(self.source, codes[:known]), self.paces_off(pace))
-        drawn_actions = nucleus(np.tile(weights, (settings.actions, 1)), noise.random(settings.actions), 1.0, 1.0)
-        count = settings.rows
-        places = drawn_actions[np.arange(count) % len(drawn_actions)]
-        row_noise = [np.random.Generator(np.random.PCG64([seed, row])) for row in range(count)]
+        count = self.settings.rows
+        noise = [np.random.Generator(np.random.PCG64([seed, row])) for row in range(count)]
+        actions, ages = self._drawn_actions(numbers_of(self.source, codes[:known]), pace, seed)
 
         # All rows have seen the same steps: one row sees them, and becomes all.
-        writer = Writer(self.source, row_noise[:1], self.drawing)
+        writer = Writer(self.source, noise[:1], self.drawing)
         writer.see(codes)
         writer.keep(np.zeros(count, dtype=np.intp))
-        writer.noise = list(row_noise)
-        writer.age = ages[places]
-        moment = max(1, round(settings.moment / self.codec.seconds))
+        writer.noise = list(noise)
+        writer.age = ages
+
+        # Moment by moment, the row that keeps the pace best is continued in all rows.
+        moment = max(1, round(self.settings.moment / self.codec.seconds))
         progress = Progress(self, pace)
-        row_actions = actions[places]
+        row_actions = actions
         while True:
             drawn = np.stack([writer.draw(row_actions, ends=False) for _ in range(moment)])
             best = progress.nearest(drawn)
             yield from drawn[:, best]
             writer.keep(np.full(count, best))
-            writer.noise = list(row_noise)
+            writer.noise = list(noise)
             # One half of the rows keeps the action, the other may begin its own again.
-            row_actions = np.where(np.arange(count) < count // 2, row_actions[best], actions[places])
+            row_actions = np.where(np.arange(count) < count // 2, row_actions[best], actions)
+
+    def _drawn_actions(self, recent: Array, pace: Pace, seed: int) -> tuple[Ids, Ids]:
+        """The action of each row (B,), and the age at which it is entered: a few drawn by their likelihood, in turn."""
+        actions, ages, weights = self.likely(recent, self.paces_off(pace))
+        uniform = np.random.Generator(np.random.PCG64(seed)).random(self.settings.actions)
+        drawn = nucleus(np.tile(weights, (len(uniform), 1)), uniform, 1.0, 1.0)
+        in_turn = drawn[np.arange(self.settings.rows) % len(drawn)]
+        return actions[in_turn], ages[in_turn]
 
     def likely(self, numbers: Array, beside: Array | float = 0.0) -> tuple[Ids, Ids, Scores]:
         """Of all actions, the likeliest first: which they are, the age of each at the place that is nearest, and
@@ -179,21 +185,23 @@ class Continuer(NamedTuple):
 
     def paces_off(self, pace: Pace) -> Array:
         """How much (M,) the distance of remembered places grows because they continue faster or slower for a moment."""
-        memory = self.source.memory
-        book = self.codec.book
-        seconds = self.codec.seconds
-        count = len(memory.codes)
-        steps = max(1, round(self.settings.moment / seconds))
-        # The way gone before each step; an end is no move.
-        is_move = memory.codes[:, 0] < len(book)
-        lengths = np.where(is_move, np.linalg.norm(book[memory.codes[:, 0] * is_move, :2], axis=1), 0.0)
-        gone = np.concatenate([[0.0], np.cumsum(lengths)])
+        gone = self._ways_gone()
+        places = np.arange(len(gone) - 1)
         # The steps of a moment, up to where the next motion begins.
-        begins = np.append(np.flatnonzero(np.diff(memory.ages) != 1) + 1, count)
-        stops = begins[np.searchsorted(begins, np.arange(count), side="right")]
-        after = np.minimum(np.arange(count) + steps, stops)
-        speeds = (gone[after] - gone[:-1]) / (steps * seconds)
+        steps = max(1, round(self.settings.moment / self.codec.seconds))
+        begins = np.append(np.flatnonzero(np.diff(self.source.memory.ages) != 1) + 1, len(places))
+        stops = begins[np.searchsorted(begins, places, side="right")]
+        after = np.minimum(places + steps, stops)
+        speeds = (gone[after] - gone[:-1]) / (steps * self.codec.seconds)
         return self.settings.speed_cost * self.speeds_apart(speeds, pace.speed)
+
+    def _ways_gone(self) -> Array:
+        """The length of the way (M + 1,) gone before each remembered step, and after the last one."""
+        moves = self.source.memory.codes[:, 0]
+        book = self.codec.book
+        is_move = moves < len(book)  # not an end
+        lengths = np.where(is_move, np.linalg.norm(book[moves * is_move, :2], axis=1), 0.0)
+        return np.concatenate([[0.0], np.cumsum(lengths)])
 
     def speeds_apart(self, speed: Array, wanted: float) -> Scores:
         """The logarithm of the factor by which speeds (...) are off."""
@@ -214,24 +222,29 @@ class Progress:
 
     def nearest(self, drawn: Ids) -> int:
         """The row of those drawn for a moment (S, B, P) that keeps the pace best, and is continued."""
-        settings = self.continuer.settings
-        seconds = self.continuer.codec.seconds
         moves = self.continuer.codec.book[drawn[..., 0]]
+        self.steps += len(moves)
+        best = int(self._off(moves).argmin())
+        # Its moves are the past of the next moment.
+        recent = round(self.continuer.settings.pace_recent / self.continuer.codec.seconds)
+        self.recent_moves = np.concatenate([self.recent_moves, moves[:, best]])[-recent:]
+        self.turned += moves[:, best, 2].sum()
+        return best
+
+    def _off(self, moves: Array) -> Scores:
+        """How far rows (B,) are off the pace by their moves (S, B, 3)."""
+        seconds = self.continuer.codec.seconds
         # The speed of the moment and the recent moves.
         way = np.linalg.norm(moves[..., :2], axis=-1).sum(axis=0)
         way = way + np.linalg.norm(self.recent_moves[:, :2], axis=-1).sum()
         speeds = way / ((len(moves) + len(self.recent_moves)) * seconds)
         off = self.continuer.speeds_apart(speeds, self.pace.speed)
         # The heading beside the course.
-        self.steps += len(moves)
-        if self.pace.turn is not None:
-            turned = self.turned + moves[..., 2].sum(axis=0)
-            off = off + np.abs(turned - self.pace.turn * self.steps * seconds) / settings.turn_scale
-        best = int(off.argmin())
-        recent = round(settings.pace_recent / seconds)
-        self.recent_moves = np.concatenate([self.recent_moves, moves[:, best]])[-recent:]
-        self.turned += moves[:, best, 2].sum()
-        return best
+        if self.pace.turn is None:
+            return off
+        turned = self.turned + moves[..., 2].sum(axis=0)
+        beside: Scores = np.abs(turned - self.pace.turn * self.steps * seconds)
+        return off + beside / self.continuer.settings.turn_scale
 
 
 def numbers_of(source: Source, codes: Ids) -> Array:

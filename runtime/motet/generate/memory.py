@@ -6,13 +6,14 @@ before it, T steps of a recording.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats
-from motet.decode.loop import Ids, Scores
+from motet.decode.loop import Flags, Ids, Scores
 from motet.errors import BundleError
 from motet.settings import Range, Settings
 
@@ -126,9 +127,6 @@ class Memory:
     """The numbers (R, K L) float32 of the K steps before each step of an action, scaled by the roots of their weights.
     """
 
-    shortest: dict[int, int]
-    """The number of steps of each action's shortest motion."""
-
     settings: MemorySettings
     _courses: dict[int, tuple[Ids, Scores]] = field(default_factory=dict, init=False)
 
@@ -152,22 +150,25 @@ class Memory:
         # The steps of each action, and what preceded them.
         numbers = _numbers(codes, moves, body)
         features = _step_features(numbers, ages, settings.past_weights)
-        order = np.argsort(action_of_step, kind="stable")
-        actions_in_order, begins = np.unique(action_of_step[order], return_index=True)
-        names = actions_in_order.tolist()
-        rows = dict(zip(names, np.split(order, begins[1:]), strict=True))
-        keys = dict(zip(names, np.split(features[order], begins[1:]), strict=True))
+        rows = _rows_by_action(action_of_step)
+        keys = {action: features[of_action] for action, of_action in rows.items()}
 
-        # Where motions begin and end, and how much of each is over before its steps.
+        # How much each step matters: to its motion by its movement, to its action by what other actions do not have.
         starts, lasts = _motions(ages)
         is_move = codes[:, 0] < len(moves)
         change = _changes(numbers[:, moves.shape[1] :], is_move, starts)
         rarity = _rarity(codes[:, 1:], action_of_step, is_move)
         importance = (settings.pose_weight + change) * np.exp(rarity) * is_move
+
+        # How much of each motion is over before its steps, by both.
         parts = _over(settings.rest_weight + change, starts, lasts)
         acts = _over(importance, starts, lasts)
-        shortest = {name: int(ages[lasts[of_action]].min()) for name, of_action in rows.items()}
-        return Memory(codes, ages, parts, importance, acts, lasts, rows, keys, shortest, settings)
+        return Memory(codes, ages, parts, importance, acts, lasts, rows, keys, settings)
+
+    @cached_property
+    def shortest(self) -> dict[int, int]:
+        """The number of steps of each action's shortest motion."""
+        return {action: int(self.ages[self.lasts[rows]].min()) for action, rows in self.rows.items()}
 
     def next(
         self,
@@ -306,7 +307,7 @@ class Memory:
         ends: bool,
         uniform: float,
         ages: Ids,
-        fitting: NDArray[np.bool_],
+        fitting: Flags,
     ) -> int:
         """A place of an action whose past resembles the present: one of the ``fitting`` (R,), if there are any."""
         settings = self.settings
@@ -333,27 +334,36 @@ def act_of(keys: Floats, importance: Scores, settings: MemorySettings) -> tuple[
         return 0, end
     distances = squared_distances(keys)
     steps = np.arange(end + 1)
-    firsts = steps[:, None]
-
-    # (T, T): from each first step on, the step at which each step of the recording is shown first.
-    alike = np.where(distances <= settings.alike_distance, firsts, end + 1)
-    shown = np.minimum.accumulate(alike[::-1])[::-1]
-
-    # (T,): from each first step on, the last step that is needed to show enough.
-    order = np.argsort(shown, axis=1, kind="stable")
-    enough = np.cumsum(importance[order], axis=1) >= settings.act_share * importance.sum()
-    needed = np.take_along_axis(shown, order, axis=1)[steps, enough.argmax(axis=1)]
+    lengths = steps - steps[:, None]
 
     # (T, T): the cost of each first and last step: the length, and edges that are unlike those of the recording.
     unlike_begin = np.minimum(distances[0] / settings.alike_distance, 1.0)
     unlike_end = np.minimum(distances[end] / settings.alike_distance, 1.0)
-    lengths = steps - firsts
     cost = lengths + settings.edge_cost * (unlike_begin[:, None] + np.minimum(unlike_begin, unlike_end))
+
+    # The cheapest of those that show enough and are not too short; the whole recording if there is none.
+    needed = _last_needed(distances, importance, settings)
     cost[(steps <= needed[:, None]) | (lengths < settings.act_steps)] = np.inf
     if not np.isfinite(cost).any():
         return 0, end
     first, last = divmod(int(cost.argmin()), end + 1)
     return first, last
+
+
+def _last_needed(distances: Scores, importance: Scores, settings: MemorySettings) -> Ids:
+    """From each first step of a recording on, the last step (T,) that is needed to show enough of its importance (T,).
+
+    distances: (T, T) of each two steps."""
+    count = len(distances)
+    steps = np.arange(count)
+    # (T, T): from each first step on, the step at which each step of the recording is shown first.
+    alike = np.where(distances <= settings.alike_distance, steps[:, None], count)
+    shown = np.minimum.accumulate(alike[::-1])[::-1]
+    # Its steps in that order, up to the one that makes the importance enough.
+    order = np.argsort(shown, axis=1, kind="stable")
+    enough = np.cumsum(importance[order], axis=1) >= settings.act_share * importance.sum()
+    needed: Ids = np.take_along_axis(shown, order, axis=1)[steps, enough.argmax(axis=1)]
+    return needed
 
 
 def squared_distances(keys: Floats) -> Scores:
@@ -377,6 +387,13 @@ def _check(codes: Ids, actions: Ids, ages: Ids, largest: tuple[int, int, int]) -
     for name, (values, most) in limits.items():
         if values.min() < 0 or (most < values.T).any():
             raise BundleError(f"table memory: {name} is out of range")
+
+
+def _rows_by_action(actions: Ids) -> dict[int, Ids]:
+    """The steps (R,) of each action, from the action (M,) of each step."""
+    order = np.argsort(actions, kind="stable")
+    names, begins = np.unique(actions[order], return_index=True)
+    return dict(zip(names.tolist(), np.split(order, begins[1:]), strict=True))
 
 
 def _numbers(codes: Ids, moves: Floats, body: Floats) -> Floats:
@@ -407,7 +424,7 @@ def _motions(ages: Ids) -> tuple[Ids, Ids]:
     return starts, np.repeat(starts + lengths - 1, lengths)
 
 
-def _changes(numbers: Floats, is_move: NDArray[np.bool_], starts: Ids) -> Scores:
+def _changes(numbers: Floats, is_move: Flags, starts: Ids) -> Scores:
     """How much the body's numbers change before each step (M,), squared; 0 at the start of a motion and at its end."""
     exact = numbers.astype(np.float64)
     change: Scores = (np.diff(exact, axis=0, prepend=exact[:1]) ** 2).sum(axis=1) * is_move
@@ -423,7 +440,7 @@ def _over(counts: Scores, starts: Ids, lasts: Ids) -> Scores:
     return shares
 
 
-def _rarity(codes: Ids, actions: Ids, is_move: NDArray[np.bool_]) -> Scores:
+def _rarity(codes: Ids, actions: Ids, is_move: Flags) -> Scores:
     """How rare the codes (M, B) of each step are among actions (M,), in standard deviations of the steps that move.
 
     The sum of the logarithms of inverse document frequencies (Spaerck Jones 1972)."""

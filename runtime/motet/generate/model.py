@@ -23,7 +23,7 @@ from motet.errors import (
     warn,
 )
 from motet.figures.humanoid import HUMANOID
-from motet.generate.base import Generated, GenerateModel, LoopSettings
+from motet.generate.base import Generated, GenerateModel, LoopSettings, LoopValues
 from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.continue_codes import ContinuationSettings
@@ -240,7 +240,7 @@ class CodesModel(GenerateModel):
         words = set(map(self.vocabulary.meant, self.vocabulary.rules.words(sentence))) - FUNCTION_WORDS - {""}
         return {word: frozenset((stem(word), stem(self.vocabulary.near(word)))) for word in sorted(words)}
 
-    def _composed(self, sentence: str, numbers: bool, whole: bool, settings: Mapping[str, float | None]) -> bool:
+    def _composed(self, sentence: str, numbers: bool, whole: bool, settings: LoopValues) -> bool:
         seconds = self._settled(settings)["seconds"]
         if super()._composed(sentence, numbers, whole, settings):
             return True
@@ -311,17 +311,16 @@ class CodesModel(GenerateModel):
 
     def results(self, sentence: str, samples: Sequence[Sample]) -> list[Generated]:
         """See :meth:`GenerateModel.results`."""
-        shown: dict[int, Shown] = {}
+        shown: dict[int | None, Shown] = {}
         for sample in samples:
-            if sample.action is not None and sample.action not in shown:
+            if sample.action not in shown:
                 shown[sample.action] = self._shown(sentence, sample.action)
         motions = []
-        for generated, sample in zip(super().results(sentence, samples), samples, strict=True):
-            if sample.action is not None:
-                motions.append(replace(generated, **shown[sample.action]._asdict()))
+        for motion, sample in zip(super().results(sentence, samples), samples, strict=True):
+            motions.append(replace(motion, **shown[sample.action]._asdict()))
         return motions
 
-    def _shown(self, sentence: str, action: int) -> Shown:
+    def _shown(self, sentence: str, action: int | None) -> Shown:
         """How a sentence is shown by an action; a TextWarning names the words that are left out."""
         shown = self._shown_as(sentence, action)
         if shown.lacking:
@@ -348,7 +347,7 @@ class CodesModel(GenerateModel):
             raise TextError(shown.left_out(sentence))
 
     def drawing_inputs(
-        self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: Mapping[str, float | None]
+        self, texts: Sequence[str], rows: int, seed: Seed, strict: bool, settings: LoopValues
     ) -> tuple[Floats, list[np.random.Generator], dict[str, float]]:
         """See :meth:`GenerateModel.drawing_inputs`; strict: only actions are drawn that leave out no word."""
         contexts, noise, chosen = super().drawing_inputs(texts, rows, seed, strict, settings)
@@ -363,15 +362,13 @@ class CodesModel(GenerateModel):
 
     def decode(self, contexts: Floats, noise: Sequence[Noise], settings: Mapping[str, Any]) -> list[list[Sample]]:
         """See :meth:`GenerateModel.decode`."""
+        # A row for each hypothesis of each context, and its action.
         count = settings["hypotheses"]
-        seconds = settings["seconds"]
-        # A row for each hypothesis of each context.
-        noise_of_rows: list[Noise] = []
-        for row_noise in noise:
-            noise_of_rows += apart(row_noise, count)
+        noise_of_rows = apart(noise, count)
         contexts = np.repeat(contexts, count, axis=0)
         actions = drawn_actions(self.source, contexts, noise_of_rows, settings["certainty"])
         # Codes, up to the end of a motion or as many as the seconds take.
+        seconds = settings["seconds"]
         longest = max(1, self.codec.steps(seconds or settings["max_seconds"]))
         writer = Writer(self.source, noise_of_rows, CodesSettings(**settings))
         motions = draw_codes(writer, actions, longest, exactly=seconds > 0)
@@ -493,39 +490,43 @@ class CodesModel(GenerateModel):
         sentences = texts_of(sentences)
         numbers = settings.pop("numbers", True)
         whole = settings.pop("whole", False)
-        loop_settings = cast(Mapping[str, float | None], settings)
+        loop_settings = cast(LoopValues, settings)
         _check_story(sentences, stand, loop_settings.get("hypotheses"))
 
-        # Texts in the order in which they are shown, and their seconds.
-        texts: list[str] = []
-        lengths: list[float] = []
-        for length, parts in self._parts_in_time(sentences, seconds, whole):
-            texts += parts
-            lengths += [length] * len(parts)
+        # Texts in the order in which they are shown, and what each is read as.
+        timed = self._timed_texts(sentences, seconds, whole)
         if stand in ("start", "both"):
-            texts.insert(0, STANDING)
-            lengths.insert(0, STANDING_SECONDS)
+            timed.insert(0, (STANDING, STANDING_SECONDS))
         if stand in ("end", "both"):
-            texts.append(STANDING)
-            lengths.append(STANDING_SECONDS)
+            timed.append((STANDING, STANDING_SECONDS))
+        requests, noise, chosen = self._requests(timed, numbers, seed, strict, loop_settings)
 
-        # What each is read as.
-        quantities = [self.quantities(text) if numbers else Quantities(text) for text in texts]
-        read_as = [quantity.text for quantity in quantities]
-        contexts, noise, chosen = self.drawing_inputs(read_as, 1, seed, strict, loop_settings)
-        figure = None if after is None else self.contract.on_figure(self.at_own_rate(after))
-        requests = []
-        for row in zip(texts, quantities, contexts, lengths, strict=True):
-            requests.append(self._request(*row, paced=numbers))
-
+        # They are drawn after the end of the motion before.
         teller = Teller(self.source, self.codec, self.contract, noise, chosen, self.continuation.context)
-        return requests, figure, teller.pieces(requests, None if figure is None else self.context(figure))
+        if after is None:
+            return requests, None, teller.pieces(requests, None)
+        figure = self.contract.on_figure(self.at_own_rate(after))
+        return requests, figure, teller.pieces(requests, self.context(figure))
 
-    def _parts_in_time(
+    def _requests(
+        self, timed: Sequence[tuple[str, float]], numbers: bool, seed: Seed, strict: bool, settings: LoopValues
+    ) -> tuple[list[Request], list[np.random.Generator], dict[str, float]]:
+        """A request for each text with its seconds; noise, and all settings of the loop.
+
+        numbers: whether to read those of the text.
+        """
+        quantities = [self.quantities(text) if numbers else Quantities(text) for text, _ in timed]
+        read_as = [quantity.text for quantity in quantities]
+        contexts, noise, chosen = self.drawing_inputs(read_as, 1, seed, strict, settings)
+        requests = []
+        for (text, seconds), quantity, context in zip(timed, quantities, contexts, strict=True):
+            requests.append(self._request(text, quantity, context, seconds, paced=numbers))
+        return requests, noise, chosen
+
+    def _timed_texts(
         self, sentences: Sequence[str], seconds: float | Sequence[float | None] | None, whole: bool
-    ) -> list[tuple[float, list[str]]]:
-        """The parts of each sentence, and the seconds of each part, 0 where it ends by itself; DecodingError like
-        :meth:`story`."""
+    ) -> list[tuple[str, float]]:
+        """The parts of sentences, each with its seconds, 0 where it ends by itself; errors like :meth:`story`."""
         count = len(sentences)
         each: list[Any] = list(cast(Any, seconds)) if np.ndim(cast(Any, seconds)) else [seconds] * count
         if len(each) != count:
@@ -534,7 +535,7 @@ class CodesModel(GenerateModel):
         timed = []
         for sentence, length in zip(sentences, lengths, strict=True):
             parts = [sentence] if whole else self.parts(sentence)
-            timed.append((length / len(parts), parts))
+            timed += [(part, length / len(parts)) for part in parts]
         return timed
 
     def decoder(self, context: Context | None = None) -> StreamingDecoder:

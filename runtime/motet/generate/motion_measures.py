@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motet.decode.loop import Flags
 from motet.figures.feet.contacts import smoothed
 from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
 from motet.motion.kinematics import positions
@@ -126,14 +126,14 @@ class Seen:
         to_and_fro = {"waves": self._waves, "nods": self._nods, "claps": self._claps, "pushups": self._pushups}
         if act in to_and_fro:
             return sorted(to_and_fro[act](), key=lambda span: span[1])
-        flags: NDArray[np.bool_] = getattr(self, f"_{act}")
+        flags: Flags = getattr(self, f"_{act}")
         spans: Spans = []
         for column in flags.reshape(len(flags), -1).T:
             spans += spells(column)
         return sorted(spans, key=lambda span: span[1])
 
     @property
-    def _jumps(self) -> NDArray[np.bool_]:
+    def _jumps(self) -> Flags:
         """Flights of 0.1 to 0.9 s with the hips not lower than in standing, without those that are low beside the
         highest: steps of a walk or a run."""
         low = self.soles.min(axis=1)
@@ -149,25 +149,25 @@ class Seen:
         return flags
 
     @property
-    def _jacks(self) -> NDArray[np.bool_]:
+    def _jacks(self) -> Flags:
         up = np.greater(self.pair("Hand")[..., 1], self.pair("UpperArm")[..., 1])
         return np.asarray(up.all(axis=1))
 
     @property
-    def _kicks(self) -> NDArray[np.bool_]:
+    def _kicks(self) -> Flags:
         return np.asarray(self.soles >= 0.45)
 
     @property
-    def _punches(self) -> NDArray[np.bool_]:
+    def _punches(self) -> Flags:
         out = np.linalg.norm((self.pair("Hand") - self.joint("chest")[:, None])[..., ::2], axis=2)
         return np.asarray(np.gradient(out, axis=0) * self.fps >= 2.0)
 
     @property
-    def _dips(self) -> NDArray[np.bool_]:
+    def _dips(self) -> Flags:
         return np.asarray(self.joint("hips")[:, 1] < T_POSE[HUMANOID.index("hips"), 1] - 0.2)
 
     @property
-    def _bows(self) -> NDArray[np.bool_]:
+    def _bows(self) -> Flags:
         trunk = self.joint("neck") - self.joint("hips")
         return np.asarray(np.degrees(np.arctan2(np.linalg.norm(trunk[:, ::2], axis=1), trunk[:, 1])) >= 25)
 
@@ -231,7 +231,7 @@ class Seen:
         return len(self.points) / self.fps if kind == "seconds" else np.nan
 
 
-def spells(flags: NDArray[np.bool_]) -> Spans:
+def spells(flags: Flags) -> Spans:
     """The frames from which to which flags (T,) are true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]))).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))

@@ -1,7 +1,7 @@
 """Drawing a story: one request after another, in pieces as they come, or to a measure where a request has numbers."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import Any, NamedTuple
@@ -83,6 +83,57 @@ class Piece(NamedTuple):
     """Frames by which the passage of that request becomes longer."""
 
 
+@dataclass(eq=False)
+class Limited:
+    """The frames of a run that are shown, up to a limit."""
+
+    limit: int | None = None
+    """Frames of the run by the end of the request."""
+
+    count: int = 0
+    """Frames shown so far."""
+
+    def next(self, frames: Array) -> Array:
+        """The frames (T, D) that are within the limit."""
+        if self.limit is not None:
+            frames = frames[: self.limit - self.count]
+        self.count += len(frames)
+        return frames
+
+
+@dataclass(eq=False)
+class OnDemand:
+    """Draws and decodes no more steps than the frames that are called for need."""
+
+    decoder: StreamingDecoder
+    drawn: Iterator[tuple[Ids, Ids]]
+    """As of :func:`motet.generate.codes.drawn_steps`."""
+
+    steps: int
+    """How many there are."""
+
+    waiting: Array
+    """Frames (T, D) that are decoded and not called for yet."""
+
+    pushed: int = 0
+    """Steps that the decoder has."""
+
+    def next(self, until: float, count: int, ends: bool) -> Array:
+        """The next ``count`` frames, up to the frame ``until``; all steps are decoded where the motion ends."""
+        field = self.decoder.codec.field
+        needed = self.steps if ends else min(self.steps, math.ceil(until / field.hop) + field.ahead + 1)
+        codes: list[Ids] = []
+        for _, step in islice(self.drawn, needed - self.pushed):
+            codes += list(step)
+        self.pushed = needed
+        decoded = [self.waiting, self.decoder.push(np.array(codes))]
+        if ends:
+            decoded.append(self.decoder.finish())
+        frames = np.concatenate(decoded)
+        self.waiting = frames[count:]
+        return frames[:count]
+
+
 @dataclass(frozen=True, eq=False)
 class Teller:
     """Draws the requests of a story."""
@@ -135,52 +186,44 @@ class Teller:
         writer = self._writer(context)
         decoder = StreamingDecoder(self.codec, context)
         hop = self.codec.field.hop
+        shown = Limited()
         steps_drawn = 0
-        frames_shown = 0
         end = 0.0  # seconds at which a request is to end
-        limit: int | None = None  # frames by then
         number = action = 0
         for number, request in run:
             actions = self._action(request)
             action = int(actions[0])
-            yield Piece(number, action, np.empty((0, len(self.contract.channels))), 0)
+            yield Piece(number, action, self._no_frames, 0)
 
             # Lengths count from the start of the run, so that rounding errors do not add up.
-            exactly = request.seconds > 0
             end += request.seconds
-            if exactly:
-                longest = self.codec.steps(end) - steps_drawn
-                limit = max(1, round(end * self.contract.fps))
-            else:
-                longest = self.codec.steps(self.settings["max_seconds"])
-                limit = None
+            exactly = request.seconds > 0
+            longest = self.codec.steps(end) - steps_drawn if exactly else self.codec.steps(self.settings["max_seconds"])
+            shown.limit = max(1, round(end * self.contract.fps)) if exactly else None
             for _, step in drawn_steps(writer, actions, longest, exactly=exactly):
                 steps_drawn += 1
-                frames = decoder.push(step)[: None if limit is None else limit - frames_shown]
-                frames_shown += len(frames)
-                yield Piece(number, action, frames, hop)
+                yield Piece(number, action, shown.next(decoder.push(step)), hop)
             if not exactly:
                 end = steps_drawn * self.codec.seconds
-        remaining = decoder.finish()[: None if limit is None else limit - frames_shown]
-        yield Piece(number, action, remaining, frames_shown + len(remaining) - steps_drawn * hop)
+        # What the decoder held back, as nothing follows; its steps have been counted in full.
+        last = shown.next(decoder.finish())
+        yield Piece(number, action, last, shown.count - steps_drawn * hop)
 
     def _timed(self, number: int, request: Request, context: Context | None) -> Iterator[Piece]:
         """A request whose length comes first, stretch by stretch: each has its share of the turn and of the length."""
         actions = self._action(request)
-        action = int(actions[0])
         steps = self.codec.steps(request.seconds * request.pace)
         drawn = drawn_steps(self._writer(context), actions, steps, exactly=True, whole=True)
-        frames_drawn = self._decoded_on_demand(drawn, steps, context)
+        decoder = OnDemand(StreamingDecoder(self.codec, context), drawn, steps, self._no_frames)
         length = max(1, round(request.seconds * self.contract.fps))
-        stretches = math.ceil(request.seconds / STRETCH)
-        edges = np.linspace(0, length, stretches + 1).round().astype(int).tolist()
-        lead = np.empty((0, len(self.contract.channels)))  # the last frame before a stretch
+        edges = np.linspace(0, length, math.ceil(request.seconds / STRETCH) + 1).round().astype(int).tolist()
+        lead = self._no_frames  # the last frame before a stretch
         degrees = 0.0
         for start, stop in pairwise(edges):
             # As many frames as are played in the stretch.
             count = round(stop * request.pace) - round(start * request.pace)
-            frames = np.concatenate([lead, frames_drawn(stop * request.pace, count, stop == length)])
-            # Turned by its share of the turn.
+            frames = np.concatenate([lead, decoder.next(stop * request.pace, count, stop == length)])
+            # Turned by its share of the turn, to the side that the first stretch turns to.
             if "degrees" in request.quantities.amounts:
                 seen = Seen.of(self.contract, frames)
                 degrees = degrees or turn_to_make(seen, request.quantities)
@@ -189,72 +232,52 @@ class Teller:
             # And played to its share of the length.
             shown = played(frames, len(frames) / (len(lead) + stop - start))[len(lead) :]
             lead = frames[-1:]
-            yield Piece(number, action, shown, len(shown))
+            yield Piece(number, int(actions[0]), shown, len(shown))
 
-    def _decoded_on_demand(
-        self, drawn: Iterator[tuple[Ids, Ids]], steps: int, context: Context | None
-    ) -> Callable[[float, int, bool], Array]:
-        """A function that decodes no more of the drawn steps than it is called for: the next ``count`` frames, up to
-        the frame ``until``. Where the motion ends, all steps are decoded."""
-        decoder = StreamingDecoder(self.codec, context)
-        field = self.codec.field
-        waiting = np.empty((0, len(self.contract.channels)))
-        pushed = 0
-
-        def decoded(until: float, count: int, ends: bool) -> Array:
-            nonlocal waiting, pushed
-            needed = steps if ends else min(steps, math.ceil(until / field.hop) + field.ahead + 1)
-            codes: list[Ids] = []
-            for _, step in islice(drawn, needed - pushed):
-                codes += list(step)
-            pushed = needed
-            waiting = np.concatenate([waiting, decoder.push(np.array(codes))])
-            if ends:
-                waiting = np.concatenate([waiting, decoder.finish()])
-            frames = waiting[:count]
-            waiting = waiting[count:]
-            return frames
-
-        return decoded
+    @property
+    def _no_frames(self) -> Array:
+        return np.empty((0, len(self.contract.channels)))
 
     def _measured(self, number: int, request: Request, context: Context | None) -> Iterator[Piece]:
         """The whole of a request: drawn again and again until its numbers are reached, and fitted to them."""
         quantities = request.quantities
-        writer = self._writer(context)
         actions = self._action(request)
-        steps = self.codec.steps(request.seconds or self.settings["max_seconds"])
         most = self._most_steps(quantities)
         times = int(quantities.amounts.get("times", 1))
         least_rounds = 1 if quantities.act else times
-        rounds = 0
         steps_measured = 0
+        for rounds, codes in enumerate(self._again(request, actions, context), start=1):
+            # A long motion is not decoded and measured after each draw.
+            over = len(codes) >= most
+            if not over and (rounds < least_rounds or len(codes) < 1.2 * steps_measured):
+                continue
+            steps_measured = len(codes)
+            decoder = StreamingDecoder(self.codec, context)
+            frames = np.concatenate([decoder.push(codes), decoder.finish()])
+            # It ends with what is requested, or where as many draws have never shown the act.
+            seen = Seen.of(self.contract, frames)
+            in_vain = (
+                "times" in quantities.amounts and rounds - least_rounds >= times - 1 and not seen.done(quantities.act)
+            )
+            if over or in_vain or enough(seen, quantities):
+                break
+        frames = fitted(self.contract, frames, quantities)
+        yield Piece(number, int(actions[0]), frames, len(frames))
+
+    def _again(self, request: Request, actions: Ids, context: Context | None) -> Iterator[Ids]:
+        """The codes (N, P) of an action drawn once, twice, and so on without end."""
+        writer = self._writer(context)
+        steps = self.codec.steps(request.seconds or self.settings["max_seconds"])
         codes = np.empty((0, self.source.parts), np.int64)
         while True:
             drawn = [step for _, step in drawn_steps(writer, actions, steps, whole=True)]
             codes = np.concatenate([codes, *drawn])
-            rounds += 1
-            over = len(codes) >= most
-            # A long motion is not decoded and measured after each draw.
-            if not over and (rounds < least_rounds or len(codes) < 1.2 * steps_measured):
-                continue
-            frames = self._decoded(codes, context)
-            steps_measured = len(codes)
-            seen = Seen.of(self.contract, frames)
-            tries = 1 - least_rounds + rounds
-            never = "times" in quantities.amounts and tries >= times and not seen.done(quantities.act)
-            if over or never or enough(seen, quantities):
-                break
-        frames = fitted(self.contract, frames, quantities)
-        yield Piece(number, int(actions[0]), frames, len(frames))
+            yield codes
 
     def _most_steps(self, quantities: Quantities) -> int:
         """Steps after which a motion is not continued, by the slowest progress towards its numbers."""
         seconds = sum(abs(quantities.amounts.get(kind, 0)) / slowest for kind, slowest in SLOWEST.items())
         return self.codec.steps(min(LONGEST, 10 + seconds))
-
-    def _decoded(self, codes: Ids, context: Context | None) -> Array:
-        decoder = StreamingDecoder(self.codec, context)
-        return np.concatenate([decoder.push(codes), decoder.finish()])
 
 
 def _runs(requests: Sequence[Request]) -> list[list[tuple[int, Request]]]:

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Ids, Loop, Noise, Sample, Scores, advance, two_rows, zero_state
+from motet.decode.loop import Flags, Ids, Loop, Noise, Sample, Scores, advance, two_rows, zero_state
 from motet.settings import Range, Settings
 
 SMALLEST = 2.0**-24
@@ -99,7 +98,7 @@ class _Beam:
         self.state = {name: np.take(array, places.ravel(), axis=0) for name, array in state.items()}
         return True
 
-    def _rank(self, alive: Ids, flags: NDArray[np.bool_], gains: Scores) -> tuple[Ids, Ids]:
+    def _rank(self, alive: Ids, flags: Flags, gains: Scores) -> tuple[Ids, Ids]:
         """Keep the best of each row's candidates: the parent and the candidate of each, (B, W)."""
         rows, hypotheses = self.shape
         scores = np.full((rows * hypotheses, self.candidates), -np.inf)
@@ -133,7 +132,7 @@ class _Beam:
 
 def draw(
     outputs: Arrays, normal: Floats, uniform: Floats, temperature: float, forced: bool | None
-) -> tuple[Floats, NDArray[np.bool_], Scores]:
+) -> tuple[Floats, Flags, Scores]:
     """What noise, normal (n, C, D) and uniform (n, C, 2), draws from a step's distributions for n hypotheses.
 
     forced: the flag where there is no choice. Frames (n, C, D), flags (n, C) and the log-likelihoods of both (n, C).
