@@ -5,6 +5,7 @@ import shutil
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from importlib import import_module
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, get_args, get_overloads, get_type_hints
@@ -14,6 +15,7 @@ import onnxruntime
 import pytest
 from click.testing import CliRunner
 
+import motet
 from motet.bench.cases import cases
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle
 from motet.bundle.graph import SessionOptions
@@ -42,7 +44,7 @@ def edit(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
-    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, *PAPERS])
+    assert list(list_bundles()) == sorted([*KINDS, *PAPERS])
     for name, path in list_bundles().items():
         bundle = Bundle.open(name)
         assert bundle.name == name == path.stem
@@ -56,17 +58,22 @@ def test_the_shipped_bundles_are_whole_and_give_their_golden_vectors() -> None:
 
 def test_the_type_of_a_bundle_loaded_by_name_is_known() -> None:
     kinds = {}
+    names = {name: getattr(motet, name) for name in motet.__all__}
     for overload in get_overloads(load):
-        hints = get_type_hints(overload)
+        hints = get_type_hints(overload, localns=names)
         kinds |= {name: hints["return"] for name in get_args(hints["name_or_path"]) if isinstance(name, str)}
     assert {name: type(load(name)) for name in list_bundles()} == kinds
 
 
 def test_every_kind_of_model_is_measured_and_has_loops_of_its_own() -> None:
-    assert all(cases.dispatch(kind) is not cases.dispatch(object) for kind in KINDS)
-    loops = [loop for kind in KINDS for loop in kind.LOOPS]
-    assert all(kind.LOOPS for kind in KINDS)
+    loops = [loop for by_loop in KINDS.values() for loop in by_loop]
     assert len(loops) == len(set(loops))
+    places = {place for by_loop in KINDS.values() for place in by_loop.values()}
+    for place in places:
+        module, _, name = place.rpartition(".")
+        kind = getattr(import_module(f"motet.{module}"), name)
+        assert kind.LOOPS
+        assert cases.dispatch(kind) is not cases.dispatch(object)
 
 
 def test_folder_and_zip_run_alike_and_pack_to_the_same_bytes(folder: Path, tmp_path: Path) -> None:
@@ -272,10 +279,10 @@ def test_packages_bring_bundles_by_an_entry_point(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: points if group == "motet.bundles" else ())
     assert load("bends").manifest.name == "tdbn"
     assert load("describe").manifest.name == "describe"  # motet's own come first
-    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, *PAPERS, "bends"])
+    assert list(list_bundles()) == sorted([*KINDS, *PAPERS, "bends"])
     gone = EntryPoint("gone", "not_installed_any_more", "motet.bundles")
     monkeypatch.setattr("motet.bundle.bundle.entry_points", lambda group: (gone,))
-    assert list(list_bundles()) == sorted([*{kind.VERB for kind in KINDS}, *PAPERS])
+    assert list(list_bundles()) == sorted([*KINDS, *PAPERS])
     with pytest.raises(BundleError, match="unknown bundle 'bends'"):
         load("bends")
 
