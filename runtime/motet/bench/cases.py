@@ -18,6 +18,7 @@ from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
 from motet.models.language import LanguageModel
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Skeleton
 from motet.papers.mixture_model import MixtureModel
 from motet.papers.tdbn_control import TdbnModel
 from motet.predict.fill import FillModel
@@ -148,20 +149,25 @@ def predict_cases(model: PredictModel, file: Path | None = None) -> list[Case]:
     ]
     if motion.skeleton is None:
         return cases
-    joints = [replace(joint, offset=(*(1.1 * np.array(joint.offset)),)) for joint in motion.skeleton.joints]
-    other = replace(motion, skeleton=replace(motion.skeleton, joints=tuple(joints))).resample(100.0)
-    session = model.stream(other)
-
-    def pushed() -> None:
-        session.push(other.values[-1])
-        session.predict()
-
     path = file or _written("predict.bvh", motion)
     return [
         *cases,
-        Case("predict.streamed", pushed),
+        Case("predict.streamed", _streamed(model, motion, motion.skeleton)),
         Case("predict.file", lambda: model.predict(read_motion(path))),
     ]
+
+
+def _streamed(model: PredictModel, motion: Motion, skeleton: Skeleton) -> Callable[[], None]:
+    """A frame of a larger figure that is pushed at 100 Hz, and its prediction."""
+    joints = [replace(joint, offset=(*(1.1 * np.array(joint.offset)),)) for joint in skeleton.joints]
+    larger = replace(motion, skeleton=replace(skeleton, joints=tuple(joints))).resample(100.0)
+    session = model.stream(larger)
+
+    def pushed() -> None:
+        session.push(larger.values[-1])
+        session.predict()
+
+    return pushed
 
 
 @cases.register

@@ -64,12 +64,18 @@ def profiled(options: SessionOptions, call_of: Callable[[SessionOptions], Call],
         taken = time.perf_counter() - start
         del call
         gc.collect()  # a session writes its profile when it ends
-        events = list[dict[str, Any]]()
-        for file, since in zip(sorted(Path(folder).iterdir()), begun, strict=True):
-            earliest = start - PAUSE - since
-            recorded = json.loads(file.read_text(encoding="utf-8"))
-            events += [event for event in recorded if event["ts"] / 1e6 > earliest]
+        since_begin = [start - PAUSE - session_begin for session_begin in begun]
+        events = _events_after(since_begin, Path(folder))
     return _summed(events, taken, count)
+
+
+def _events_after(seconds: Sequence[float], folder: Path) -> list[dict[str, Any]]:
+    """The events in the profiles of a folder, of each session those later than so many seconds after its begin."""
+    events = list[dict[str, Any]]()
+    for file, earliest in zip(sorted(folder.iterdir()), seconds, strict=True):
+        recorded = json.loads(file.read_text(encoding="utf-8"))
+        events += [event for event in recorded if event["ts"] / 1e6 > earliest]
+    return events
 
 
 def with_profiles(

@@ -99,25 +99,30 @@ def measured(
 
 def _print(rows: list[Row], before: dict[str, float], profile: bool) -> None:
     for row in rows:
-        line = f"{row.name:<24} {row.value:>10,.1f} {row.unit:<9}"
-        if row.batch > 1:
-            line += f" of {row.batch}"
-        if row.times is not None:
-            times = row.times
-            line += f"  p95 {times.p95:,.3g} p99 {times.p99:,.3g} mean {times.mean:,.3g} cpu {times.processor:,.3g} ms"
-        for rival, comparison in row.beside.items():
-            line += f"  x{comparison.ratio:.2f} (cpu x{comparison.processor_ratio:.2f})"
-            line += f" of {rival} {comparison.value:,.1f}"
-        if row.share is not None:
-            line += f"  {row.gflop:.3g} GFLOP, {100 * row.share:.0f} % of peak"
-        if before.get(row.name):
-            gain = row.value / before[row.name]
-            line += f"  x{1 / gain if row.unit in LESS else gain:.2f} of before"
-        click.echo(line)
+        click.echo(_line(row, before.get(row.name)))
         if profile and row.parts:
             whole = sum(row.parts.values())
             parts = [(name, of / whole) for name, of in row.parts.items() if of > 0.02 * whole]
             click.echo("    " + ", ".join(f"{name} {100 * of:.0f} %" for name, of in parts))
+
+
+def _line(row: Row, before: float | None) -> str:
+    """A row, beside its value of before."""
+    line = f"{row.name:<24} {row.value:>10,.1f} {row.unit:<9}"
+    if row.batch > 1:
+        line += f" of {row.batch}"
+    if row.times is not None:
+        times = row.times
+        line += f"  p95 {times.p95:,.3g} p99 {times.p99:,.3g} mean {times.mean:,.3g} cpu {times.processor:,.3g} ms"
+    for rival, comparison in row.beside.items():
+        line += f"  x{comparison.ratio:.2f} (cpu x{comparison.processor_ratio:.2f})"
+        line += f" of {rival} {comparison.value:,.1f}"
+    if row.share is not None:
+        line += f"  {row.gflop:.3g} GFLOP, {100 * row.share:.0f} % of peak"
+    if before:
+        gain = row.value / before
+        line += f"  x{1 / gain if row.unit in LESS else gain:.2f} of before"
+    return line
 
 
 def _earlier(file: Path) -> dict[str, Any]:

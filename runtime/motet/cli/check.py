@@ -120,15 +120,21 @@ def _print_text(rows: Iterator[Row], sources: Sequence[Source], counts: Mapping[
     head = ("figure", "sure", "tall m", "seconds", "fps", "facing", "ground m", "travel m", "notes")
     click.echo(f"{'file':<{width}}{COLUMNS.format(*head)}")
     for file, of_file in groupby(rows, key=lambda row: row.source.path):
-        last = None
-        for row in of_file:
-            if row.source.part and last is None:
-                click.echo(str(file))
-            name = f"  {row.source.part}" if row.source.part else str(file)
-            line = f"{row.verdict}, as above" if row.reason and last and last.reason == row.reason else _line(row)
-            click.echo(f"{name:<{width - 2}}  {line}")
-            last = row
+        _print_file(file, of_file, width)
     click.echo(f"{len(sources)} motions: " + ", ".join(f"{count} {word}" for word, count in counts.items()))
+
+
+def _print_file(file: Path, rows: Iterable[Row], width: int) -> None:
+    """The lines of one file in the table, below its name where it has several clips."""
+    last = None
+    for row in rows:
+        if row.source.part and last is None:
+            click.echo(str(file))
+        name = f"  {row.source.part}" if row.source.part else str(file)
+        is_as_above = row.reason and last and last.reason == row.reason
+        line = f"{row.verdict}, as above" if is_as_above else _line(row)
+        click.echo(f"{name:<{width - 2}}  {line}")
+        last = row
 
 
 def _line(row: Row) -> str:
@@ -154,19 +160,26 @@ def _report(row: Row) -> Iterator[str]:
     checked = row.checked
     if checked is None:
         return iter((str(row.source), f"  {row.verdict:<9} {row.reason}"))
-    facts: list[tuple[str, str]] = []
-    if checked.clips:
-        facts.append(("clip", f"{checked.clip}, {checked.clips.index(checked.clip or '') + 1} of {len(checked.clips)}"))
-    if len(checked.figures) > 1:
-        names = ", ".join(checked.figures)
-        taken = "the default" if checked.figure is None else checked.figure
-        facts.append(("figures", f"{taken}, of {len(checked.figures)}: {names} (--figure)"))
+    facts = _parts_of_file(checked)
     facts += [("refused", checked.refused)] if checked.refused else _understood(checked)
     facts.append(("length", size(checked.frames, checked.fps)))
     facts += [("" if number else "assumed", note) for number, note in enumerate(checked.notes)]
     if row.source.place is not None:
         facts.append(("page", str(row.source.place)))
     return chain([str(row.source)], (f"  {name:<9} {text}" for name, text in facts))
+
+
+def _parts_of_file(checked: Checked) -> list[tuple[str, str]]:
+    """Which clip and figure of the file it is, where there are several."""
+    facts: list[tuple[str, str]] = []
+    if checked.clips:
+        number = checked.clips.index(checked.clip or "") + 1
+        facts.append(("clip", f"{checked.clip}, {number} of {len(checked.clips)}"))
+    if len(checked.figures) > 1:
+        names = ", ".join(checked.figures)
+        figure = "the default" if checked.figure is None else checked.figure
+        facts.append(("figures", f"{figure}, of {len(checked.figures)}: {names} (--figure)"))
+    return facts
 
 
 def _understood(checked: Checked) -> list[tuple[str, str]]:

@@ -132,35 +132,43 @@ def size(frames: int, fps: float) -> str:
     return f"{frames} frames at {fps:g} fps, {round(frames / fps, 2):g} s"
 
 
+NAME_FIELDS = re.compile(r"\{(name|clip)\}")
+
+
+def _named(out: Path, source: Source | str) -> Path:
+    """OUT with the names of a source in it."""
+
+    def name_of(field: re.Match[str]) -> str:
+        if isinstance(source, str):
+            return source
+        return source.name if field[1] == "name" else source.label
+
+    return Path(NAME_FIELDS.sub(name_of, str(out)))
+
+
+def _numbered(place: Path, count: int) -> list[Path]:
+    """A place for each of several results."""
+    if count <= 1:
+        return [place] * count
+    return [place.with_stem(f"{place.stem}-{number}") for number in range(1, count + 1)]
+
+
 def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output: Output | None = None) -> list[Path]:
     """Where results go: by ``{name}`` and ``{clip}`` in OUT, or several numbered: out-1.bvh, out-2.bvh, ...
 
     samples: how many results each source has, one after the other, which are numbered in any case.
     output: how they are written; a character takes all that go to one place.
     """
-    fields = r"\{(name|clip)\}"
-
-    def named(source: Source | str) -> Path:
-        def name(field: re.Match[str]) -> str:
-            if isinstance(source, str):
-                return source
-            return source.name if field[1] == "name" else source.label
-
-        return Path(re.sub(fields, name, str(out)))
-
-    def numbered(place: Path, count: int) -> list[Path]:
-        return [place.with_stem(f"{place.stem}-{i}") if count > 1 else place for i in range(1, count + 1)]
-
     onto = output is not None and output.onto is not None
     targets: list[Path] = []
     if onto:
         for source in sources:
-            targets += [named(source)] * samples
-    elif re.search(fields, str(out)):
+            targets += [_named(out, source)] * samples
+    elif NAME_FIELDS.search(str(out)):
         for source in sources:
-            targets += numbered(named(source), samples)
+            targets += _numbered(_named(out, source), samples)
     else:
-        targets = numbered(out, len(sources) * samples)
+        targets = _numbered(out, len(sources) * samples)
     if len(set(targets)) < len(targets) and not onto:
         raise click.UsageError(
             "several results have the same name: give an OUT with {name} and, for clips, {clip}, or without both"

@@ -77,27 +77,27 @@ class Moves:
                 rises[frame] = key.place[1:2] - root[frame, 1:2]
         root[:, 1:2] += _swell(rises, len(root), reach)
 
-        # The rotation of each joint, as a rotation vector from the motion to the key.
-        for joint in set().union(*(key.turns for key in keys.values())):
-            before = turns[:, joint]
-            off = {}
-            for frame, key in keys.items():
-                if joint in key.turns:
-                    off[frame] = rotmat_to_rotvec(key.turns[joint] @ before[frame].T)
-            turns[:, joint] = product(rotvec_to_rotmat(_swell(off, len(root), reach)), before)
+        # The rotation of each joint.
+        joints = set[int]().union(*(key.turns for key in keys.values()))
+        for joint in joints:
+            rotations = {frame: key.turns[joint] for frame, key in keys.items() if joint in key.turns}
+            turns[:, joint] = _turned(turns[:, joint], rotations, reach)
         return Moves(turns, root, moves.facing)
 
     def _led(self, keys: Mapping[int, Key]) -> "Moves":
         """The path turned and moved over the ground, as a whole before the first key and after the last, and evenly in
         between."""
         count = len(self.root)
+
         # Turned, every step of the path about the vertical axis.
         turn = {frame: self._off(frame, key) for frame, key in keys.items()}
         angle = _evenly(turn, count)
         about = axis_to_rotmat("y", angle)
-        turns = np.concatenate([product(about, self.turns[:, 0])[:, None], self.turns[:, 1:]], axis=1)
+        turns = self.turns.copy()
+        turns[:, 0] = product(about, turns[:, 0])
         steps = np.diff(self.root, axis=0, prepend=self.root[:1])
         root = self.root[:1] + np.cumsum(rotated(about, steps), axis=0)
+
         # Then moved along x and z.
         for axis in (0, 2):
             shift = {frame: float(key.place[axis] - root[frame, axis]) for frame, key in keys.items()}
@@ -109,6 +109,13 @@ class Moves:
         if 0 in key.turns and np.isnan(key.facing):
             return float(rotmat_to_rotvec(twist((key.turns[0] @ self.turns[frame, 0].T)[None], UP))[0, 1])
         return float(wrapped(np.array(key.facing - self.facing[frame])))
+
+
+def _turned(rotations: Array, keys: Mapping[int, Array], reach: int) -> Array:
+    """Rotations (T, 3, 3) of a joint that pass through those of keys, each (3, 3), by frame."""
+    differences = {frame: rotmat_to_rotvec(key @ rotations[frame].T) for frame, key in keys.items()}
+    turned: Array = product(rotvec_to_rotmat(_swell(differences, len(rotations), reach)), rotations)
+    return turned
 
 
 def _evenly(values: Mapping[int, float], count: int, wraps: bool = True) -> Array:
@@ -127,6 +134,21 @@ def _swell(values: Mapping[int, Array], count: int, reach: int) -> Array:
     between keys that are nearer to each other they go from one to the next."""
     if not values:
         return np.zeros((count, 1))
+    knots = _knots(values, reach)
+    knot_frames = np.array(sorted(knots))
+    heights = np.array([knots[frame] for frame in knot_frames.tolist()])
+
+    # Between two knots, a cubic that is flat at both.
+    frames = np.arange(count).clip(knot_frames[0], knot_frames[-1])
+    left = np.searchsorted(knot_frames, frames, side="right").clip(1, len(knots) - 1) - 1
+    right = left + 1
+    share = ((frames - knot_frames[left]) / (knot_frames[right] - knot_frames[left]))[:, None]
+    swell: Array = heights[left] + share**2 * (3 - 2 * share) * (heights[right] - heights[left])
+    return swell
+
+
+def _knots(values: Mapping[int, Array], reach: int) -> dict[int, Array]:
+    """The values by frame, and zeros ``reach`` frames before and after those that have no neighbour there."""
     frames = sorted(values)
     zero = 0 * values[frames[0]]
     knots = {frames[0] - reach: zero, frames[-1] + reach: zero}
@@ -134,12 +156,4 @@ def _swell(values: Mapping[int, Array], count: int, reach: int) -> Array:
         if after - before > 2 * reach:
             knots[before + reach] = zero
             knots[after - reach] = zero
-    knots |= values
-    # Between two knots, a cubic that is flat at both.
-    at = np.array(sorted(knots))
-    heights = np.array([knots[frame] for frame in at.tolist()])
-    now = np.arange(count).clip(at[0], at[-1])
-    left = np.searchsorted(at, now, side="right").clip(1, len(at) - 1) - 1
-    share = ((now - at[left]) / (at[left + 1] - at[left]))[:, None]
-    swell: Array = heights[left] + share**2 * (3 - 2 * share) * (heights[left + 1] - heights[left])
-    return swell
+    return knots | dict(values)

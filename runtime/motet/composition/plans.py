@@ -152,6 +152,11 @@ def time_line(moments: Sequence[Moment]) -> list[Moment]:
             )
         if moment is not line[-1] and moment == Moment(moment.at):
             raise SettingError(f"moment {number}, at {moment.at:g} s, asks for nothing")
+    _check_prompts(line)
+    return line
+
+
+def _check_prompts(line: Sequence[Moment]) -> None:
     end = line[-1]
     if end.text is not None:
         raise SettingError(f"the last moment is the end: {quoted(end.text)} needs a later one")
@@ -160,4 +165,3 @@ def time_line(moments: Sequence[Moment]) -> list[Moment]:
         seconds = following.at - prompt.at
         if seconds < SHORTEST:
             raise SettingError(f"{quoted(str(prompt.text))} has {seconds:.2g} s: a prompt needs {SHORTEST:g}")
-    return line

@@ -98,16 +98,22 @@ def walked(model: SteerModel, walk: Walk, after: Motion | None) -> Motion:
     session = model.start(walk.gait.name)
     ground = np.zeros(3) if after is None else _take_over(session, model, after)
     _check(walk, ground, model.fps)
-    ticks_between = round(AGAIN * model.fps)
+    poses = _ticked(session, walk, ground, model.fps)
+    poses.insert(0, replace(poses[0], ground=ground[None]))
+    return model.contract.motion(session.frames_of(poses)[0, 1:], after=after, plant=False)
+
+
+def _ticked(session: SteerSession, walk: Walk, ground: Array, fps: float) -> list[Pose]:
+    """The poses of a walk, of which each leg is commanded again and again; ground: x, z and facing (3,) before."""
+    ticks_between = round(AGAIN * fps)
     poses: list[Pose] = []
     for now in range(walk.start, walk.stop):
         leg = next((leg for leg in walk.legs if leg.frame >= now), walk.legs[-1])
         if (now - walk.start) % ticks_between == 0:
             place = poses[-1].ground[0] if poses else ground
-            _command(session, walk, leg, (leg.frame + 1 - now) / model.fps, place)
+            _command(session, walk, leg, (leg.frame + 1 - now) / fps, place)
         poses.append(session.tick())
-    poses.insert(0, replace(poses[0], ground=ground[None]))
-    return model.contract.motion(session.frames_of(poses)[0, 1:], after=after, plant=False)
+    return poses
 
 
 def _take_over(session: SteerSession, model: SteerModel, motion: Motion) -> Array:
@@ -124,19 +130,24 @@ def _take_over(session: SteerSession, model: SteerModel, motion: Motion) -> Arra
 def _command(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: Array) -> None:
     """Command a session to go to a place in the seconds left, but no slower than the gait, and to stand there."""
     gait = walk.gait
-    gap = np.zeros(2) if leg.place is None else leg.place - ground[:2]
-    far = float(np.hypot(*gap))
-    way = float(np.arctan2(*gap))
-    left -= _pause(walk, leg, way)
+    backwards = math.pi * gait.back
     if leg.place is None and leg.facing is not None:
-        speed = gait.usual
-        way = leg.facing + math.pi * gait.back
-    elif far < NEAR or left <= 0:
+        _go(session, gait, gait.usual, leg.facing + backwards)
+        return
+    gap = np.zeros(2) if leg.place is None else leg.place - ground[:2]
+    distance = float(np.hypot(*gap))
+    direction = float(np.arctan2(*gap))
+    left -= _pause(walk, leg, direction)
+    if distance < NEAR or left <= 0:
         session.control(speed=0, facing=None if leg.facing is None else math.degrees(leg.facing))
         return
-    else:
-        speed = float(np.clip(far / max(left, AGAIN), gait.low, gait.high))
-    degrees = math.degrees(way)
+    speed = float(np.clip(distance / max(left, AGAIN), gait.low, gait.high))
+    _go(session, gait, speed, direction)
+
+
+def _go(session: SteerSession, gait: Gait, speed: float, direction: float) -> None:
+    """Command a gait at a speed in m/s and a direction in radians, facing that way or, backwards, away from it."""
+    degrees = math.degrees(direction)
     session.control(gait=gait.name, speed=speed, direction=degrees, facing=degrees + 180 * gait.back)
 
 

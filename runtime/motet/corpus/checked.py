@@ -1,7 +1,7 @@
 """What a motion file holds and how it is understood: what to look at first of a file that nobody knows."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -97,30 +97,57 @@ def check(file: str | Path, *, clip: Clip = None, figure: Figure = None, **optio
     motion, has the reason in :attr:`Checked.refused`.
     """
     motion = read_motion(file, clip=clip, figure=figure, **options)
-    unnamed, named_clip, named_figure = split_part(file, options.get("format"))
-    clip = named_clip if clip is None else clip
-    figure = named_figure if figure is None else figure
-    path = place_of(unnamed)
-    parts = contents_of(path, format=options.get("format"))
-    titles = tuple(parts.figures)
-    if clip is None and figure is None and parts.clips:
-        clip = 1
-    at, place_of_figure = choice(path, parts, clip, figure)
-    taken = None if at is None else parts.clips[at]
-    title = None if place_of_figure is None else titles[place_of_figure]
-    joints = 0 if motion.skeleton is None else len(motion.skeleton.joints)
-    about = (str(path), taken, parts.clips, title, titles, len(motion), motion.fps, joints)
+    checked = _described(motion, file, clip, figure, options.get("format"))
     try:
         humanoid = to_humanoid(motion)
     except MotionError as error:
-        return Checked(*about, refused=str(error))
-    way = np.ptp(positions(humanoid.motion)[:, 0], axis=0)
-    travel = float(np.hypot(way[0], way[2])) * (humanoid.leg or leg_length()) / leg_length()
+        return replace(checked, refused=str(error))
+    ground, lowest = _heights(motion, humanoid)
     strides = is_in_place(motion)
-    measured = (_facing(humanoid.motion), *_heights(motion, humanoid), travel)
-    understood = humanoid.convention, humanoid.confidence, humanoid.unit, humanoid.height
-    notes = (*humanoid.notes, IMPLIED) if strides else humanoid.notes
-    return Checked(*about, None, *understood, *measured, strides, notes, humanoid.joints)
+    return replace(
+        checked,
+        convention=humanoid.convention,
+        confidence=humanoid.confidence,
+        unit=humanoid.unit,
+        height=humanoid.height,
+        facing=_facing(humanoid.motion),
+        ground=ground,
+        lowest=lowest,
+        travel=_travel(humanoid),
+        strides=strides,
+        notes=(*humanoid.notes, IMPLIED) if strides else humanoid.notes,
+        bones=humanoid.joints,
+    )
+
+
+def _described(motion: Motion, file: str | Path, clip: Clip, figure: Figure, format: str | None) -> Checked:
+    """What a file says of a motion in it; clip and figure as :func:`check` takes them."""
+    unnamed, named_clip, named_figure = split_part(file, format)
+    clip = named_clip if clip is None else clip
+    figure = named_figure if figure is None else figure
+    path = place_of(unnamed)
+    parts = contents_of(path, format=format)
+    if clip is None and figure is None and parts.clips:
+        clip = 1
+    clip_index, figure_index = choice(path, parts, clip, figure)
+    names = tuple(parts.figures)
+    return Checked(
+        file=str(path),
+        clip=None if clip_index is None else parts.clips[clip_index],
+        clips=parts.clips,
+        figure=None if figure_index is None else names[figure_index],
+        figures=names,
+        frames=len(motion),
+        fps=motion.fps,
+        joints=0 if motion.skeleton is None else len(motion.skeleton.joints),
+        refused=None,
+    )
+
+
+def _travel(humanoid: Humanoid) -> float:
+    """Metres between the ends of the ground that the hips pass over."""
+    extent = np.ptp(positions(humanoid.motion)[:, 0], axis=0)
+    return float(np.hypot(extent[0], extent[2])) * (humanoid.leg or leg_length()) / leg_length()
 
 
 def _facing(motion: Motion) -> float | None:

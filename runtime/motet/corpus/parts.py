@@ -173,9 +173,29 @@ def merge(paths: Sequence[Path], out: Path) -> int:
 
 def _complete(folders: Sequence[Path]) -> list[Path]:
     """All parts of one corpus, in order."""
-    paths = [file for path in folders for file in (sorted(path.glob("*.jsonl*")) if path.is_dir() else [path])]
+    by_shard = _by_shard(_part_files(folders))
+    parts = list(by_shard.values())
+    count = Shard.parse(next(iter(by_shard))).count
+    expected = [str(Shard(number, count)) for number in range(1, count + 1)]
+    missing = [name for name in expected if name not in by_shard]
+    if wrong := missing or sorted(by_shard.keys() - set(expected)):
+        reason = f"these shards are missing or of another count: {', '.join(wrong[:9])}"
+        raise FormatError(parts[0].parent, f"{reason}; run the command with --shard for each")
+    return [by_shard[name] for name in expected]
+
+
+def _part_files(folders: Sequence[Path]) -> list[Path]:
+    """The files of parts, of folders all in them."""
+    paths: list[Path] = []
+    for path in folders:
+        paths += sorted(path.glob("*.jsonl*")) if path.is_dir() else [path]
     if not paths:
         raise FormatError(folders[0], "no parts (.jsonl) are in it")
+    return paths
+
+
+def _by_shard(paths: Sequence[Path]) -> dict[str, Path]:
+    """Complete parts that were made alike, by their shards."""
     by_shard: dict[str, Path] = {}
     first: dict[str, Any] = {}
     for path in paths:
@@ -191,12 +211,7 @@ def _complete(folders: Sequence[Path]) -> list[Path]:
         if shard in by_shard:
             raise FormatError(path, f"it is the same shard as {by_shard[shard]}: remove one")
         by_shard[shard] = path
-    count = Shard.parse(shard).count
-    wanted = [str(Shard(number, count)) for number in range(1, count + 1)]
-    if missing := [name for name in wanted if name not in by_shard] or sorted(by_shard.keys() - set(wanted)):
-        reason = f"these shards are missing or of another count: {', '.join(missing[:9])}"
-        raise FormatError(paths[0].parent, f"{reason}; run the command with --shard for each")
-    return [by_shard[name] for name in wanted]
+    return by_shard
 
 
 def _head(path: Path) -> dict[str, Any]:
@@ -329,7 +344,9 @@ def _write_parquet(parts: Sequence[Path], out: Path) -> int:
     schema = pa.schema([(name, pa.string()) for name in columns])
     with pq.ParquetWriter(out, schema) as writer:
         while batch := list(islice(answers, ROWS)):
-            table = {name: [row[key] for row in batch] for name, key in columns.items()}
+            table = {}
+            for name, key in columns.items():
+                table[name] = [row[key] for row in batch]
             writer.write_table(pa.table(table, schema=schema))
             count += len(batch)
     return count

@@ -110,7 +110,10 @@ class Source:
 def files_of(places: Sequence[Path]) -> list[Path]:
     """The motion files that are meant: of folders and zips all in them, of patterns what they match, each in order of
     names. FormatError for a folder, zip or pattern without any."""
-    return [file for path in places for file in _files(path)]
+    files: list[Path] = []
+    for path in places:
+        files += _files(path)
+    return files
 
 
 def _files(path: Path) -> list[Path]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, Floats, Graph
-from motet.decode.loop import Ids, Loop, Scores, advance, taken, two_rows, zero_state
+from motet.decode.loop import Ids, Loop, Scores, State, advance, taken, two_rows, zero_state
 from motet.settings import Range, Settings
 
 
@@ -65,23 +65,31 @@ def beam_search(step: Graph, contexts: Arrays, limits: Limits, beams: int) -> li
     as no ``beams`` others are better; a row is done when all of its have ended.
     """
     rows = len(contexts["context"])
-    end = limits.end
+    first_of_row = np.arange(rows)[:, None] * beams
     scores = np.where(np.arange(beams) == 0, 0.0, -np.inf) * np.ones((rows, 1))
     words = np.full((rows, beams, 1), limits.start, dtype=np.int64)
     state = zero_state(step, rows * beams)
     for length in range(limits.longest + 1):
-        alive = two_rows(np.flatnonzero((words[:, :, -1] != end) & np.isfinite(scores)))
+        last = words[:, :, -1]
+        alive = two_rows(np.flatnonzero((last != limits.end) & np.isfinite(scores)))
         if not len(alive):
             break
-        row = alive // beams
-        inputs: Arrays = {"word": words[:, :, -1].ravel()[alive], **taken(contexts, row)}
+
+        # the graph: the words that may follow those that have not ended
+        inputs: Arrays = {"word": last.ravel()[alive], **taken(contexts, alive // beams)}
         outputs, following = advance(step, taken(state, alive), inputs)
-        left = limits.possible(outputs["log_probabilities"], length)
-        scores, parents, chosen = _best(scores, alive, left, end)
-        words = np.concatenate([np.take_along_axis(words, parents[:, :, None], 1), chosen[:, :, None]], axis=2)
-        places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * beams).ravel() % len(alive)
+        possible = limits.possible(outputs["log_probabilities"], length)
+
+        # the best of each row, each behind its parent's words
+        scores, parents, chosen = _best(scores, alive, possible, limits.end)
+        before = np.take_along_axis(words, parents[:, :, None], 1)
+        words = np.concatenate([before, chosen[:, :, None]], axis=2)
+
+        # a parent that has ended gets the state of some other: it is never used
+        places = np.searchsorted(alive, parents + first_of_row).ravel() % len(alive)
         state = taken(following, places)
-    return [_hypotheses(*row, end) for row in zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)]
+    sequences = zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)
+    return [_hypotheses(ids, row_scores, limits.end) for ids, row_scores in sequences]
 
 
 def _hypotheses(sequences: list[list[int]], scores: list[float], end: int) -> list[Hypothesis]:
@@ -100,19 +108,33 @@ def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Sco
     """
     rows, beams = scores.shape
     width = min(beams, left.shape[1])
-    each = np.arange(len(left))
+    flat_scores = scores.ravel()
     pool = np.full((rows * beams, width), -np.inf)
     words = np.full((rows * beams, width), end, dtype=np.int64)
-    pool[:, 0] = scores.ravel()  # ended hypotheses are kept unchanged
-    for place in range(width):  # a few passes of argmax take a fraction of argpartition's time
-        likeliest = left.argmax(axis=1)
-        words[alive, place] = likeliest
-        pool[alive, place] = scores.ravel()[alive] + left[each, likeliest]
-        left[each, likeliest] = -np.inf
+
+    # ended hypotheses are kept unchanged
+    pool[:, 0] = flat_scores
+
+    likeliest, log_probabilities = _likeliest(left, width)
+    words[alive] = likeliest
+    pool[alive] = flat_scores[alive, None] + log_probabilities
+
     pool = pool.reshape(rows, -1)
     words = words.reshape(rows, -1)
-    order = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
-    return np.take_along_axis(pool, order, 1), order // width, np.take_along_axis(words, order, 1)
+    best = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
+    return np.take_along_axis(pool, best, 1), best // width, np.take_along_axis(words, best, 1)
+
+
+def _likeliest(log_probabilities: NDArray[Any], count: int) -> tuple[Ids, NDArray[Any]]:
+    """The ``count`` likeliest words of each row (N, V), which is used up, and their log-probabilities: (N, count)."""
+    rows = np.arange(len(log_probabilities))
+    words = np.empty((len(rows), count), dtype=np.int64)
+    values = np.empty((len(rows), count), dtype=log_probabilities.dtype)
+    for place in range(count):  # a few passes of argmax take a fraction of argpartition's time
+        words[:, place] = log_probabilities.argmax(axis=1)
+        values[:, place] = log_probabilities[rows, words[:, place]]
+        log_probabilities[rows, words[:, place]] = -np.inf
+    return words, values
 
 
 def noise_of(limits: Limits, draws: int, seed: int = 0) -> Floats:
@@ -132,37 +154,70 @@ def draw_sequences(
     uniform number u (systematic sampling). A word of probability p then comes n p times, rounded up or down, and n p
     times on average: the draws show the distribution better than independent ones.
     """
-    rows = len(contexts["context"])
     noise = noise_of(limits, draws) if noise is None else noise
-    words = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
-    scores = np.zeros(rows * draws)
-    alive = np.arange(rows * draws)  # the draws that have not ended; those that begin alike are neighbours
-    row = two_rows(np.arange(rows))  # of each beginning, as the last word and the state
-    last = np.full(len(row), limits.start, dtype=np.int64)
-    state = zero_state(step, len(row))
-    begun = alive // draws  # of each draw the beginning
+    sequences = _Draws(step, contexts, limits, draws)
     for length in range(limits.longest + 1):
-        if not len(alive):
+        if not len(sequences.alive):
             break
-        inputs: Arrays = {"word": last, **taken(contexts, row)}
-        outputs, following = advance(step, state, inputs)
-        left = limits.possible(outputs["log_probabilities"].astype(np.float64), length)
-        shares = np.cumsum(np.exp((left - left.max(axis=1, keepdims=True)) / temperature), axis=1)
-        chosen = _spread(shares / shares[:, -1:], begun, noise[length, alive % draws])
-        words[alive, length] = chosen
-        scores[alive] += outputs["log_probabilities"][begun, chosen]
-        goes_on = chosen != limits.end
-        longer = (begun * left.shape[1] + chosen)[goes_on]
-        alive = alive[goes_on]
+        sequences.advance(length, temperature, noise[length])
+    return sequences.counted()
+
+
+class _Draws:
+    """B rows of n draws, word by word.
+
+    alive: (A,) the draws that have not ended; those that begin alike are neighbours. beginning: (A,) of each of these.
+    row, last, state: of each different beginning the row of contexts, the last word and the graph's states.
+    """
+
+    def __init__(self, step: Graph, contexts: Arrays, limits: Limits, draws: int) -> None:
+        rows = len(contexts["context"])
+        self.step = step
+        self.contexts = contexts
+        self.limits = limits
+        self.draws = draws
+        self.words = np.full((rows * draws, limits.longest + 1), limits.end, dtype=np.int64)
+        self.scores = np.zeros(rows * draws)
+        self.alive = np.arange(rows * draws)
+        self.beginning = self.alive // draws
+        self.row = two_rows(np.arange(rows))
+        self.last = np.full(len(self.row), limits.start, dtype=np.int64)
+        self.state = zero_state(step, len(self.row))
+
+    def advance(self, length: int, temperature: float, uniform: Floats) -> None:
+        """One more word for each draw that has not ended, by uniform numbers (n,)."""
+        # the graph: the words that may follow each beginning
+        inputs: Arrays = {"word": self.last, **taken(self.contexts, self.row)}
+        outputs, following = advance(self.step, self.state, inputs)
+        log_probabilities = outputs["log_probabilities"]
+        possible = self.limits.possible(log_probabilities.astype(np.float64), length)
+
+        # the word of each draw
+        relative = np.exp((possible - possible.max(axis=1, keepdims=True)) / temperature)
+        ends = np.cumsum(relative, axis=1)
+        chosen = _spread(ends / ends[:, -1:], self.beginning, uniform[self.alive % self.draws])
+        self.words[self.alive, length] = chosen
+        self.scores[self.alive] += log_probabilities[self.beginning, chosen]
+        self._begin(chosen, following, possible.shape[1])
+
+    def _begin(self, chosen: Ids, following: State, words: int) -> None:
+        """The beginnings with the chosen words (A,) behind them; what has ended leaves."""
+        goes_on = chosen != self.limits.end
+        longer = (self.beginning * words + chosen)[goes_on]
+        self.alive = self.alive[goes_on]
         unique = two_rows(np.unique(longer))
-        begun = np.searchsorted(unique, longer)
-        parent, last = np.divmod(unique, left.shape[1])
-        row = row[parent]
-        state = taken(following, parent)
-    return [
-        _counted(words[at : at + draws].tolist(), scores[at : at + draws].tolist(), limits.end)
-        for at in range(0, rows * draws, draws)
-    ]
+        self.beginning = np.searchsorted(unique, longer)
+        parent, self.last = np.divmod(unique, words)
+        self.row = self.row[parent]
+        self.state = taken(following, parent)
+
+    def counted(self) -> list[list[Drawn]]:
+        """Of each row the different sequences."""
+        counted = []
+        for first in range(0, len(self.words), self.draws):
+            of_row = slice(first, first + self.draws)
+            counted.append(_counted(self.words[of_row].tolist(), self.scores[of_row].tolist(), self.limits.end))
+        return counted
 
 
 def _spread(shares: Scores, begun: Ids, uniform: Floats) -> Ids:
@@ -211,19 +266,29 @@ def agreement(sequences: Sequence[tuple[int, ...]], times: Ids) -> Scores:
     """
     agreements = np.zeros(len(sequences))
     for order in (1, 2):
-        columns: dict[tuple[tuple[int, ...], int], int] = {}  # of an n-gram for the first, second, ... time
-        places = []
-        for row, ids in enumerate(sequences):
-            seen: Counter[tuple[int, ...]] = Counter()
-            for gram in zip(*(ids[shift:] for shift in range(order)), strict=False):
-                seen[gram] += 1
-                places.append((row, columns.setdefault((gram, seen[gram]), len(columns))))
-        marks = np.zeros((len(sequences), len(columns)))
-        marks[tuple(np.array(places, dtype=np.intp).reshape(-1, 2).T)] = 1
+        marks = _marks(sequences, order)
         sizes = marks.sum(axis=1)
-        shared = 2 * (marks @ marks.T) / np.maximum(sizes[:, None] + sizes, 1)  # a product counts what both have
-        agreements += shared @ (times / times.sum()) / 2
+        # a product counts what both have
+        f1 = 2 * (marks @ marks.T) / np.maximum(sizes[:, None] + sizes, 1)
+        agreements += f1 @ (times / times.sum()) / 2
     return agreements
+
+
+def _marks(sequences: Sequence[tuple[int, ...]], order: int) -> Scores:
+    """(S, N): 1 where a sequence has an n-gram of that order; its second, third, ... time is a column of its own."""
+    columns: dict[tuple[tuple[int, ...], int], int] = {}
+    rows = []
+    places = []
+    for row, ids in enumerate(sequences):
+        times: Counter[tuple[int, ...]] = Counter()
+        for first in range(len(ids) - order + 1):
+            gram = ids[first : first + order]
+            times[gram] += 1
+            rows.append(row)
+            places.append(columns.setdefault((gram, times[gram]), len(columns)))
+    marks = np.zeros((len(sequences), len(columns)))
+    marks[rows, places] = 1
+    return marks
 
 
 def score_words(step: Graph, contexts: Arrays, rows: Ids, words: Ids) -> Scores:
@@ -240,11 +305,15 @@ def score_words(step: Graph, contexts: Arrays, rows: Ids, words: Ids) -> Scores:
         alive = np.flatnonzero(coming)
         if not len(alive):
             break
-        _, first, same = np.unique(group[alive] * count + previous[alive], return_index=True, return_inverse=True)
+
+        # those that have begun alike are one row of the step
+        beginnings = group[alive] * count + previous[alive]
+        _, first, same = np.unique(beginnings, return_index=True, return_inverse=True)
         chosen = two_rows(alive[first])
         row = rows[chosen]
         inputs: Arrays = {"word": previous[chosen], **taken(contexts, row)}
         outputs, state = advance(step, taken(state, group[chosen]), inputs)
+
         group = np.zeros_like(rows)
         group[alive] = same
         totals[alive] += outputs["log_probabilities"][same, coming[alive]]

@@ -53,21 +53,29 @@ def _pages(place: Path) -> Iterator[Card]:
     walk = steer.run("walk 4s, run 4s")
     write_live_page(place / "live.html", steer, 3, "motet live")
     yield Card("live.html", "Live", "Steer it by keys, touch, pad or words; or drop a motion or an avatar on it.", walk)
+
     made = [drawn.motion for (drawn,) in writer.generate(PROMPTS)]
     write_many(place / "generate.html", made, PROMPTS, "motet generate")
     yield Card("generate.html", "Generate", "Motions from sentences, such as “a person kicks”.", made[1])
+    yield _predicted(place, walk, writer)
+    yield _joined(place, made[0][:SHORT], made[2][:SHORT])
+    yield _described(place, [walk[:90], walk[-60:], *made[1:3]])
+
+
+def _predicted(place: Path, walk: Motion, writer: CodesModel) -> Card:
     start_of_walk = walk[: round(GIVEN * walk.fps) + 1]
     future = load_as(PredictModel, "predict").predict(start_of_walk, seconds=FUTURE, append=True, beyond=writer)
     write(place / "predict.html", future, [(0.0, "given"), (start_of_walk.duration, "predicted")], "motet predict")
-    yield Card("predict.html", "Predict", "A second of a walk is given; the rest goes on from it.", future)
-    first = made[0][:SHORT]
-    other = made[2][:SHORT]
+    return Card("predict.html", "Predict", "A second of a walk is given; the rest goes on from it.", future)
+
+
+def _joined(place: Path, first: Motion, other: Motion) -> Card:
+    """first, other: the beginnings of the motions of the first and the third prompt."""
     joined = load_as(FillModel, "fill").join(first, other)
     start = first.duration
     captions = [(0.0, PROMPTS[0]), (start, "filled"), (start + JOIN_SECONDS, PROMPTS[2])]
     write(place / "join.html", joined, captions, "motet join")
-    yield Card("join.html", "Fill and join", "Two motions, with a transition between them.", joined)
-    yield _described(place, [walk[:90], walk[-60:], *made[1:3]])
+    return Card("join.html", "Fill and join", "Two motions, with a transition between them.", joined)
 
 
 def _described(place: Path, motions: list[Motion]) -> Card:

@@ -44,6 +44,17 @@ class BundleModel(ABC):
     _source: tuple[Path, SessionOptions] | None = None
 
     def __init__(self, manifest: Manifest, graphs: Mapping[str, Graph], tables: Arrays | None = None) -> None:
+        self._check(manifest, graphs)
+        self.manifest = manifest
+        self.contract = manifest.motion
+        self.loop = self.LOOPS[manifest.loop]
+        self.graphs = graphs
+        self.tables = tables or {}
+        self.defaults = self.loop.defaults(manifest.defaults)
+        self._tuned = self._read_settings(manifest.settings)
+        self.sizes: Sizes = {"D": len(self.contract.channels)}
+
+    def _check(self, manifest: Manifest, graphs: Mapping[str, Graph]) -> None:
         if manifest.verb != self.VERB:
             raise BundleError(f"manifest, verb: {manifest.verb!r}, expected {self.VERB!r}")
         if manifest.loop not in self.LOOPS:
@@ -52,19 +63,14 @@ class BundleModel(ABC):
         for role in self.ROLES:
             if role not in graphs:
                 raise BundleError(f"manifest, graphs: there is no graph for the role {role!r}")
-        self.manifest = manifest
-        self.contract = manifest.motion
-        self.loop = self.LOOPS[manifest.loop]
-        self.graphs = graphs
-        self.tables = tables or {}
-        self.defaults = self.loop.defaults(manifest.defaults)
-        known = {kind.FEATURE: kind for kind in self.SETTINGS}
-        if unknown := sorted(manifest.settings.keys() - known.keys()):
-            expected = ", ".join(known) or "none"
+
+    def _read_settings(self, settings: Mapping[str, Mapping[str, Any]]) -> dict[type[Settings], Settings]:
+        """The bundle's values of all :attr:`SETTINGS`, defaults for the others."""
+        features = {kind.FEATURE: kind for kind in self.SETTINGS}
+        if unknown := sorted(settings.keys() - features.keys()):
+            expected = ", ".join(features) or "none"
             raise BundleError(f"manifest, settings.{unknown[0]}: is unknown; expected {expected}")
-        settings = manifest.settings
-        self._tuned = {kind: kind.read(settings.get(name, {}), f"settings.{name}") for name, kind in known.items()}
-        self.sizes: Sizes = {"D": len(self.contract.channels)}
+        return {kind: kind.read(settings.get(name, {}), f"settings.{name}") for name, kind in features.items()}
 
     def bind(
         self,

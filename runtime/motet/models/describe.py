@@ -178,14 +178,18 @@ class DescribeModel(LanguageModel):
             described = self._answers(motions_of(motions), beams, progress)
             return described[0] if isinstance(motions, Motion) else described
         loop = self.LOOPS[name] if name else self.loop
-        (first,) = seeds_of(seed, 1, DecodingError)
-        counts = {"beams": beams, "draws": draws}
-        settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), counts)}
-        if "draws" in settings:
-            settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
+        settings = self._settled(loop, {"beams": beams, "draws": draws}, seed)
         encoded = self._encoded([self.frames(motion) for motion in motions_of(motions)])
         rows = list(map(self._described, self._hypotheses(loop, encoded, settings, progress)))
         return rows[0] if isinstance(motions, Motion) else rows
+
+    def _settled(self, loop: Loop, counts: Mapping[str, int | None], seed: SupportsIndex) -> dict[str, Any]:
+        """All settings of a loop, and the noise that it draws with."""
+        (first,) = seeds_of(seed, 1, DecodingError)
+        settings: dict[str, Any] = {**loop.settled(loop.defaults(self.manifest.defaults), counts)}
+        if "draws" in settings:
+            settings["noise"] = noise_of(self.limits(settings), settings["draws"], first)
+        return settings
 
     def _described(self, hypotheses: Sequence[Hypothesis]) -> list[Description]:
         """The hypotheses as sentences, and whether each is probable enough to be relied on."""
@@ -278,20 +282,23 @@ class DescribeModel(LanguageModel):
 
     def _parts(self, motion: Motion, cuts: list[int]) -> list[Part]:
         """Parts of a motion between cuts; a cut between two equal descriptions is dropped."""
-        most = int(MAX_SECONDS * motion.fps + 1e-9)
-        skipped = [max(0, b - a - most) // 2 for a, b in pairwise(cuts)]  # at the start of a part that is too long
-        middles = [motion[a + off : b][:most] for (a, b), off in zip(pairwise(cuts), skipped, strict=True)]
+        longest = int(MAX_SECONDS * motion.fps + 1e-9)
+        middles = []
+        for start, stop in pairwise(cuts):
+            skipped = max(0, stop - start - longest) // 2
+            middles.append(motion[start + skipped : stop][:longest])
         descriptions = [row[0] for row in self.describe(middles)]
+
+        # what is described the same is one part
         inner = []
         for cut, (before, after) in zip(cuts[1:-1], pairwise(descriptions), strict=True):
             if before.text != after.text:
                 inner.append(cut)
         if len(inner) < len(cuts) - 2:
             return self._parts(motion, [cuts[0], *inner, cuts[-1]])
-        times = pairwise(cut / motion.fps for cut in cuts)
         parts = []
-        for description, (start, stop) in zip(descriptions, times, strict=True):
-            parts.append(Part(**asdict(description), start=start, stop=stop))
+        for description, (start, stop) in zip(descriptions, pairwise(cuts), strict=True):
+            parts.append(Part(**asdict(description), start=start / motion.fps, stop=stop / motion.fps))
         return parts
 
     def _hypotheses(
@@ -390,10 +397,7 @@ def near_scores(
     """
     places = {ids: place for place, ids in enumerate(sorted(set(sentences)))}
     words = padded([np.array(ids) for ids in places], "int64")[0]
-    sentence_of_row = np.array([places[ids] for ids in sentences])
-    nearby = [np.unique(sentence_of_row[max(0, row - near) : row + near + 1]) for row in range(len(sentence_of_row))]
-    rows = np.repeat(np.arange(len(sentence_of_row)), list(map(len, nearby)))
-    columns = np.concatenate(nearby)
+    rows, columns = _near_pairs(np.array([places[ids] for ids in sentences]), near)
     scores = np.full((len(sentences), len(places)), -np.inf)
     for start in range(0, len(rows), at_once):
         row = rows[start : start + at_once]
@@ -401,6 +405,15 @@ def near_scores(
         scores[row, column] = score_words(step, contexts, row, words[column])
         progress(int(row[-1]) + 1, len(sentences))
     return scores
+
+
+def _near_pairs(sentence_of_row: Ids, near: int) -> tuple[Ids, Ids]:
+    """Each window (P,) with each sentence (P,) of those up to ``near`` before and after it."""
+    nearby = []
+    for row in range(len(sentence_of_row)):
+        nearby.append(np.unique(sentence_of_row[max(0, row - near) : row + near + 1]))
+    counts = [len(sentences) for sentences in nearby]
+    return np.repeat(np.arange(len(nearby)), counts), np.concatenate(nearby)
 
 
 def best_path(scores: Iterable[Array], change: float, at_once: int = AT_ONCE) -> list[int]:
@@ -446,5 +459,8 @@ def _agreed(back: list[NDArray[np.intp]], columns: int) -> list[int]:
 def edges(spans: Sequence[tuple[int, int]], path: Sequence[int]) -> list[int]:
     """The boundaries of parts in frames: the first, the last, and the middle between two windows that differ."""
     middles = [(start + stop) / 2 for start, stop in spans]
-    steps = zip(pairwise(middles), pairwise(path), strict=True)
-    return [spans[0][0], *(round(sum(two) / 2) for two, (a, b) in steps if a != b), spans[-1][1]]
+    boundaries = [spans[0][0]]
+    for (before, after), (column, next_column) in zip(pairwise(middles), pairwise(path), strict=True):
+        if column != next_column:
+            boundaries.append(round((before + after) / 2))
+    return [*boundaries, spans[-1][1]]

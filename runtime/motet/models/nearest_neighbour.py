@@ -142,15 +142,22 @@ class Known:
         """How much each action counts (N, A), 1 in all, by the motions near vectors (N, E); and the greatest
         similarity (N,)."""
         settings = self.settings
-        motions, views = self.vectors.shape[:2]
-        every = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: motions * views].T
-        alike = every.reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
-        best = alike.max(axis=1, keepdims=True)
-        least = np.sort(alike, axis=1)[:, -min(settings.near, motions)][:, None]
-        weights = np.where(alike >= least, np.exp((alike - best) / settings.temperature), 0.0)
+        similarities = self._similarities(vectors)
+        best = similarities.max(axis=1, keepdims=True)
+        count = min(settings.near, similarities.shape[1])
+        least = np.sort(similarities, axis=1)[:, -count][:, None]
+        weights = np.exp((similarities - best) / settings.temperature)
+        weights = np.where(similarities >= least, weights, 0.0)
         counted = np.zeros((len(vectors), len(self.shown)))
         np.add.at(counted.T, self.actions, weights.T)
         return counted / weights.sum(axis=1, keepdims=True), best[:, 0]
+
+    def _similarities(self, vectors: Floats) -> Array:
+        """Of vectors (N, E) with each motion, seen from the side from which they are most alike: (N, motions)."""
+        motions, views = self.vectors.shape[:2]
+        products = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: motions * views].T
+        similarities: Array = products.reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
+        return similarities
 
     def shares(self, counted: Array) -> Array:
         """Of each set of kinds (N, Q) the share of near motions that it is right about; 0 where none of them is said to

@@ -114,7 +114,8 @@ def control_track(segments: Sequence[Segment], labels: Sequence[str], fps: float
         raise ControlError(f"the script lasts less than one frame at {fps:g} fps")
     track = []
     for segment, count in zip(segments, np.diff(ends, prepend=0), strict=True):
-        start, stop = (np.array([side.get(label, 0.0) for label in labels]) for side in (segment.start, segment.stop))
+        start = np.array([segment.start.get(label, 0.0) for label in labels])
+        stop = np.array([segment.stop.get(label, 0.0) for label in labels])
         # the last frame of a ramp is its end, and a segment that holds is the same throughout
         share = (np.arange(1, count + 1) / max(1, count))[:, None]
         track.append(start + share * (stop - start))

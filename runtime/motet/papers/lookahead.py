@@ -80,11 +80,9 @@ class Lookahead:
     def ticked(self, now: Ahead, run: Run, control: Floats) -> Ahead:
         """One tick later; ``run`` counts from now. Each character moves as it would alone, to the bit."""
         reach = self.reach
-        settings = self.settings
-        offset, speed = damped(now.offset, now.speed, settings.fading, self.seconds)
-        moving = (np.maximum(np.abs(offset), np.abs(speed)) > settings.faded).any(axis=1, keepdims=True)
-        offset = np.where(moving, offset, 0)
-        speed = np.where(moving, speed, 0)
+        offset, speed = self._faded(now)
+
+        # the frames to come: one more, or all of them anew under another control
         if control is now.control or np.array_equal(control, now.control):
             frames, histories = _run_on(run, now.frames[1:], now.histories, 1)
         else:
@@ -92,12 +90,23 @@ class Lookahead:
             # what is farthest ahead was not run before: it is taken to differ as what is before it does
             apart = now.frames[reach + 1 :] - frames[reach:-1]
             offset = offset + self._mean(np.concatenate([np.zeros_like(apart), apart, apart[-1:]]))
+
+        # what is shown: their mean with what is left of a difference, no faster than a figure turns
         mean = self._mean(frames)
-        wanted = mean + offset
-        step = wanted - now.shown
-        fast = (np.abs(step) > self.most).any(axis=1, keepdims=True)  # what is too fast fades, too
-        shown = np.where(fast, now.shown + np.clip(step, -self.most, self.most), wanted)
-        return Ahead(frames, histories[1:], control, shown, np.where(fast, shown - mean, offset), speed)
+        target = mean + offset
+        step = target - now.shown
+        is_too_fast = (np.abs(step) > self.most).any(axis=1, keepdims=True)
+        limited = now.shown + np.clip(step, -self.most, self.most)
+        shown = np.where(is_too_fast, limited, target)
+        offset = np.where(is_too_fast, shown - mean, offset)
+        return Ahead(frames, histories[1:], control, shown, offset, speed)
+
+    def _faded(self, now: Ahead) -> tuple[Floats, Floats]:
+        """What is left of a difference one tick later, and its speed: nothing once all of a figure is small."""
+        offset, speed = damped(now.offset, now.speed, self.settings.fading, self.seconds)
+        largest = np.maximum(np.abs(offset), np.abs(speed))
+        is_moving = (largest > self.settings.faded).any(axis=1, keepdims=True)
+        return np.where(is_moving, offset, 0), np.where(is_moving, speed, 0)
 
     def _mean(self, frames: Floats) -> Floats:
         """The mean (B, D) of frames (2R + 1, B, D) by the window."""
@@ -108,9 +117,9 @@ class Lookahead:
 
 def _run_on(run: Run, frames: Floats, histories: tuple[Floats, ...], count: int) -> tuple[Floats, tuple[Floats, ...]]:
     """With ``count`` more frames after the last of the histories, which is ``len(histories) - 1`` ticks from now."""
-    found = []
+    later = []
     for _ in range(count):
         frame, history = run(histories[-1], len(histories) - 1)
-        found.append(frame[None])
+        later.append(frame[None])
         histories = (*histories, history)
-    return np.concatenate([frames, *found]), histories
+    return np.concatenate([frames, *later]), histories

@@ -78,43 +78,71 @@ class _Beam:
         alive = two_rows(np.flatnonzero(~self.ended))
         if not len(alive):
             return False
-        (rows, hypotheses), length = self.shape, len(self.history)
+
+        # the graph: one step of what goes on
+        hypotheses = self.shape[1]
         inputs = {"frame": self.frame[alive], "context": self.context[alive // hypotheses]}
-        outputs, state = advance(self.step, {name: array[alive] for name, array in self.state.items()}, inputs)
-        running, place = np.unique(alive // hypotheses, return_inverse=True)
-        size = (hypotheses, self.candidates)
-        slot = alive % hypotheses
-        normal = [noise[row].standard_normal((*size, self.frame.shape[1] - 1), np.float32) for row in running]
-        uniform = [noise[row].random((*size, 2), np.float32) for row in running]
-        forced = False if length == max_frames else True if length == 0 else None
-        drawn = draw(outputs, np.stack(normal)[place, slot], np.stack(uniform)[place, slot], temperature, forced)
-        parents, chosen = self._rank(alive, *drawn[1:])
-        # a parent that has ended finds the place of some other: what it takes there is never used
-        places = np.searchsorted(alive, parents + np.arange(rows)[:, None] * hypotheses) % len(alive)
-        frames = drawn[0][places, chosen]
-        self.history.append((frames, parents))
-        ones = np.ones((*self.shape, 1), dtype=np.float32)
-        self.frame = np.concatenate([frames, ones], axis=2).reshape(self.frame.shape)
+        state = {name: array[alive] for name, array in self.state.items()}
+        outputs, state = advance(self.step, state, inputs)
+
+        # candidates of each hypothesis, and the best of each row
+        normal, uniform = self._noise_of(noise, alive)
+        frames, flags, gains = draw(outputs, normal, uniform, temperature, self._forced(max_frames))
+        parents, candidates = self._rank(alive, flags, gains)
+
+        # a parent that has ended gets the place of some other: what it takes there is never used
+        first_of_row = np.arange(len(parents))[:, None] * hypotheses
+        places = np.searchsorted(alive, parents + first_of_row) % len(alive)
+        self._follow(frames[places, candidates], parents)
         self.state = {name: np.take(array, places.ravel(), axis=0) for name, array in state.items()}
         return True
+
+    def _noise_of(self, noise: Sequence[Noise], alive: Ids) -> tuple[Floats, Floats]:
+        """Of each hypothesis in ``alive`` (n,), from its row's noise: normal (n, C, D) and uniform (n, C, 2)."""
+        hypotheses = self.shape[1]
+        size = (hypotheses, self.candidates)
+        channels = self.frame.shape[1] - 1
+        running, place = np.unique(alive // hypotheses, return_inverse=True)
+        normal = np.stack([noise[row].standard_normal((*size, channels), np.float32) for row in running])
+        uniform = np.stack([noise[row].random((*size, 2), np.float32) for row in running])
+        slot = alive % hypotheses
+        return normal[place, slot], uniform[place, slot]
+
+    def _forced(self, max_frames: int) -> bool | None:
+        """The flag where there is no choice: no motion is empty, and none is longer than ``max_frames``."""
+        length = len(self.history)
+        if length == max_frames:
+            return False
+        return True if length == 0 else None
+
+    def _follow(self, frames: Floats, parents: Ids) -> None:
+        """What has been drawn, frames (B, W, D) of parents (B, W), is the next step's input."""
+        self.history.append((frames, parents))
+        flags = np.ones((*self.shape, 1), dtype=np.float32)
+        self.frame = np.concatenate([frames, flags], axis=2).reshape(self.frame.shape)
 
     def _rank(self, alive: Ids, flags: Flags, gains: Scores) -> tuple[Ids, Ids]:
         """Keep the best of each row's candidates: the parent and the candidate of each, (B, W)."""
         rows, hypotheses = self.shape
+
+        # what has ended goes on as it is, as its first candidate
         scores = np.full((rows * hypotheses, self.candidates), -np.inf)
-        scores[:, 0] = self.scores.ravel()  # what has ended goes on as it is
+        scores[:, 0] = self.scores.ravel()
         scores[alive] = self.scores.ravel()[alive, None] + gains
         lengths = np.repeat(self.lengths.reshape(-1, 1), self.candidates, axis=1)
         lengths[alive] += flags
         ended = np.ones_like(lengths, dtype=np.bool_)
         ended[alive] = ~flags
+
+        # the order of a row's candidates: log-likelihoods per frame
         flat_scores = scores.reshape(rows, -1)
         flat_lengths = lengths.reshape(rows, -1)
-        order = np.argsort(-flat_scores / np.maximum(flat_lengths, 1), axis=1, kind="stable")[:, :hypotheses]
-        self.scores = np.take_along_axis(flat_scores, order, 1)
-        self.lengths = np.take_along_axis(flat_lengths, order, 1)
-        self.ended = np.take_along_axis(ended.reshape(rows, -1), order, 1)
-        return order // self.candidates, order % self.candidates
+        score_per_frame = flat_scores / np.maximum(flat_lengths, 1)
+        best = np.argsort(-score_per_frame, axis=1, kind="stable")[:, :hypotheses]
+        self.scores = np.take_along_axis(flat_scores, best, 1)
+        self.lengths = np.take_along_axis(flat_lengths, best, 1)
+        self.ended = np.take_along_axis(ended.reshape(rows, -1), best, 1)
+        return best // self.candidates, best % self.candidates
 
     def samples(self) -> list[list[Sample]]:
         """Follow each hypothesis back through its parents."""
@@ -124,10 +152,11 @@ class _Beam:
             backward.append(np.take_along_axis(frames, slot[:, :, None], 1))
             slot = np.take_along_axis(parents, slot, 1)
         frames = np.stack(backward[::-1], axis=2)
-        return [
-            [Sample(f[:n].copy(), float(s)) for f, n, s in zip(*row, strict=True)]
-            for row in zip(frames, self.lengths, self.scores, strict=True)
-        ]
+        samples = []
+        for row_frames, lengths, scores in zip(frames, self.lengths, self.scores, strict=True):
+            row = zip(row_frames, lengths, scores, strict=True)
+            samples.append([Sample(drawn[:length].copy(), float(score)) for drawn, length, score in row])
+        return samples
 
 
 def draw(
@@ -137,19 +166,33 @@ def draw(
 
     forced: the flag where there is no choice. Frames (n, C, D), flags (n, C) and the log-likelihoods of both (n, C).
     """
-    log_weights, means, stds, active = (outputs[name] for name in ("log_weights", "means", "stds", "active"))
-    weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True), dtype=np.float64)
-    bounds = np.cumsum(weights, axis=1)
-    threshold = uniform[:, :, :1] * bounds[:, None, -1:]
-    component = np.minimum((threshold >= bounds[:, None]).sum(axis=2), weights.shape[1] - 1)
+    log_weights = outputs["log_weights"]
+    means = outputs["means"]
+    stds = outputs["stds"]
+    active = outputs["active"][:, None]
+    component = _components(log_weights, uniform[:, :, 0])
     row = np.arange(len(means))[:, None]
-    frames = means[row, component] + np.float32(np.sqrt(temperature)) * stds[row, component] * normal
-    flags = uniform[:, :, 1] < active[:, None] if forced is None else np.full(uniform.shape[:2], forced)
-    chance = np.where(flags, active[:, None], 1 - active[:, None])
-    gains = np.log(np.maximum(chance, SMALLEST), dtype=np.float64)
+    scale = np.float32(np.sqrt(temperature))
+    frames = means[row, component] + scale * stds[row, component] * normal
+
+    flags = uniform[:, :, 1] < active if forced is None else np.full(uniform.shape[:2], forced)
+    probability = np.where(flags, active, 1 - active)
+    gains = np.log(np.maximum(probability, SMALLEST), dtype=np.float64)
     gains[flags] += log_density(frames, log_weights, means, stds)[flags]
-    gains[~flags & (np.cumsum(~flags, axis=1) > 1)] = -np.inf  # a second end would be the same motion again
+    # a second end would be the same motion again
+    ends_before = np.cumsum(~flags, axis=1) > 1
+    gains[~flags & ends_before] = -np.inf
     return frames, flags, gains
+
+
+def _components(log_weights: Floats, uniform: Floats) -> Ids:
+    """The component (n, C) of each draw in ``uniform`` (n, C), by weights (n, K)."""
+    weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True), dtype=np.float64)
+    bounds = np.cumsum(weights, axis=1)[:, None]
+    threshold = uniform[:, :, None] * bounds[:, :, -1:]
+    below: Ids = (threshold >= bounds).sum(axis=2)
+    components: Ids = np.minimum(below, weights.shape[1] - 1)
+    return components
 
 
 def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats) -> Scores:
@@ -159,13 +202,13 @@ def log_density(frames: Floats, log_weights: Floats, means: Floats, stds: Floats
     size = means.shape[2]
     constant = log_weights - np.log(stds).sum(axis=2) - 0.5 * size * np.log(2 * np.pi)
     inverse = 1 / stds
-    found = np.empty(frames.shape[:2])
+    densities = np.empty(frames.shape[:2])
     for candidate in range(frames.shape[1]):  # one at a time, so that memory stays that of the step's own output
         off = (frames[:, candidate, None] - means) * inverse
         log_terms = constant - 0.5 * np.einsum("nkd,nkd->nk", off, off)
         top = log_terms.max(axis=1, keepdims=True)
-        found[:, candidate] = (top + np.log(np.exp(log_terms - top).sum(axis=1, keepdims=True)))[:, 0]
-    return found
+        densities[:, candidate] = (top + np.log(np.exp(log_terms - top).sum(axis=1, keepdims=True)))[:, 0]
+    return densities
 
 
 def score_frames(step: Graph, context: Floats, frames: Floats) -> float:
@@ -176,15 +219,20 @@ def score_frames(step: Graph, context: Floats, frames: Floats) -> float:
     contexts = np.stack([context, context])
     state = zero_state(step, 2)
     steps = []
-    given = np.ones((2, frames.shape[1] + 1), dtype=np.float32)
-    for n in range(len(frames) + 1):
-        given[:, :-1] = frames[n - 1] if n else 1
-        outputs, state = advance(step, state, {"frame": given, "context": contexts})
-        steps.append([outputs[name][0] for name in ("active", "log_weights", "means", "stds")])
-    active, *mixtures = map(np.stack, zip(*steps, strict=True))
-    chances = np.maximum(np.append(active[:-1], 1 - active[-1]), SMALLEST)
-    densities = log_density(frames[:, None], *(part[:-1] for part in mixtures))
-    return float(np.log(chances, dtype=np.float64).sum() + densities.sum())
+    frame_and_flag = np.ones((2, frames.shape[1] + 1), dtype=np.float32)
+    for step_index in range(len(frames) + 1):
+        frame_and_flag[:, :-1] = frames[step_index - 1] if step_index else 1
+        outputs, state = advance(step, state, {"frame": frame_and_flag, "context": contexts})
+        steps.append({name: outputs[name][0] for name in ("active", "log_weights", "means", "stds")})
+    active = np.stack([output["active"] for output in steps])
+    probabilities = np.maximum(np.append(active[:-1], 1 - active[-1]), SMALLEST)
+
+    # after the last frame only the flag counts
+    log_weights = np.stack([output["log_weights"] for output in steps[:-1]])
+    means = np.stack([output["means"] for output in steps[:-1]])
+    stds = np.stack([output["stds"] for output in steps[:-1]])
+    densities = log_density(frames[:, None], log_weights, means, stds)
+    return float(np.log(probabilities, dtype=np.float64).sum() + densities.sum())
 
 
 LOOPS: Mapping[str, Loop] = {

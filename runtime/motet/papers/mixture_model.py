@@ -32,8 +32,11 @@ class MixtureModel(GenerateModel):
         """See :meth:`GenerateModel.decode`."""
         rest = {name: value for name, value in settings.items() if name != "max_seconds"}
         frames = max(1, round(settings["max_seconds"] * self.fps))
-        found: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
-        return [[one._replace(frames=self.contract.denormalised(one.frames)) for one in row] for row in found]
+        samples: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
+        return [[self._denormalised(sample) for sample in row] for row in samples]
+
+    def _denormalised(self, sample: Sample) -> Sample:
+        return sample._replace(frames=self.contract.denormalised(sample.frames))
 
     def score(self, sentence: str, motion: Motion) -> float:
         """See :meth:`GenerateModel.score`."""

@@ -38,15 +38,21 @@ class TdbnModel(ControlModel):
         self.starts = manifest.control.starts
         self.has_free_units = self.stepper.spec.takes("codes")
         self.sizes["L"] = len(self.labels)
-        self.bind("encoder", {"frames": "batch D"}, {"codes": "batch H"})
-        free = {"codes": "batch H"} if self.has_free_units else {}
-        self.bind("step", {**self.loop.inputs, **free}, self.loop.outputs)
+        self._bind_graphs()
         self.taps = self.sizes["K"]
         self.codes = self.sizes["H"]
         turns = np.array([TURN.get(unit, np.inf) for unit in self.contract.units], dtype=np.float32)
         self.lookahead = Lookahead(self.settings(LookaheadSettings), self.fps, turns)
+        self._check_starts()
+
+    def _bind_graphs(self) -> None:
+        self.bind("encoder", {"frames": "batch D"}, {"codes": "batch H"})
+        free = {"codes": "batch H"} if self.has_free_units else {}
+        self.bind("step", {**self.loop.inputs, **free}, self.loop.outputs)
         if "history" not in self.stepper.spec.feedback:
             raise BundleError("manifest, graphs.step.feedback: no output is fed back to 'history'")
+
+    def _check_starts(self) -> None:
         for label, frames in self.starts.items():
             if len(frames) != self.taps:
                 raise BundleError(f"manifest, control.starts.{label}: must hold {self.taps} frames, not {len(frames)}")
@@ -169,21 +175,20 @@ class TdbnSession:
         self.smooth = smooth
         self.characters = len(seeds)
         self.iterations = int(settings["iterations"])
-        variety = settings["variety"]
         self._first = np.repeat(first[:, None], self.characters, axis=1)
         self._history = np.repeat(model.encode(first)[None], self.characters, axis=0)
         self._ahead: Ahead | None = None
         self._tick = 0
+        width = model.stepper.spec.input("noise").size(1)
         column = np.ones((self.characters, 1), dtype=np.float32)
         self._inputs: dict[str, Floats] = {
             "control": np.zeros((self.characters, len(model.labels)), dtype=np.float32),
-            "variety": column * np.float32(variety),
+            "variety": column * np.float32(settings["variety"]),
             "temperature": column * np.float32(settings["temperature"]),
+            "noise": np.zeros((self.characters, width), dtype=np.float32),
         }
-        width = model.stepper.spec.input("noise").size(1)
-        self.noise: RowNoise | RowsOfNoise | None = RowNoise(seeds, width) if variety > 0 else None
-        if self.noise is None:  # noise has no effect: any array will do
-            self._inputs["noise"] = np.zeros((self.characters, width), dtype=np.float32)
+        is_random = settings["variety"] > 0  # without, noise has no effect: any array will do
+        self.noise: RowNoise | RowsOfNoise | None = RowNoise(seeds, width) if is_random else None
 
     def __repr__(self) -> str:
         return f"TdbnSession({self.characters} characters, tick {self._tick}, {self.model!r})"
@@ -249,11 +254,12 @@ class TdbnSession:
     def frames(self, track: ArrayLike) -> Floats:
         """Run a control track (T, labels) or (T, characters, labels): frames (characters, T, D) float32."""
         controls = np.asarray(track, dtype=np.float32)
-        found = np.empty((self.characters, len(controls), len(self.model.contract.channels)), dtype=np.float32)
+        channels = len(self.model.contract.channels)
+        frames = np.empty((self.characters, len(controls), channels), dtype=np.float32)
         for place, control in enumerate(controls):
             self.set_control(control)
-            found[:, place] = self.step()
-        return found
+            frames[:, place] = self.step()
+        return frames
 
     def snapshot(self) -> TdbnSnapshot:
         """Frames, control and tick, without the noise: a session that continues from it uses its own seeds."""

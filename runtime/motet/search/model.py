@@ -273,6 +273,10 @@ def direction(model: SearchModel, motion: Motion) -> Floats:
     return unit_direction
 
 
+Entries = dict[tuple[str, int, int], list[tuple[Member, Floats]]]
+"""The members of each file, by its :attr:`Member.state`, with their vectors (windows, E)."""
+
+
 def _renewed(
     folder: Path,
     model: SearchModel,
@@ -283,30 +287,41 @@ def _renewed(
     progress: Progress,
 ) -> Index:
     """The current index of a folder, reusing the entries of unchanged files."""
-    known: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}  # by path, size and modification time
+    known: Entries = {}
     for index in before:
         known |= _entries(index) if index.unit == unit else {}
-    if not folder.is_dir():
-        raise FormatError(folder, "neither a folder of motion files nor an index of one")
-    paths = shard.of(files_in(folder, MOCAP))
-    if not paths:
-        raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in {'it' if shard == Shard() else shard}")
-    files = list(map(partial(_file, folder), paths))
+    files = [_file(folder, path) for path in _motion_files(folder, shard)]
+
+    # what is new or has changed, read and embedded
     new = [file for file in files if file.state not in known]
     embedded = in_order(partial(_embedded, folder, model=model, unit=unit), new, jobs)
     rows = list[tuple[Member, Floats]]()
     for done, file in enumerate(files, start=1):
         rows += known.get(file.state) or next(embedded)
-        progress(done, len(paths))
+        progress(done, len(files))
+
+    vanished = _vanished(folder, known)
     members, vectors = zip(*rows, strict=True)
-    known_paths = sorted({path for path, _, _ in known})
-    vanished = tuple(folder / path for path in known_paths if not (folder / path).exists())
     return Index(model, folder, members, np.concatenate(vectors), vanished, unit, shard)
 
 
-def _entries(index: Index) -> dict[tuple[str, int, int], list[tuple[Member, Floats]]]:
-    """The members of each file, by its :attr:`Member.state`, with their vectors (windows, E)."""
-    entries: dict[tuple[str, int, int], list[tuple[Member, Floats]]] = {}
+def _vanished(folder: Path, known: Entries) -> tuple[Path, ...]:
+    """The files that were indexed before, and are there no more."""
+    paths = sorted({path for path, _, _ in known})
+    return tuple(folder / path for path in paths if not (folder / path).exists())
+
+
+def _motion_files(folder: Path, shard: Shard) -> Sequence[Path]:
+    if not folder.is_dir():
+        raise FormatError(folder, "neither a folder of motion files nor an index of one")
+    paths = shard.of(files_in(folder, MOCAP))
+    if not paths:
+        raise FormatError(folder, f"no motion files ({' '.join(MOCAP)}) are in {'it' if shard == Shard() else shard}")
+    return paths
+
+
+def _entries(index: Index) -> Entries:
+    entries: Entries = {}
     stops = np.cumsum([len(member.windows) for member in index.members])
     for member, rows in zip(index.members, np.split(index.vectors, stops)[:-1], strict=True):
         entries.setdefault(member.state, []).append((member, rows))
@@ -396,13 +411,11 @@ def _read(file: Path, model: SearchModel) -> Index:
     except Exception as error:
         reason = str(error)[:200]
         raise FormatError(file, f"not an index of motions: {reason}; remove it, or name another") from error
-    if version != VERSION or made != model.manifest.identity:
-        by = (
-            f"the model {made}, not {model.manifest.identity}"
-            if version == VERSION
-            else f"another motet (version {version})"
-        )
-        raise FormatError(file, f"this index was made by {by}: remove it, or name another")
+    if version != VERSION:
+        raise FormatError(file, f"this index was made by another motet (version {version}): remove it, or name another")
+    if made != model.manifest.identity:
+        other = f"the model {made}, not {model.manifest.identity}"
+        raise FormatError(file, f"this index was made by {other}: remove it, or name another")
     if vectors.shape != (sum(len(member.windows) for member in members), model.sizes["E"]):
         raise FormatError(file, "this index is damaged: its vectors are not those of its windows; remove it")
     return Index(model, folder, members, vectors.astype(np.float32, copy=False), (), unit, shard)

@@ -101,7 +101,9 @@ class Answers:
         texts, settings = await _in(self._threads, self._texts_and_settings, data, True)
         settings |= await self._after(data)
         pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
-        parts = [part for text in texts for part in self._parts(text, data)]
+        parts: list[str] = []
+        for text in texts:
+            parts += self._parts(text, data)
         understood = await _in(self._models, lambda: [self._read_as(part) for part in parts])
         piece = await _in(self._models, next, pieces, None)
 
@@ -129,13 +131,16 @@ class Answers:
         each = seconds if isinstance(seconds, list) else [seconds] * len(texts)
         if len(each) != len(texts):
             raise RequestError(f"seconds: expected a number, or one for each of {len(texts)} texts, not {len(each)}")
-        most = settings.get("max_seconds", self._writer.defaults["max_seconds"])
-        parts = [len(self._parts(text, data)) for text in texts]
-        longest = 0.0
-        for count, length in zip(parts, each, strict=True):
-            longest += count * most if length is None else length
-        self._check_length(longest)
+        self._check_length(self._longest(texts, each, data))
         return texts, {**settings, "seconds": each[0] if len(texts) == 1 else seconds}
+
+    def _longest(self, texts: list[str], seconds: list[float | None], data: RequestData) -> float:
+        """How many seconds the texts may become, each of a length or None."""
+        longest_part = data.settings.get("max_seconds", self._writer.defaults["max_seconds"])
+        longest = 0.0
+        for text, length in zip(texts, seconds, strict=True):
+            longest += len(self._parts(text, data)) * longest_part if length is None else length
+        return longest
 
     def _check_length(self, seconds: float) -> None:
         if seconds > self.limits.motion_seconds:
@@ -196,15 +201,10 @@ class Answers:
         if settings.get("draws") == 0:  # none drawn: beam search
             settings = {**settings, "draws": None, "decoding": "beam"}
         descriptions = await self._described(frozenset(settings.items()), [window for _, window in windows])
-        rows = [
-            {
-                **about,
-                "start": start,
-                "stop": start + part.duration,
-                "hypotheses": [hypothesis.to_json() for hypothesis in row],
-            }
-            for (start, part), row in zip(windows, descriptions, strict=True)
-        ]
+        rows = []
+        for (start, part), row in zip(windows, descriptions, strict=True):
+            hypotheses = [hypothesis.to_json() for hypothesis in row]
+            rows.append({**about, "start": start, "stop": start + part.duration, "hypotheses": hypotheses})
         return _json_answer(rows)
 
     def _describe(self, key: Key, files: list[list[Motion]]) -> list[list[list[Description]]]:

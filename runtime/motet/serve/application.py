@@ -3,7 +3,7 @@
 import asyncio
 import signal
 import socket
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from importlib.metadata import version
 from typing import Any
@@ -65,11 +65,7 @@ def app(
     (:mod:`motet.serve.mmcp`).
     BundleError for a bundle that cannot be used; ImportError with the remedy where the extra mmcp is missing.
     """
-    kinds = KINDS | ({"fill": FillModel} if mmcp else {})
-    named = {verb: verb for verb in kinds} | {Bundle.open(name).manifest.verb: name for name in bundles}
-    if others := sorted(named.keys() - kinds.keys()):
-        raise BundleError(f"bundle {named[others[0]]} is for {others[0]!r}; a server takes {', '.join(kinds)}")
-    models: dict[str, Any] = {verb: load_as(kind, named[verb], session) for verb, kind in kinds.items()}
+    models = _models(bundles, KINDS | ({"fill": FillModel} if mmcp else {}), session)
     doors = _mmcp(models["generate"], models.pop("fill"), models["control"]) if mmcp else []
     live = LiveDoor(models.pop("control"), origins)
     answers = Answers(**models, limits=limits or Limits())
@@ -94,6 +90,16 @@ def app(
     application.state.limits = answers.limits
     application.state.live = live
     return application
+
+
+def _models(
+    bundles: Sequence[str], kinds: Mapping[str, type[BundleModel]], session: SessionOptions | None
+) -> dict[str, Any]:
+    """A model of each kind by its verb, which is also the default bundle's name."""
+    names = {verb: verb for verb in kinds} | {Bundle.open(name).manifest.verb: name for name in bundles}
+    if others := sorted(names.keys() - kinds.keys()):
+        raise BundleError(f"bundle {names[others[0]]} is for {others[0]!r}; a server takes {', '.join(kinds)}")
+    return {verb: load_as(kind, names[verb], session) for verb, kind in kinds.items()}
 
 
 def _mmcp(model: CodesModel, fill: FillModel, steer: SteerModel) -> list[Mount]:

@@ -15,7 +15,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from motet.composition.compose import compose
+from motet.composition.compose import GROUND, compose
 from motet.composition.keys import Key, Moves
 from motet.composition.plans import APART, Moment
 from motet.errors import DecodingError, MotetError, MotionError
@@ -156,10 +156,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         seconds = (drawn + 2) / self.fill.fps
         motion = self.model.story(prompt, seconds=seconds, seed=seed).playable(self.fill.fps)[:drawn]
         known = placed(motion)
-        steps = np.diff(known[:, [0, 2]], axis=0)
-        pace = (steps[-5:].mean(axis=0) + steps[:5].mean(axis=0)) / 2  # metres a frame
-        again = known[: self.fill.context].copy()
-        again[:, [0, 2]] += known[-1, [0, 2]] + (gap + 1) * pace - known[0, [0, 2]]
+        again = _begun_again(known, self.fill.context, gap)
         cycle = np.concatenate([known, self.fill.frames_between(known, again, gap), again[:1]])
         return unplaced(spline(cycle, np.linspace(0, whole, frames)), replace(motion[:1], fps=fps))
 
@@ -169,18 +166,26 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         if len(posed) < 2:
             raise MotionError("without a prompt, motet goes from key pose to key pose: give two, or a prompt")
         motion = _humanoid(figure, posed, fps)
-        poses = [np.repeat(frame[None], self.fill.least, axis=0) for frame in placed(motion)]
-        pieces = [np.repeat(poses[0][:1], min(posed), axis=0)]
+        poses = placed(motion)
+        pieces = [np.repeat(poses[:1], min(posed), axis=0)]
         for (start, stop), (before, after) in zip(pairwise(posed), pairwise(poses), strict=True):
             if (stop - start) / fps > self.fill.seconds:
                 far = f"the key poses of frames {start} and {stop} are {(stop - start) / fps:.2g} s apart"
                 raise MotionError(f"{far}, and at most {self.fill.seconds:g} s are filled: add one, or a prompt")
-            span = (stop - start) / fps * self.fill.fps
-            count = max(0, round(span) - 1)
-            way = [before[:1], self.fill.frames_between(before, after, count, span / (count + 1)), after[:1]]
-            pieces.append(spline(np.concatenate(way), np.arange(stop - start) / (stop - start) * (count + 1)))
-        pieces.append(np.repeat(poses[-1][:1], frames - max(posed), axis=0))
+            pieces.append(self._way(before, after, stop - start, fps))
+        pieces.append(np.repeat(poses[-1:], frames - max(posed), axis=0))
         return unplaced(np.concatenate(pieces), motion[:1])
+
+    def _way(self, before: Array, after: Array, frames: int, fps: float) -> Array:
+        """From one pose (D,) up to another, which is not in it: (frames, D)."""
+        seconds = frames / fps
+        span = seconds * self.fill.fps
+        count = max(0, round(span) - 1)
+        held_before = np.repeat(before[None], self.fill.least, axis=0)
+        held_after = np.repeat(after[None], self.fill.least, axis=0)
+        inner = self.fill.frames_between(held_before, held_after, count, span / (count + 1))
+        way = np.concatenate([before[None], inner, after[None]])
+        return spline(way, np.arange(frames) / frames * (count + 1))
 
     def _notes(self, request: GenerateRequest, seed: int) -> list[dict[str, str]]:
         """What the client cannot see: the seed that was drawn, and what was not understood."""
@@ -199,6 +204,15 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         if request.options and request.options.guidance and request.options.guidance.type != "nocfg":
             notes.append(("guidance", "info", "guidance is the model's own: the request's is not used"))
         return [dict(zip(("code", "severity", "message"), note, strict=True)) for note in notes]
+
+
+def _begun_again(frames: Array, count: int, gap: int) -> Array:
+    """The first ``count`` frames (T, D) once more, ``gap`` frames after the last, at the pace of both ends."""
+    steps = np.diff(frames[:, GROUND], axis=0)
+    metres_per_frame = (steps[-5:].mean(axis=0) + steps[:5].mean(axis=0)) / 2
+    again = frames[:count].copy()
+    again[:, GROUND] += frames[-1, GROUND] + (gap + 1) * metres_per_frame - frames[0, GROUND]
+    return again
 
 
 def _check(request: GenerateRequest, fps: float, options: schemas.Options) -> None:

@@ -34,7 +34,9 @@ def described(version: str) -> dict[str, Any]:
     """The OpenAPI document."""
     error = {"type": "object", "properties": {"error": {"type": "string"}, "type": {"type": "string"}}}
     health = {"summary": "Whether it runs, its version, and what it does.", "responses": {"200": {"description": "OK"}}}
-    paths = {door.path: {method.lower(): _operation(door, method) for method in door.methods} for door in DOORS}
+    paths: dict[str, dict[str, Any]] = {}
+    for door in DOORS:
+        paths[door.path] = {method.lower(): _operation(door, method) for method in door.methods}
     return {
         "openapi": "3.1.0",
         "info": {"title": "motet", "version": version, "description": "Motions from sentences, and back."},

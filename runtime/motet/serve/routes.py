@@ -30,7 +30,9 @@ SHAPING = {
     "in_place": Parameter("flag", "Remove horizontal travel; height and turns stay."),
 }
 READING = {
-    "format": Parameter("text", "Type of the file, where its name does not say it.", tuple(one[1:] for one in TAKES)),
+    "format": Parameter(
+        "text", "Type of the file, where its name does not say it.", tuple(extension[1:] for extension in TAKES)
+    ),
     "clip": Parameter("text", "Clip of a file with several: its name, or its number from 1."),
     "figure": Parameter("text", "Skeleton of a file with several: its name, or its number from 1."),
     "unit_in": Parameter("text", "Length unit of a file that does not state it.", tuple(METRES)),

@@ -164,7 +164,9 @@ class Vocabulary:
     @staticmethod
     def of(sentences: Iterable[str]) -> "Vocabulary":
         """The vocabulary of sentences: their words by falling count, then by name."""
-        counts = Counter(word for sentence in sentences for word in RULES.words(sentence))
+        counts = Counter[str]()
+        for sentence in sentences:
+            counts.update(RULES.words(sentence))
         return Vocabulary((*SPECIALS, *sorted(counts, key=lambda word: (-counts[word], word))))
 
     def __len__(self) -> int:
