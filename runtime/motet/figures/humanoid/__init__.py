@@ -4,12 +4,14 @@ Two doors: :func:`to_humanoid` and :func:`from_humanoid`, with a :class:`Figure`
 """
 
 from motet.figures.humanoid.bones import (
+    ARM,
     BONES,
     FINGERS,
     HUMANOID,
     LEFT_RIGHT,
     LEG,
     MIXAMO,
+    NECK,
     REQUIRED,
     RIGS,
     SOLE,
@@ -39,6 +41,7 @@ from motet.figures.humanoid.retarget import (
 )
 
 __all__ = [
+    "ARM",
     "BONES",
     "FINGERS",
     "HUMANOID",
@@ -46,6 +49,7 @@ __all__ = [
     "LEG",
     "LENGTH_UNITS",
     "MIXAMO",
+    "NECK",
     "REQUIRED",
     "RIGS",
     "SOLE",

@@ -1,0 +1,85 @@
+"""An act of key poses, and how it is laid over a motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from motet.errors import DecodingError, MotionError
+from motet.figures.humanoid import BONES, HUMANOID, on_humanoid
+from motet.keyed.draw import Drawn, drawn
+from motet.keyed.hands import with_hands
+from motet.keyed.keys import Key, Repeat, Span
+from motet.keyed.trunk import Figure, with_feet, with_trunk
+from motet.motion.kinematics import heading, local_rotations, local_translations, posed
+from motet.motion.motion import Motion
+from motet.motion.rotations import axis_to_rotmat
+from motet.settings import Seed, seeds_of
+
+FPS = 30.0
+"""Frames a second of what acts give, as of everything on the humanoid."""
+
+
+@dataclass(frozen=True)
+class KeyedAct:
+    """An act of key poses.
+
+    says: sentences for it. ease: seconds in which a part comes from the base to its first key, and goes back after its
+    last. speed, amplitude: of each draw; the amplitude is of all numbers, but not of where hands go. mirrored: whether
+    a draw may have left and right exchanged.
+    """
+
+    name: str
+    says: tuple[str, ...]
+    keys: tuple[Key, ...]
+    repeat: Repeat | None = None
+    ease: float = 0.4
+    speed: Span = (0.92, 1.08)
+    amplitude: Span = (0.9, 1.1)
+    mirrored: bool = False
+
+    def motion(self, base: Motion, seed: Seed = 0) -> Motion:
+        """The act laid over the begin of a base, such as a person who stands.
+
+        base: of any human figure; it must last as long as the act. The result is on the humanoid, at 30 frames a
+            second, and ends when the act does.
+        seed: of times, sizes and counts.
+        MotionError for a base that is too short or not of a human, and for a key that no body can take. DecodingError
+        for a negative seed.
+        """
+        (number,) = seeds_of(seed, 1, DecodingError)
+        return laid_over(base, drawn(self, np.random.default_rng(number), FPS), self.name)
+
+    def seconds(self, seed: Seed = 0) -> float:
+        """How long the motion of a seed lasts."""
+        (number,) = seeds_of(seed, 1, DecodingError)
+        return drawn(self, np.random.default_rng(number), FPS).frames / FPS
+
+
+def laid_over(base: Motion, act: Drawn, name: str) -> Motion:
+    """A drawn act over the begin of a base; MotionError as of :meth:`KeyedAct.motion`."""
+    motion = on_humanoid(base).continuous().resample(FPS)
+    if len(motion) < act.frames:
+        raise MotionError(
+            f"{name} lasts {act.frames / FPS:.1f} s, the motion that it is laid over {len(motion) / FPS:.1f} s: "
+            "give a longer one"
+        )
+    motion = motion[: act.frames]
+    figure = _figure_of(motion)
+
+    # from the ground up: legs under the hips, the trunk on them, and arms on the trunk
+    figure = with_feet(figure, act)
+    figure = with_trunk(figure, act)
+    if any(act.hands.values()):
+        figure = with_hands(figure, act, name)
+    rotations = {bone: figure.local[:, index] for index, bone in enumerate(BONES)}
+    return posed(motion, rotations, {BONES[0]: figure.root})
+
+
+def _figure_of(motion: Motion) -> Figure:
+    """The figure of a motion on the humanoid, seen along the way that it faces."""
+    joints = [HUMANOID.index(bone) for bone in BONES]
+    return Figure(
+        local_rotations(motion, joints),
+        local_translations(motion)[:, 0],
+        axis_to_rotmat("y", heading(motion)),
+    )
