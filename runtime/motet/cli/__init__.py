@@ -16,6 +16,7 @@ COMMANDS = {
     "describe": ("motet.cli.describe", "", "Describe motions in ranked sentences."),
     "generate": ("motet.cli.generate", "", "Generate motions from sentences."),
     "compose": ("motet.cli.compose", "", "Compose motions: prompts, places and poses at given times."),
+    "key": ("motet.cli.key", "", "Make clips of acts by key poses."),
     "predict": ("motet.cli.predict", "", "Predict how motions continue."),
     "fill": ("motet.cli.fill", "", "Fill gaps of motions, and close loops."),
     "join": ("motet.cli.fill", "", "Join two motions by a transition."),

@@ -182,7 +182,8 @@ def curve(points: Iterable[tuple[float, float]], times: Array) -> Array:
     before = np.searchsorted(knots, times, side="right").clip(1, len(knots) - 1) - 1
     span = np.maximum(knots[before + 1] - knots[before], 1e-6)
     share = rise((times - knots[before]) / span, 0, 1)
-    return values[before] + share * (values[before + 1] - values[before])
+    through: Array = values[before] + share * (values[before + 1] - values[before])
+    return through
 
 
 def with_follow_through(values: Array, fps: float) -> Array:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, unit
 from motet.settings import Range
 
 DEGREES = "degrees"
@@ -127,7 +127,7 @@ OTHER_HAND = "other hand"
 def direction(words: str, side: float) -> Array:
     """The unit vector (3,) of words such as "forward down", seen from the upper chest, of a hand with this sign of x.
     KeyError for another word; a zero vector where they cancel out."""
-    total = np.sum([DIRECTIONS[word] for word in words.split()], axis=0, dtype=np.float64)
-    total[0] *= side
-    length = float(np.linalg.norm(total))
-    return total / length if length > 0 else total
+    total = np.zeros(3)
+    for word in words.split():
+        total += DIRECTIONS[word]
+    return unit(total * [side, 1.0, 1.0])

@@ -1,0 +1,63 @@
+"""``motet key``: clips of acts by key poses."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+
+from motet.bundle.graph import SessionOptions
+from motet.cli.options import session_options
+from motet.cli.reading import Read, read_options
+from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.keyed import KeyedAct, ours
+from motet.keyed import read as read_acts
+from motet.models.load import load_as
+from motet.motion.motion import Motion
+from motet.steering.model import SteerModel
+
+
+@click.command()
+@click.argument("acts", required=False, type=Path)
+@out_option
+@click.option("--act", "names", multiple=True, help="Only this act; may be given several times.  [default: all]")
+@click.option(
+    "--over", type=Path, metavar="MOTION", help="Motion that the acts are laid over.  [default: a person who stands]"
+)
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of times, sizes and counts.")
+@write_options
+@session_options
+@read_options
+def key(
+    acts: Path | None,
+    out: Path,
+    names: tuple[str, ...],
+    over: Path | None,
+    seed: int,
+    output: Output,
+    session: SessionOptions,
+    read: Read,
+) -> None:
+    """Make a clip of each act in the file ACTS (.toml), or of each act that ships.
+
+    With {name} in OUT, such as "clips/{name}.bvh", each clip has the name of its act; else several are numbered.
+    """
+    chosen = _chosen(ours() if acts is None else read_acts(acts), names)
+    outs = places(out, list(chosen), output=output)
+    longest = max(act.seconds(seed) for act in chosen.values())
+    base = _standing(longest, session) if over is None else read(over)
+    for (name, act), place in zip(chosen.items(), outs, strict=True):
+        motion = output.write(place, act.motion(base, seed), name)
+        click.echo(f"{place}: {size(len(motion), motion.fps)}: {name}")
+    output.finish()
+
+
+def _chosen(acts: Mapping[str, KeyedAct], names: tuple[str, ...]) -> Mapping[str, KeyedAct]:
+    if unknown := [name for name in names if name not in acts]:
+        raise click.UsageError(f"there is no act {unknown[0]!r}, only {', '.join(acts)}")
+    return {name: acts[name] for name in names or acts}
+
+
+def _standing(seconds: float, session: SessionOptions) -> Motion:
+    """A person who stands and breathes, a little longer than that."""
+    model = load_as(SteerModel, "control", session)
+    return model.run(f"stop {seconds + 1:.1f}s")
