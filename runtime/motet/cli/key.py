@@ -43,8 +43,7 @@ def key(
     """
     chosen = _chosen(ours() if acts is None else read_acts(acts), names)
     outs = places(out, list(chosen), output=output)
-    longest = max(act.seconds(seed) for act in chosen.values())
-    base = _standing(longest, session) if over is None else read(over)
+    base = _standing(chosen, seed, session) if over is None else read(over)
     for (name, act), place in zip(chosen.items(), outs, strict=True):
         motion = output.write(place, act.motion(base, seed), name)
         click.echo(f"{place}: {size(len(motion), motion.fps)}: {name}")
@@ -57,7 +56,8 @@ def _chosen(acts: Mapping[str, KeyedAct], names: tuple[str, ...]) -> Mapping[str
     return {name: acts[name] for name in names or acts}
 
 
-def _standing(seconds: float, session: SessionOptions) -> Motion:
-    """A person who stands and breathes, a little longer than that."""
+def _standing(acts: Mapping[str, KeyedAct], seed: int, session: SessionOptions) -> Motion:
+    """A person who stands and breathes, a little longer than all acts."""
+    seconds = max(act.seconds(seed) for act in acts.values())
     model = load_as(SteerModel, "control", session)
     return model.run(f"stop {seconds + 1:.1f}s")

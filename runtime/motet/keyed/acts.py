@@ -32,7 +32,7 @@ class KeyedAct:
     says: tuple[str, ...]
     keys: tuple[Key, ...]
     repeat: Repeat | None = None
-    ease: float = 0.4
+    ease: Span = (0.4, 0.4)
     speed: Span = (0.92, 1.08)
     amplitude: Span = (0.9, 1.1)
     mirrored: bool = False

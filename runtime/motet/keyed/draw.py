@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from motet.figures.feet.contacts import rise, smoothed
 from motet.keyed.keys import HandKey, Key, Repeat, Span, mirrored_keys
-from motet.keyed.parts import HANDS, SIDE_OF_HAND, TOUCHES, direction
+from motet.keyed.parts import SIDE_OF_HAND, TOUCHES, direction
 from motet.motion.rotations import Array
 
 if TYPE_CHECKING:
@@ -55,6 +55,17 @@ class HandTrack(NamedTuple):
     share: Array
     weight: Array
 
+    def mixed(self, values: Array) -> Array:
+        """Values (T, ...) on the way between those (N, T, ...) of the N poses."""
+        frames = np.arange(len(self.share))
+        share = self.share.reshape(-1, *[1] * (values.ndim - 2))
+        return (1 - share) * values[self.before, frames] + share * values[self.after, frames]
+
+    @property
+    def after(self) -> NDArray[np.intp]:
+        """(T,) the pose that comes next."""
+        return np.minimum(self.before + 1, len(self.poses) - 1)
+
 
 @dataclass(frozen=True)
 class Drawn:
@@ -84,54 +95,66 @@ Points = list[tuple[float, float]]
 
 def drawn(act: "KeyedAct", rng: np.random.Generator, fps: float) -> Drawn:
     """A draw of an act at a frame rate."""
-    speed = _chosen(act.speed, rng)
-    amplitude = _chosen(act.amplitude, rng)
     is_mirrored = act.mirrored and rng.random() < 0.5
     keys = mirrored_keys(act.keys) if is_mirrored else act.keys
+    speed = _chosen(act.speed, rng)
+    ease = _chosen(act.ease, rng) / speed
     timed = _timed(keys, act.repeat, speed, rng)
-    ease = act.ease / speed
-
-    # each number of each part, and each hand, is a track of its own
-    points: dict[tuple[str, str], Points] = {}
-    hands: dict[str, list[tuple[float, HandPose]]] = {}
-    for time, hold, key in timed:
-        for part, values in key.numbers.items():
-            for name, span in values.items():
-                value = amplitude * _chosen(span, rng)
-                points.setdefault((part, name), []).extend(_held(time, hold, value))
-        for hand, where in key.hands.items():
-            hands.setdefault(hand, []).extend(_held(time, hold, _hand_pose(hand, where, rng)))
+    points = _points(timed, _chosen(act.amplitude, rng), rng)
+    hands = _hand_poses(timed, rng)
 
     # all of them last until the last one is back at the base
-    last = max(time + hold for time, hold, _ in timed)
+    last = max(key.time + key.hold for key in timed)
     frames = int(np.ceil((last + ease) * fps)) + 1
     times = np.arange(frames) / fps
     numbers: dict[str, dict[str, Array]] = {}
     for (part, name), track in points.items():
         numbers.setdefault(part, {})[name] = with_follow_through(curve(_eased(track, ease), times), fps)
-    tracks = {hand: _hand_track(hands[hand], ease, times) for hand in HANDS if hand in hands}
-    return Drawn(frames, numbers, tracks)
+    return Drawn(frames, numbers, {hand: _hand_track(poses, ease, times) for hand, poses in hands.items()})
+
+
+def _points(timed: Sequence[_Timed], amplitude: float, rng: np.random.Generator) -> dict[tuple[str, str], Points]:
+    """The points of each number of each part."""
+    points: dict[tuple[str, str], Points] = {}
+    for time, hold, key in timed:
+        for part, spans in key.numbers.items():
+            for name, span in spans.items():
+                value = amplitude * _chosen(span, rng)
+                points.setdefault((part, name), []).extend(_held(time, hold, value))
+    return points
+
+
+def _hand_poses(timed: Sequence[_Timed], rng: np.random.Generator) -> dict[str, list[tuple[float, HandPose]]]:
+    """The poses of each hand, with their times."""
+    poses: dict[str, list[tuple[float, HandPose]]] = {}
+    for time, hold, key in timed:
+        for hand, where in key.hands.items():
+            poses.setdefault(hand, []).extend(_held(time, hold, _hand_pose(hand, where, rng)))
+    return poses
 
 
 def _timed(keys: Sequence[Key], repeat: Repeat | None, speed: float, rng: np.random.Generator) -> list[_Timed]:
     """The keys, those that are repeated as often as they are, at rising times."""
-    rounds = [(0, key) for key in keys]
-    every = 0.0
-    if repeat is not None:
-        every = _chosen(repeat.every, rng)
-        count = int(rng.integers(repeat.times[0], repeat.times[1] + 1))
-        rounds = [(0, key) for key in keys[: repeat.first]]
-        for number in range(count):
-            rounds += [(number, key) for key in keys[repeat.first : repeat.last + 1]]
-        rounds += [(count - 1, key) for key in keys[repeat.last + 1 :]]
+    every = 0.0 if repeat is None else _chosen(repeat.every, rng)
     timed: list[_Timed] = []
     earliest = 0.0
-    for number, key in rounds:
+    for number, key in _rounds(keys, repeat, rng):
         time = max((_chosen(key.at, rng) + number * every) / speed, earliest)
         hold = _chosen(key.hold, rng) / speed
         timed.append(_Timed(time, hold, key))
         earliest = time + hold
     return timed
+
+
+def _rounds(keys: Sequence[Key], repeat: Repeat | None, rng: np.random.Generator) -> list[tuple[int, Key]]:
+    """The keys, each with how many rounds are over before it."""
+    if repeat is None:
+        return [(0, key) for key in keys]
+    count = int(rng.integers(repeat.times[0], repeat.times[1] + 1))
+    rounds = [(0, key) for key in keys[: repeat.first]]
+    for number in range(count):
+        rounds += [(number, key) for key in keys[repeat.first : repeat.last + 1]]
+    return [*rounds, *((count - 1, key) for key in keys[repeat.last + 1 :])]
 
 
 def _chosen(span: Span, rng: np.random.Generator) -> float:

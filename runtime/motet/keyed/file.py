@@ -74,25 +74,12 @@ class _Reader:
     def act(self, name: str, table: Any) -> KeyedAct:
         """The act of a table."""
         try:
-            _check_fields(table, ACT_FIELDS, f"[{name}]")
-            keys = table.get("key", [])
-            if not isinstance(keys, list) or not 1 <= len(keys) <= MOST_KEYS:
-                raise _EntryError(f"expected 1 to {MOST_KEYS} keys, each a table [[{name}.key]]")
-            says = table.get("says", [name])
-            if not isinstance(says, list) or not all(isinstance(text, str) and text.strip() for text in says):
-                raise _EntryError("says: expected a list of sentences")
-            is_mirrored = table.get("mirrored", False)
-            if not isinstance(is_mirrored, bool):
-                raise _EntryError("mirrored: expected true or false")
-            repeat = _repeat(table["repeat"], len(keys)) if "repeat" in table else None
-            ease = _span(table.get("ease", 0.4), EASE, "ease")[0]
-            speed = _span(table.get("speed", [0.92, 1.08]), SPEED, "speed")
-            amplitude = _span(table.get("amplitude", [0.9, 1.1]), AMPLITUDE, "amplitude")
+            settings = _settings(name, table)
         except _EntryError as wrong:
             raise FormatError(self.path, f"[{name}]: {wrong}", self._line(name)) from None
-        poses = tuple(self._key(name, number, key) for number, key in enumerate(keys))
-        self._check_order(name, poses)
-        return KeyedAct(name, tuple(says), poses, repeat, ease, speed, amplitude, is_mirrored)
+        keys = tuple(self._key(name, number, key) for number, key in enumerate(table["key"]))
+        self._check_order(name, keys)
+        return KeyedAct(name, keys=keys, **settings)
 
     def _key(self, name: str, number: int, table: Any) -> Key:
         try:
@@ -114,6 +101,31 @@ class _Reader:
         numbers = [number for number, line in enumerate(self.lines, start=1) if re.match(header, line)]
         place = key or 0
         return numbers[place] if place < len(numbers) else None
+
+
+def _settings(name: str, table: Any) -> dict[str, Any]:
+    """The fields of an act beside its keys."""
+    _check_fields(table, ACT_FIELDS, f"[{name}]")
+    keys = table.get("key", [])
+    if not isinstance(keys, list) or not 1 <= len(keys) <= MOST_KEYS:
+        raise _EntryError(f"expected 1 to {MOST_KEYS} keys, each a table [[{name}.key]]")
+    settings: dict[str, Any] = {"says": _sentences(table.get("says", [name]))}
+    if "mirrored" in table:
+        settings["mirrored"] = table["mirrored"]
+        if not isinstance(table["mirrored"], bool):
+            raise _EntryError("mirrored: expected true or false")
+    if "repeat" in table:
+        settings["repeat"] = _repeat(table["repeat"], len(keys))
+    for field, limits in (("ease", EASE), ("speed", SPEED), ("amplitude", AMPLITUDE)):
+        if field in table:
+            settings[field] = _span(table[field], limits, field)
+    return settings
+
+
+def _sentences(says: Any) -> tuple[str, ...]:
+    if not isinstance(says, list) or not all(isinstance(text, str) and text.strip() for text in says):
+        raise _EntryError("says: expected a list of sentences")
+    return tuple(says)
 
 
 def _key(table: Any) -> Key:

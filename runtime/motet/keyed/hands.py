@@ -74,9 +74,7 @@ def _with_shoulder(figure: Figure, track: HandTrack, side: str, sign: float) -> 
     _, places = figure.chain((*TRUNK, *limb_of(side, ARM[:2])))
     shoulder = places[:, 5]
     heights = np.stack([(_place(figure, pose, side, sign) - shoulder)[:, 1] for pose in track.poses])
-    frames = np.arange(len(shoulder))
-    after = np.minimum(track.before + 1, len(track.poses) - 1)
-    height = (1 - track.share) * heights[track.before, frames] + track.share * heights[after, frames]
+    height = track.mixed(heights)
     raised = track.weight * rise(height, 0, UPPER_ARM + FOREARM)
     turn = axis_to_rotmat("z", sign * np.radians(SHOULDER_RISES) * raised)
     return figure.with_local({bone: product(turn, figure.local[:, BONES.index(bone)])})
@@ -85,38 +83,29 @@ def _with_shoulder(figure: Figure, track: HandTrack, side: str, sign: float) -> 
 def _with_hand(figure: Figure, track: HandTrack, side: str, sign: float, name: str) -> Figure:
     bones = (*TRUNK, *limb_of(side, ARM))
     rotations, places = figure.chain(bones)
-    chest = rotations[:, 3]
+    chest, parent, *arm = (rotations[:, joint] for joint in range(3, len(bones)))
     shoulder = places[:, 5]
-    base = Arm(*(rotations[:, 5 + joint] for joint in range(3)))
 
-    # where the wrist goes, from pose to pose
     wrists = np.stack([_wrist(figure, pose, side, sign, shoulder, chest) for pose in track.poses])
     _check_reach(wrists, shoulder, track, name)
+    elbows = np.array([np.full(len(chest), pose.elbow) for pose in track.poses])
+    upper, lower = _arm_to(track.mixed(wrists), shoulder, track.mixed(elbows), chest, sign)
+
+    # the hand turns the shortest way from pose to pose
+    turned = np.stack([_hand(pose, lower, chest, sign, Arm(*arm)) for pose in track.poses])
     frames = np.arange(len(chest))
-    after = np.minimum(track.before + 1, len(track.poses) - 1)
-    share = track.share[:, None]
-    wrist = (1 - share) * wrists[track.before, frames] + share * wrists[after, frames]
-    elbows = np.array([pose.elbow for pose in track.poses])
-    elbow = (1 - track.share) * elbows[track.before] + track.share * elbows[after]
+    hand = _between(turned[track.before, frames], turned[track.after, frames], track.share)
+    return _mixed(figure, bones[4:], parent, Arm(upper, *_within_wrist(lower, hand)), track.weight)
 
-    # the arm, and its hand
-    upper, lower = _arm_to(wrist, shoulder, elbow, chest, sign)
-    hands = [_hand(pose, lower, chest, sign, base) for pose in track.poses]
-    turned = np.stack(hands)
-    hand_rotation = _between(turned[track.before, frames], turned[after, frames], track.share)
-    lower, hand_rotation = _within_wrist(lower, hand_rotation, sign)
 
-    # mixed with the base, joint by joint
-    parent = rotations[:, 4]
-    target = {
-        bones[5]: product(inverse(parent), upper),
-        bones[6]: product(inverse(upper), lower),
-        bones[7]: product(inverse(lower), hand_rotation),
-    }
-    mixed = {}
-    for bone, local in target.items():
-        mixed[bone] = _between(figure.local[:, BONES.index(bone)], local, track.weight)
-    return figure.with_local(mixed)
+def _mixed(figure: Figure, bones: tuple[str, ...], parent: Array, arm: Arm, weight: Array) -> Figure:
+    """The figure with an arm, its shoulder turned as parent (T, 3, 3), mixed with its own by weights (T,)."""
+    rotations = {}
+    for bone, turned in zip(bones[1:], arm, strict=True):
+        local = product(inverse(parent), turned)
+        rotations[bone] = _between(figure.local[:, BONES.index(bone)], local, weight)
+        parent = turned
+    return figure.with_local(rotations)
 
 
 def _place(figure: Figure, pose: HandPose, side: str, sign: float) -> Array:
@@ -173,11 +162,8 @@ def _arm_to(wrist: Array, shoulder: Array, elbow: Array, chest: Array, sign: flo
     distance = np.linalg.norm(away, axis=1).clip(abs(UPPER_ARM - FOREARM) + 0.05, longest)
     along = unit(away)
 
-    # the elbow lies beside the way to the wrist, on the side of the pole
-    angle = np.radians(elbow)
-    pole = np.stack([sign * np.sin(angle), -np.cos(angle), np.full_like(angle, -0.25)], axis=1)
-    pole = rotated(chest, pole)
-    aside = unit(pole - (pole * along).sum(axis=1, keepdims=True) * along)
+    # the elbow lies beside the way to the wrist
+    aside = _elbow_side(along, elbow, chest, sign)
     cosine = (UPPER_ARM**2 + distance**2 - FOREARM**2) / (2 * UPPER_ARM * distance)
     sine = np.sqrt(np.maximum(1 - cosine**2, 0))
     to_elbow = UPPER_ARM * (cosine[:, None] * along + sine[:, None] * aside)
@@ -186,6 +172,14 @@ def _arm_to(wrist: Array, shoulder: Array, elbow: Array, chest: Array, sign: flo
     # both bones turn about the normal of their plane, which is the y axis of a T-pose
     normal = sign * unit(np.cross(along, aside))
     return _bone_frame(unit(to_elbow), normal, sign), _bone_frame(unit(to_wrist), normal, sign)
+
+
+def _elbow_side(along: Array, elbow: Array, chest: Array, sign: float) -> Array:
+    """The direction (T, 3) square to the way to the wrist in which the elbow lies: down, and raised to the side."""
+    angle = np.radians(elbow)
+    pole = np.stack([sign * np.sin(angle), -np.cos(angle), np.full_like(angle, -0.25)], axis=1)
+    pole = rotated(chest, pole)
+    return unit(pole - (pole * along).sum(axis=1, keepdims=True) * along)
 
 
 def _bone_frame(along: Array, up: Array, sign: float) -> Array:
@@ -205,7 +199,7 @@ def _hand(pose: HandPose, lower: Array, chest: Array, sign: float, base: Arm) ->
     return _bone_frame(unit(along), -palm, sign)
 
 
-def _within_wrist(lower: Array, hand: Array, sign: float) -> tuple[Array, Array]:
+def _within_wrist(lower: Array, hand: Array) -> tuple[Array, Array]:
     """The forearm with its share of the hand's twist, and the hand with its wrist bent no farther than it goes."""
     relative = product(inverse(lower), hand)
     turn = rotmat_to_rotvec(twist(relative, np.array([1.0, 0.0, 0.0])))
