@@ -78,8 +78,6 @@ def laid_over(base: Motion, act: Drawn, name: str) -> Motion:
 def _figure_of(motion: Motion) -> Figure:
     """The figure of a motion on the humanoid, seen along the way that it faces."""
     joints = [HUMANOID.index(bone) for bone in BONES]
-    return Figure(
-        local_rotations(motion, joints),
-        local_translations(motion)[:, 0],
-        axis_to_rotmat("y", heading(motion)),
-    )
+    root = local_translations(motion)[:, 0]
+    facing = axis_to_rotmat("y", heading(motion))
+    return Figure(local_rotations(motion, joints), root, facing, root * [1, 0, 1])

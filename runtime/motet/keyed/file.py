@@ -11,7 +11,7 @@ from typing import Any
 from motet.errors import FormatError, quoted
 from motet.keyed.acts import KeyedAct
 from motet.keyed.keys import HandKey, Key, Repeat, Span
-from motet.keyed.parts import DIRECTIONS, HAND, HANDS, NUMBERS, OTHER_HAND, PLACES, TOUCHES
+from motet.keyed.parts import DIRECTIONS, FLOOR, HAND, HANDS, NUMBERS, OTHER_HAND, PLACES, TOUCHES
 from motet.settings import Range, is_number
 
 LARGEST_FILE = 1_000_000
@@ -143,7 +143,7 @@ def _key(table: Any) -> Key:
 
 def _hand(table: Any, hand: str) -> HandKey:
     _check_fields(table, HAND_FIELDS, hand)
-    places = (*PLACES, OTHER_HAND)
+    places = (*PLACES, OTHER_HAND, FLOOR)
     place = table.get("to")
     if place not in places:
         raise _EntryError(f"{hand}.to: expected one of {', '.join(places)}, not {quoted(str(place))}")

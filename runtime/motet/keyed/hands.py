@@ -11,7 +11,7 @@ from motet.errors import MotionError
 from motet.figures.feet.contacts import rise
 from motet.figures.humanoid import ARM, BONES, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, limb_of, sided
 from motet.keyed.draw import Drawn, HandPose, HandTrack
-from motet.keyed.parts import OTHER_HAND, PLACES, TOUCHES, Place
+from motet.keyed.parts import FLOOR, OTHER_HAND, PLACES, TOUCHES, Place
 from motet.keyed.trunk import Figure
 from motet.motion.rotations import (
     Array,
@@ -115,6 +115,8 @@ def _place(figure: Figure, pose: HandPose, side: str, sign: float) -> Array:
         rotations, places = figure.chain((*TRUNK, *limb_of(other, ARM)))
         palm = np.array([-sign * TOUCHES["palm"], -0.02, 0.0])
         return places[:, -1] + rotated(rotations[:, -1], palm) + rotated(rotations[:, 3], pose.offset)
+    if pose.place == FLOOR:
+        return figure.floor + rotated(figure.facing, np.broadcast_to(pose.offset, figure.floor.shape))
     place = PLACES[pose.place]
     rotations, places = figure.chain(_way_to(place, side))
     point = np.array([sign * place.x, place.y, place.z]) + pose.offset

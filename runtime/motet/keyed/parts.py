@@ -49,9 +49,9 @@ NUMBERS: Mapping[str, Mapping[str, Range]] = {
 """Part -> its numbers, each a difference from the base; a foot's are seen from its own side."""
 
 HAND: Mapping[str, Range] = {
-    "out": _metres(-0.8, 0.8),
-    "up": _metres(-0.8, 0.8),
-    "forward": _metres(-0.8, 0.8),
+    "out": _metres(-1, 1),
+    "up": _metres(-1, 2.5),
+    "forward": _metres(-1, 1),
     "elbow": _degrees(-30, 150),
 }
 """The numbers of a hand: how far from the place that it goes to, away from the middle, up and forward, and how far the
@@ -122,6 +122,9 @@ PLACES: Mapping[str, Place] = {
 
 OTHER_HAND = "other hand"
 """The palm of the other hand is a place, too."""
+
+FLOOR = "floor"
+"""And so is the floor under the hips of the base, whatever the act does with them; its axes are those of the facing."""
 
 
 def direction(words: str, side: float) -> Array:

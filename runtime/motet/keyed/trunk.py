@@ -24,12 +24,14 @@ class Figure:
     """A motion of the humanoid as arrays.
 
     local: rotations (T, J, 3, 3) in the parents' frames. root: places (T, 3) of the hips in metres. facing: rotations
-    (T, 3, 3) about the vertical axis, from the way that the base faces to the world.
+    (T, 3, 3) about the vertical axis, from the way that the base faces to the world. floor: (T, 3) the place under the
+    hips of the base.
     """
 
     local: Array
     root: Array
     facing: Array
+    floor: Array
 
     def chain(self, bones: tuple[str, ...]) -> tuple[Array, Array]:
         """Rotations (T, n, 3, 3) in the world, and places (T, n, 3), of bones from the hips on."""
