@@ -92,7 +92,7 @@ CEILINGS = {
     "motet.figures": 32_000,
     "motet.formats": 37_400,
     "motet.generate": 26_200,
-    "motet.keyed": 9_200,
+    "motet.keyed": 9_300,
     "motet.live": 5_700,
     "motet.models": 10_100,
     "motet.motion": 16_400,
