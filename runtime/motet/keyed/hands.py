@@ -112,15 +112,20 @@ def _place(figure: Figure, pose: HandPose, side: str, sign: float) -> Array:
     """The place (T, 3) in the world that a pose names, with its offset."""
     if pose.place == OTHER_HAND:
         other = LEFT_RIGHT[1] if side == LEFT_RIGHT[0] else LEFT_RIGHT[0]
-        rotations, places = figure.chain((*TRUNK, *limb_of(other, ARM)))
-        palm = np.array([-sign * TOUCHES["palm"], -0.02, 0.0])
-        return places[:, -1] + rotated(rotations[:, -1], palm) + rotated(rotations[:, 3], pose.offset)
+        return _palm(figure, other, -sign, pose.offset)
     if pose.place == FLOOR:
         return figure.floor + rotated(figure.facing, np.broadcast_to(pose.offset, figure.floor.shape))
     place = PLACES[pose.place]
     rotations, places = figure.chain(_way_to(place, side))
     point = np.array([sign * place.x, place.y, place.z]) + pose.offset
     return places[:, -1] + rotations[:, -1] @ point
+
+
+def _palm(figure: Figure, side: str, sign: float, offset: Array) -> Array:
+    """The middle of a palm (T, 3), and from there an offset seen from the upper chest."""
+    rotations, places = figure.chain((*TRUNK, *limb_of(side, ARM)))
+    from_wrist = np.array([sign * TOUCHES["palm"], -0.02, 0.0])
+    return places[:, -1] + rotated(rotations[:, -1], from_wrist) + rotated(rotations[:, 3], offset)
 
 
 def _way_to(place: Place, side: str) -> tuple[str, ...]:
