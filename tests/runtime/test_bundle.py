@@ -4,6 +4,7 @@ import pickle
 import shutil
 import zipfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from importlib import import_module
 from importlib.metadata import EntryPoint
@@ -19,8 +20,10 @@ import motet
 from motet.bench.cases import cases
 from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle
 from motet.bundle.graph import SessionOptions
+from motet.bundle.members import Archive
 from motet.cli import main
 from motet.errors import BundleError, OutputError, SettingError
+from motet.generate.model import CodesModel
 from motet.models.load import KINDS, kind_of, load, verify
 
 PAPERS = ("convseq2seq", "language-to-motion", "motion-to-language", "tdbn")
@@ -99,8 +102,56 @@ def test_an_altered_file_is_refused(folder: Path) -> None:
     data = bytearray((folder / "step.onnx").read_bytes())
     data[-100] ^= 1
     (folder / "step.onnx").write_bytes(data)
+    # refused when it is first called, whoever calls it and how often
+    session = load(folder).start()
+    for _ in range(2):
+        with pytest.raises(BundleError, match=rf"bundle {folder}: the file 'step.onnx' was altered"):
+            session.step()
     with pytest.raises(BundleError, match=r"'step.onnx' was altered"):
-        load(folder)
+        load(folder).ready()
+
+
+def test_a_table_that_is_altered_after_loading_is_refused_before_its_use(tmp_path: Path) -> None:
+    with zipfile.ZipFile(list_bundles()["generate"]) as archive:
+        archive.extractall(tmp_path)
+    model = load(tmp_path)
+    data = bytearray((tmp_path / "memory.npy").read_bytes())
+    data[-1] ^= 1
+    (tmp_path / "memory.npy").write_bytes(data)
+    assert isinstance(model, CodesModel)
+    assert model.parts("a person walks") == ["a person walks"]
+    with pytest.raises(BundleError, match=f"bundle {tmp_path}: the file 'memory.npy' was altered"):
+        model.generate("a person walks")
+
+
+def test_a_bundle_is_read_as_it_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+    unpack = Archive.read
+
+    def noted(self: Archive, name: str, limit: int) -> bytes:
+        read.append(name)
+        return unpack(self, name, limit)
+
+    monkeypatch.setattr(Archive, "read", noted)
+    model = load("generate")
+    assert read == ["manifest.json"]
+    assert model.vocabulary.encode("a person walks")[1] == []
+    assert read == ["manifest.json"]
+    model.understood("a person walks")
+    assert read == ["manifest.json", "encoder.onnx"]
+    first = model.generate("a person walks", seconds=1.0)
+    assert "tokens.onnx" not in read
+    model.ready()
+    model.generate("a person walks", seconds=1.0)
+    assert sorted(read) == sorted({"manifest.json", *model.manifest.files} - {"golden.npz"})
+    assert len(first) >= 1
+
+
+def test_a_graph_is_made_once_by_threads_that_call_it_at_the_same_time() -> None:
+    graph = Bundle.open("search").late_graph("text")
+    with ThreadPoolExecutor(4) as threads:
+        made = list(threads.map(lambda _: graph.ready(), range(8)))
+    assert all(each is made[0] for each in made)
 
 
 def test_a_missing_file_is_refused(folder: Path) -> None:
@@ -184,7 +235,7 @@ NAN, HUGE = float("nan"), 10**400
         ("graphs.step.inputs.0.shape", ["batch", 1 << 20, 150], "at most 8 axes with at most"),
         ("graphs.step.inputs.1.shape", ["batch", 2], "does not match its contract|expected"),
         ("graphs.step.inputs.0.dtype", "object", "dtype: must be one of float32"),
-        ("graphs.step.outputs.0.name", "other", "does not match its contract"),
+        ("graphs.step.outputs.0.name", "other", "graphs.step: the graph has no output 'next_codes', only other"),
         ("graphs.step.outputs.0.name", "frame", "two tensors have the same name"),
         ("graphs.step.feedback", {"history": "none"}, "the graph has no output 'none'"),
         ("graphs.step.feedback", {"none": "next_history"}, "the graph has no input 'none'"),
@@ -211,7 +262,7 @@ def test_a_manifest_that_does_not_fit_is_refused(folder: Path, path: str, value:
     else:
         edit(folder, lambda m: set_at(m, path, value))
     with pytest.raises(BundleError, match=reason) as caught:
-        load(folder)
+        load(folder).ready()
     assert str(caught.value).startswith(f"bundle {folder}")
 
 
@@ -330,7 +381,7 @@ def test_a_member_longer_than_declared_is_not_read_to_its_end(folder: Path) -> N
     with (folder / "step.onnx").open("ab") as file:
         file.truncate(1 << 27)  # of holes: it takes no room, and would take 128 megabytes of memory
     with pytest.raises(BundleError, match=r"has more than 3[0-9]+ bytes"):
-        load(folder)
+        load(folder).ready()
     with (folder / "encoder.onnx").open("ab") as file:
         file.truncate(1 << 27)
     with pytest.raises(BundleError, match="total more than 268435456 bytes"):
@@ -344,7 +395,7 @@ def test_damage_within_a_zip_is_a_bundle_error(tmp_path: Path) -> None:
         damaged[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
         (tmp_path / f"{number}.zip").write_bytes(damaged)
         with suppress(BundleError):
-            load(tmp_path / f"{number}.zip")
+            load(tmp_path / f"{number}.zip").ready()
 
 
 @pytest.mark.parametrize("name", ["../evil", "/evil", "a/b", "a\\b", "folder/"])
@@ -373,7 +424,7 @@ def test_a_graph_that_is_none_is_refused(folder: Path, tmp_path: Path) -> None:
     manifest = json.loads((folder / "manifest.json").read_text())
     write_bundle(tmp_path / "b.zip", manifest, {**files, "step.onnx": b"no graph"})
     with pytest.raises(BundleError, match="step graph: the graph is not valid ONNX"):
-        load(tmp_path / "b.zip")
+        load(tmp_path / "b.zip").ready()
 
 
 def test_a_bundle_is_written_whole_or_not_at_all(folder: Path, tmp_path: Path) -> None:
@@ -413,7 +464,7 @@ def test_a_session_is_configured_before_it_is_made() -> None:
         options.graph_optimization_level = onnxruntime.GraphOptimizationLevel.ORT_DISABLE_ALL
         seen.append(options)
 
-    model = load("search", SessionOptions(threads=2, configure=configure))
+    model = load("search", SessionOptions(threads=2, configure=configure)).ready()
     assert len(seen) == len(model.graphs) == 2
     assert all(one.get_session_config_entry("session.load_model_format") == "ONNX" for one in seen)
     np.testing.assert_allclose(

@@ -50,14 +50,14 @@ def tables_of(bundle: Bundle) -> dict[str, NDArray[Any]]:
         *((n, -1, "") for n in range(-6, 0)),
     ],
 )
-def test_a_memory_is_checked_as_it_is_loaded(column: int, value: int, reason: str) -> None:
+def test_a_memory_is_checked_before_its_use(column: int, value: int, reason: str) -> None:
     bundle = Bundle.open("generate")
     tables = tables_of(bundle)
     memory = tables["memory"].copy()
     memory[1000, column] = value
     graphs = {role: bundle.graph(role) for role in bundle.manifest.graphs}
     with pytest.raises(BundleError, match=f"table memory: {reason}.* is out of range"):
-        build(bundle.manifest, graphs, {**tables, "memory": memory})
+        build(bundle.manifest, graphs, {**tables, "memory": memory}).ready()
     for other in ({}, {**tables, "moves": tables["moves"][:-1]}, {**tables, "body": tables["body"][:, :-1]}):
         with pytest.raises(BundleError, match="manifest, tables"):
             build(bundle.manifest, graphs, other)

@@ -67,8 +67,11 @@ def test_what_is_not_the_declared_table_is_refused(tmp_path: Path, content: byte
     bundle = written(tmp_path / "x.zip", content)
     with pytest.raises(BundleError, match=f"bundle {tmp_path}/x.zip, table rows: .*{reason}"):
         bundle.table("rows")
+    model = SearchModel.load(bundle)
     with pytest.raises(BundleError, match=reason):
-        SearchModel.load(bundle)
+        model.ready()
+    with pytest.raises(BundleError, match=reason):
+        model.tables["rows"]
 
 
 @pytest.mark.parametrize(

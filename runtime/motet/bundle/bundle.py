@@ -12,17 +12,17 @@ import logging
 import os
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from importlib import resources
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.fields import LARGEST, Json
-from motet.bundle.graph import OnnxGraph, SessionOptions
+from motet.bundle.graph import LateGraph, OnnxGraph, SessionOptions, TensorSpec
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
 from motet.bundle.members import Archive, Folder, array_of
 from motet.errors import BundleError
@@ -91,7 +91,23 @@ class Bundle:
         with self.named(f", {role} graph"):
             if graph_entry is None:
                 raise BundleError("there is none")
-            return OnnxGraph(self.read(graph_entry.file), graph_entry.spec, options)
+            graph = OnnxGraph(self.read(graph_entry.file), graph_entry.spec, options)
+        log.info("made the %s graph of %s on %s", role, self.path, ", ".join(graph.providers))
+        return graph
+
+    def late_graph(self, role: str, options: SessionOptions | None = None) -> LateGraph:
+        """As :meth:`graph`, for a role that there is: read, checked and made when it is first called. BundleError now
+        where its file is missing."""
+        with self.named(f", {role} graph"):
+            self._find(self.manifest.graphs[role].file)
+        return LateGraph(self.manifest.graphs[role].spec, partial(self.graph, role, options))
+
+    def late_tables(self) -> "Tables":
+        """All tables by name, each read and checked when it is first used. BundleError now where a file is missing."""
+        for name, table_entry in self.manifest.tables.items():
+            with self.named(f", table {name}"):
+                self._find(table_entry.file)
+        return Tables(self)
 
     def table(self, name: str) -> NDArray[Any]:
         """A table's array, read-only; BundleError if it differs from its declaration or is not finite."""
@@ -100,7 +116,7 @@ class Bundle:
             array = array_of(self.read(table_entry.file), table_entry.file, [table_entry.dtype])
             if array.shape != table_entry.shape:
                 raise BundleError(f"its shape is {list(array.shape)}, declared as {list(table_entry.shape)}")
-            if array.dtype.kind == "f" and not (np.abs(array) <= np.float64(LARGEST)).all():
+            if array.dtype.kind == "f" and not -LARGEST <= float(array.min()) <= float(array.max()) <= LARGEST:
                 raise BundleError(f"some numbers are not between -{LARGEST:g} and {LARGEST:g}")
             return array
 
@@ -115,22 +131,57 @@ class Bundle:
         files = {name: self.read(name) for name in sorted(self.manifest.files)}
         write_whole(path, archive_bytes({MANIFEST: self._read(MANIFEST, MAX_MANIFEST), **files}))
 
-    @contextmanager
-    def named(self, where: str = "") -> Iterator[None]:
+    def named(self, where: str = "") -> AbstractContextManager[None]:
         """Name the bundle in every error raised within."""
-        try:
-            yield
-        except BundleError as error:
-            names_bundle = str(error).startswith(f"bundle {self.path}")
-            raise error if names_bundle else BundleError(f"bundle {self.path}{where}: {error}") from error
+        return named(self.path, where)
 
-    def _read(self, name: str, limit: int) -> bytes:
+    def _find(self, name: str) -> None:
         if name not in self._members.names:
             raise BundleError(f"the file {name!r} is missing")
+
+    def _read(self, name: str, limit: int) -> bytes:
+        self._find(name)
         data = self._members.read(name, limit)
         if len(data) > limit:
             raise BundleError(f"the file {name!r} was altered: it has more than {limit} bytes")
         return data
+
+
+class Tables(Mapping[str, NDArray[Any]]):
+    """The tables of a bundle by name, read-only arrays; BundleError like :meth:`Bundle.table` at first use."""
+
+    def __init__(self, bundle: Bundle) -> None:
+        self._bundle = bundle
+        self._read: dict[str, NDArray[Any]] = {}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name not in self._read:
+            self._read[name] = self._bundle.table(name)
+        return self._read[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._bundle.manifest.tables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._bundle.manifest.tables)
+
+    def __len__(self) -> int:
+        return len(self._bundle.manifest.tables)
+
+    def declared(self, name: str) -> TensorSpec:
+        """The shape and dtype of a table, which is not read for it; those of an array that is read are the same."""
+        table_entry = self._bundle.manifest.tables[name]
+        return TensorSpec(name, table_entry.shape, table_entry.dtype)
+
+
+@contextmanager
+def named(path: Path, where: str = "") -> Iterator[None]:
+    """Name the bundle of a path in every error raised within."""
+    try:
+        yield
+    except BundleError as error:
+        names_bundle = str(error).startswith(f"bundle {path}")
+        raise error if names_bundle else BundleError(f"bundle {path}{where}: {error}") from error
 
 
 def find_bundle(name_or_path: str | Path) -> Path:

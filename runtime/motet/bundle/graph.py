@@ -287,6 +287,35 @@ class OnnxGraph:
         return outputs
 
 
+class LateGraph:
+    """A graph that is read and made when it is first called; safe to share between threads.
+
+    spec: its contract. make: reads, checks and makes it; what it raises, every call raises.
+    """
+
+    def __init__(self, spec: GraphSpec, make: Callable[[], OnnxGraph]) -> None:
+        self.spec = spec
+        self._make = make
+        self._made: OnnxGraph | None = None
+        self._making = threading.Lock()
+
+    def ready(self) -> OnnxGraph:
+        """The graph itself, made now if it was not; BundleError like :class:`OnnxGraph`."""
+        if self._made is None:
+            with self._making:
+                self._made = self._made or self._make()
+        return self._made
+
+    @property
+    def providers(self) -> tuple[str, ...]:
+        """The execution providers that are active, the preferred first."""
+        return self.ready().providers
+
+    def __call__(self, feeds: Arrays) -> dict[str, NDArray[Any]]:
+        """Named inputs to named outputs; BundleError like :class:`OnnxGraph`, and like its calls."""
+        return (self._made or self.ready())(feeds)
+
+
 def _check_contract(kind: str, nodes: Any, declared: tuple[TensorSpec, ...]) -> None:
     """BundleError where ONNX Runtime's tensors of a graph are not those that its contract declares."""
     actual = {node.name: (node.type, _sizes(node.shape)) for node in nodes}

@@ -127,11 +127,11 @@ def array_of(content: bytes, name: str, dtypes: Collection[str]) -> NDArray[Any]
         # the bytes after the header must be those that it announces
         version = np.lib.format.read_magic(file)
         shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
-        rest = content[file.tell() :]
+        start = file.tell()
         known = dtype.name in dtypes and dtype.isnative
-        if version != (1, 0) or fortran or not known or math.prod(shape) * dtype.itemsize != len(rest):
+        if version != (1, 0) or fortran or not known or math.prod(shape) * dtype.itemsize != len(content) - start:
             raise ValueError(f"expected {' or '.join(dtypes)} in C order, and nothing after it")
-        return np.frombuffer(rest, dtype).reshape(shape)
+        return np.frombuffer(content, dtype, offset=start).reshape(shape)
     except (*_DAMAGE, SyntaxError, TypeError, tokenize.TokenError, MemoryError) as error:
         raise BundleError(f"{name!r} is not a plain array: {error}") from error
 

@@ -59,7 +59,7 @@ def live(
     target = None if osc is None else _address(osc)
     model = load_as(SteerModel, bundle, session)
     if port is not None:
-        words = load_as(GenerateModel, "generate", session)
+        words = load_as(GenerateModel, "generate", session).ready()
         _serve(model, target, host, port=port, characters=characters, origins=origins, words=words)
     elif target is not None and script is not None:
         _follow(model, target, script)

@@ -4,7 +4,7 @@ Letters in shapes: M steps in all, R of an action, P codes of a step (B of the b
 before it, T steps of a recording.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, ClassVar, NamedTuple
@@ -98,6 +98,31 @@ class Recording(NamedTuple):
     """The last step of each piece, as a place among all M steps."""
 
 
+class Keys(Mapping[int, Floats]):
+    """The keys (R, K L) of each action, computed when the action is first used: few are used of many.
+
+    numbers: (M, L) float32 of all steps. ages: (M,). rows: the steps of each action. weights: (K,) of the steps before.
+    """
+
+    def __init__(self, numbers: Floats, ages: Ids, rows: Mapping[int, Ids], weights: Scores) -> None:
+        self._numbers = numbers
+        self._ages = ages
+        self._rows = rows
+        self._weights = weights
+        self._known: dict[int, Floats] = {}
+
+    def __getitem__(self, action: int) -> Floats:
+        if action not in self._known:
+            self._known[action] = _step_features(self._numbers, self._ages, self._rows[action], self._weights)
+        return self._known[action]
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+
 @dataclass(frozen=True, eq=False)
 class Memory:
     """M remembered steps, motion after motion."""
@@ -123,7 +148,7 @@ class Memory:
     rows: dict[int, Ids]
     """The remembered steps (R,) of each action."""
 
-    keys: dict[int, Floats]
+    keys: Mapping[int, Floats]
     """The numbers (R, K L) float32 of the K steps before each step of an action, scaled by the roots of their weights.
     """
 
@@ -149,9 +174,8 @@ class Memory:
 
         # The steps of each action, and what preceded them.
         numbers = _numbers(codes, moves, body)
-        features = _step_features(numbers, ages, settings.past_weights)
         rows = _rows_by_action(action_of_step)
-        keys = {action: features[of_action] for action, of_action in rows.items()}
+        keys = Keys(numbers, ages, rows, settings.past_weights)
 
         # How much each step matters: to its motion by its movement, to its action by what other actions do not have.
         starts, lasts = _motions(ages)
@@ -406,14 +430,13 @@ def _numbers(codes: Ids, moves: Floats, body: Floats) -> Floats:
     return numbers
 
 
-def _step_features(numbers: Floats, ages: Ids, weights: Scores) -> Floats:
-    """The keys (M, K L) float32 of steps: numbers of those before each, scaled by the roots of their weights (K,).
+def _step_features(numbers: Floats, ages: Ids, steps: Ids, weights: Scores) -> Floats:
+    """The keys (R, K L) float32 of steps (R,): numbers of those before each, scaled by the roots of their weights (K,).
 
     Before its first step a figure counts as having stood in it."""
-    steps = np.arange(len(ages))
     past = []
     for back, weight in enumerate(weights, start=1):
-        past.append(np.sqrt(weight) * numbers[steps - np.minimum(ages, back)])
+        past.append(np.sqrt(weight) * numbers[steps - np.minimum(ages[steps], back)])
     return np.concatenate(past, axis=1).astype(np.float32)
 
 

@@ -5,7 +5,9 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal, Unpack, cast, get_args
+from functools import cached_property
+from itertools import chain
+from typing import Annotated, Any, ClassVar, Literal, Self, Unpack, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,8 +120,7 @@ class CodesModel(GenerateModel):
         self.continuation = self.settings(ContinuationSettings)
         self.codec = self._read_codec()
         self.sizes |= {"T": self.codec.field.hop, "M": self.codec.moves}
-        memory = self._bound()
-        self.source = Source(graphs["step"], graphs["part"], self.codec.moves, self.sizes["A"], memory)
+        self._bind()
         self._familiar = self.settings(FamiliaritySettings)
         self._read_actions(Fields(manifest.source).list_of_fields("actions"))
 
@@ -137,8 +138,23 @@ class CodesModel(GenerateModel):
         half_life = self.continuation.half_life
         return Codec(self.graphs["decoder"], self.graphs["tokens"], field, moves, self.fps, half_life)
 
-    def _bound(self) -> Memory:
-        """The memory, after checking that graphs and tables fit each other."""
+    @cached_property
+    def source(self) -> Source:
+        """The graphs that draw codes, and the memory, made when codes are first drawn; BundleError where a table of the
+        memory was altered or does not fit."""
+        with self.named():
+            tables = self.tables
+            settings = self.settings(MemorySettings)
+            memory = Memory.of(tables["memory"], tables["moves"], tables["body"], self.sizes["A"], settings)
+        return Source(self.graphs["step"], self.graphs["part"], self.codec.moves, self.sizes["A"], memory)
+
+    def ready(self) -> Self:
+        """See :meth:`motet.models.base.BundleModel.ready`."""
+        _ = self.source
+        return super().ready()
+
+    def _bind(self) -> None:
+        """Check that graphs and tables fit each other."""
         self.bind("encoder", {"words": "*batch words", "lengths": "*batch"}, {"context": "batch A"})
         self.bind("step", self.loop.inputs, self.loop.outputs)
         self.bind("part", {"known": "batch H", "codes": "*batch P"}, {"log_probabilities": "batch P K"})
@@ -148,12 +164,11 @@ class CodesModel(GenerateModel):
         if self.codec.moves >= self.sizes["K"]:
             most = self.sizes["K"] - 1
             raise BundleError(f"manifest, config.codec.moves: must be at most {most}, to fit the graph part")
-        steps = self.table("memory", "R S", "int16")
-        moves = self.table("moves", "M 3", "float32")
-        body = self.table("body", "Q N", "float32")
+        self.bind_table("memory", "R S", "int16")
+        self.bind_table("moves", "M 3", "float32")
+        self.bind_table("body", "Q N", "float32")
         if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
             raise BundleError("manifest, tables.body: does not fit the graph step")
-        return Memory.of(steps, moves, body, self.sizes["A"], self.settings(MemorySettings))
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """See :meth:`motet.models.language.LanguageModel.contexts`; one by one, since padding changes the rounding."""
@@ -161,20 +176,23 @@ class CodesModel(GenerateModel):
         return np.concatenate([np.empty((0, self.sizes["A"]), dtype=np.float32), *alone])
 
     def _read_actions(self, entries: Sequence[Fields]) -> None:
-        """The known actions: a sentence of each, and the weights of words, more of one that describes few actions."""
+        """The known actions: a sentence and the words of each, and the weights of words, more of one that describes few
+        actions."""
         if len(entries) != self.sizes["A"]:
             raise BundleError(f"manifest, actions: {len(entries)} entries, expected {self.sizes['A']}")
         self._sentences = [entry.text("sentence") for entry in entries]
-        self._stems: list[frozenset[str]] = []
-        self._done: list[frozenset[str]] = []
-        actions_with: Counter[str] = Counter()
-        for entry in entries:
-            words = entry.texts("words")
-            actions_with.update(set(words))
-            self._stems.append(frozenset(map(stem, words)))
-            self._done.append(frozenset(stem(word) for word in words if DONE.search(word)))
+        self._words = [entry.texts("words") for entry in entries]
+        actions_with = Counter(chain.from_iterable(self._words))
         self._rare = {word: math.log((1 + len(entries)) / count) for word, count in actions_with.items()}
         self._verbs = verbs_of(actions_with)
+
+    def _stems(self, action: int) -> frozenset[str]:
+        """The stems of the words that describe an action."""
+        return frozenset(map(stem, self._words[action]))
+
+    def _done(self, action: int) -> frozenset[str]:
+        """The stems of those of its words that are what is done."""
+        return frozenset(stem(word) for word in self._words[action] if DONE.search(word))
 
     def parts(self, sentence: str) -> list[str]:
         """The things that a text requests one after another: its sentences, and the parts of a sentence
@@ -226,7 +244,7 @@ class CodesModel(GenerateModel):
         common word the word nearest to it counts, too. action: by default the likeliest."""
         if action is None:
             action = int(self._context(sentence).argmax())
-        have = self._stems[action]
+        have = self._stems(action)
         return [word for word, forms in self._content(sentence).items() if have.isdisjoint(forms)]
 
     def _context(self, sentence: str) -> Floats:
@@ -294,7 +312,7 @@ class CodesModel(GenerateModel):
             first, second = odd
             warn(f"{sentence!r} combines {first!r} and {second!r}, and only one can be shown", TextWarning)
         likeliest = int(context.argmax())
-        nouns = self._verbs & self._stems[likeliest] - self._done[likeliest]
+        nouns = self._verbs & self._stems(likeliest) - self._done(likeliest)
         for verb in OWN.findall(self.vocabulary.rules.normalise(sentence)):
             if stem(verb) in nouns:
                 shown = self._sentences[likeliest]
@@ -355,7 +373,8 @@ class CodesModel(GenerateModel):
             for text, context in zip(texts, contexts, strict=True):
                 self.check_whole(text)
                 words = list(self._content(text).values())
-                for action, stems in enumerate(self._stems):
+                for action in range(len(self._words)):
+                    stems = self._stems(action)
                     if any(stems.isdisjoint(forms) for forms in words):
                         context[action] = NEVER
         return contexts, noise, chosen

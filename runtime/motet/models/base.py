@@ -4,6 +4,7 @@ import hashlib
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
@@ -11,8 +12,8 @@ from typing import Any, ClassVar, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.bundle import Bundle
-from motet.bundle.graph import Arrays, Graph, SessionOptions, Sizes, TensorSpec, bind, bind_tensor
+from motet.bundle.bundle import Bundle, Tables, named
+from motet.bundle.graph import Arrays, Graph, LateGraph, SessionOptions, Sizes, TensorSpec, bind, bind_tensor
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import Loop
 from motet.errors import BundleError
@@ -89,26 +90,47 @@ class BundleModel(ABC):
 
     def table(self, name: str, shape: str, dtype: str) -> NDArray[Any]:
         """A table by name, its shape checked like in :meth:`bind`; BundleError where it is missing or does not fit."""
+        self.bind_table(name, shape, dtype)
+        return self.tables[name]
+
+    def bind_table(self, name: str, shape: str, dtype: str) -> None:
+        """As :meth:`table`, but the table is not read: it is checked by what the bundle declares."""
         if name not in self.tables:
             raise BundleError(f"manifest, tables: there is no table {name!r}")
-        array = self.tables[name]
+        if isinstance(self.tables, Tables):
+            declared = self.tables.declared(name)
+        else:
+            array = self.tables[name]
+            declared = TensorSpec(name, array.shape, str(array.dtype))
         try:
-            bind_tensor(TensorSpec(name, array.shape, str(array.dtype)), shape, dtype, self.sizes)
+            bind_tensor(declared, shape, dtype, self.sizes)
         except BundleError as error:
             raise BundleError(f"manifest, tables: {error}") from error
-        return array
 
     @classmethod
     def load(cls, bundle: Bundle, options: SessionOptions | None = None) -> Self:
-        """The model of an opened bundle."""
+        """The model of an opened bundle: each graph and table is read and checked when it is first used."""
         options = options or SessionOptions()
-        graphs = {role: bundle.graph(role, options) for role in bundle.manifest.graphs}
+        graphs = {role: bundle.late_graph(role, options) for role in bundle.manifest.graphs}
         with bundle.named():
-            tables = {name: bundle.table(name) for name in bundle.manifest.tables}
-            model = cls(bundle.manifest, graphs, tables)
+            model = cls(bundle.manifest, graphs, bundle.late_tables())
         model._source = (bundle.path, options)
-        log.info("loaded %s for %s on %s", bundle.path, model.VERB, ", ".join(model.providers))
+        log.info("loaded %s for %s", bundle.path, model.VERB)
         return model
+
+    def ready(self) -> Self:
+        """The model, once all that its first use would read is read: so that a server does not start with a damaged
+        bundle, and its first answer does not wait. BundleError at the first fault."""
+        for graph in self.graphs.values():
+            if isinstance(graph, LateGraph):
+                graph.ready()
+        for name in self.tables:
+            _ = self.tables[name]
+        return self
+
+    def named(self) -> AbstractContextManager[None]:
+        """Name the bundle, if the model is from one, in every error raised within."""
+        return nullcontext() if self._source is None else named(self._source[0])
 
     def __reduce__(self) -> tuple[Any, ...]:
         # sessions of ONNX Runtime do not pickle: another process loads the bundle again

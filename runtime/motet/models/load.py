@@ -63,7 +63,8 @@ def load(name_or_path: str | Path, options: SessionOptions | None = None) -> Bun
     """The model of a bundle: a name (``motet bundle list``), or the path of a folder or zip.
 
     options: threads and execution providers; by default one thread of the CPU. BundleError if there is no such bundle,
-    or it is damaged.
+    its manifest is damaged, or does not fit the model. Its graphs and tables are read when they are first used, or by
+    the model's ``ready()``: each is checked first, with a BundleError if it was altered or does not fit.
     """
     bundle = Bundle.open(name_or_path)
     with bundle.named():
@@ -120,7 +121,7 @@ def verify(bundle: Bundle, options: SessionOptions | None = None) -> Verified:
     files = bundle.check_files()
     golden = bundle.manifest.golden
     with bundle.named():
-        model = kind_of(bundle.manifest).load(bundle, options)
+        model = kind_of(bundle.manifest).load(bundle, options).ready()
         if golden is None:
             raise BundleError("it has no golden vectors")
         errors = replay(model, bundle.read(golden.file), golden)

@@ -99,7 +99,7 @@ def _models(
     names = {verb: verb for verb in kinds} | {Bundle.open(name).manifest.verb: name for name in bundles}
     if others := sorted(names.keys() - kinds.keys()):
         raise BundleError(f"bundle {names[others[0]]} is for {others[0]!r}; a server takes {', '.join(kinds)}")
-    return {verb: load_as(kind, names[verb], session) for verb, kind in kinds.items()}
+    return {verb: load_as(kind, names[verb], session).ready() for verb, kind in kinds.items()}
 
 
 def _mmcp(model: CodesModel, fill: FillModel, steer: SteerModel) -> list[Mount]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -72,12 +73,22 @@ class Passage:
     measured: Mapping[str, float] = field(default_factory=dict)
 
 
+ENDINGS = (
+    (re.compile(r"ies$"), "y"),
+    (re.compile(r"(ing|ed|es|s|e)$"), ""),
+    (re.compile(r"y$"), "i"),
+    (re.compile(r"([^aeiou])\1$"), r"\1"),
+)
+"""Endings that stems lack, in the order in which they are dropped, and what takes their place."""
+
+
+@lru_cache(1 << 14)
 def stem(word: str) -> str:
     """The part that the forms of a lower-case word share: "danc" of dance, dances and dancing."""
     if len(word) <= 3:
         return word
-    for ending, rest in ((r"ies$", "y"), (r"(ing|ed|es|s|e)$", ""), (r"y$", "i"), (r"([^aeiou])\1$", r"\1")):
-        word = re.sub(ending, rest, word)
+    for ending, rest in ENDINGS:
+        word = ending.sub(rest, word)
     return word
 
 
