@@ -1,5 +1,6 @@
 """Small graphs of a model that writes motions as codes: numpy functions of random matrices."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -78,5 +79,5 @@ def memory_tables(motions: list[tuple[int, Array]]) -> tuple[Array, Array, Array
 
 def source(sharpness: float = 1.0, ending: float = 0.0) -> Source:
     """What writers draw from."""
-    memory = Memory.of(*memory_tables(remembered()))
-    return Source(step(), part(sharpness=sharpness, ending=ending), END, NULL_ACTION, memory)
+    remember = partial(Memory.of, *memory_tables(remembered()))
+    return Source(step(), part(sharpness=sharpness, ending=ending), END, NULL_ACTION, remember)

@@ -1,6 +1,7 @@
 """Acts of long recordings: what is shown of them where no length is asked for."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ SITS = np.concatenate([IDLE, ROUND, IDLE, ROUND, IDLE, ROUND, IDLE, END_STEP])
 
 
 def drawn_from(motions: list[tuple[int, Array]], exactly: int = 0, seeds: int = 6) -> list[list[list[int]]]:
-    given = replace(source(), memory=Memory.of(*memory_tables(motions)))
+    given = replace(source(), remember=partial(Memory.of, *memory_tables(motions)))
     writer = Writer(given, [np.random.default_rng(seed) for seed in range(seeds)], REMEMBERED)
     found = draw_codes(writer, np.full(seeds, motions[0][0]), exactly or 300, exactly > 0)
     return [codes.tolist() for codes in found]
@@ -49,7 +50,7 @@ def test_pieces_of_a_recording_are_one() -> None:
     pieces = np.concatenate([steps[:70], steps[40:]])
     shown = []
     for table in (steps, pieces):
-        given = replace(source(), memory=Memory.of(table, *tables))
+        given = replace(source(), remember=partial(Memory.of, table, *tables))
         found = draw_codes(Writer(given, [np.random.default_rng(0)], REMEMBERED), np.array([1]), 300)
         shown.append(found[0].tolist())
     assert shown[0] == shown[1]

@@ -9,8 +9,9 @@ model does with words (Khandelwal et al. 2020): the distribution of the next ste
 steps of remembered places whose past resembles the present.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -67,7 +68,13 @@ class Source:
     null_action: int
     """The action that stands for no action, for guidance."""
 
-    memory: Memory
+    remember: Callable[[], Memory]
+    """Makes the memory."""
+
+    @cached_property
+    def memory(self) -> Memory:
+        """The memory, made when it is first used; BundleError where a table of it was altered or does not fit."""
+        return self.remember()
 
     @property
     def parts(self) -> int:

@@ -5,7 +5,6 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal, Self, Unpack, cast, get_args
 
@@ -121,6 +120,7 @@ class CodesModel(GenerateModel):
         self.codec = self._read_codec()
         self.sizes |= {"T": self.codec.field.hop, "M": self.codec.moves}
         self._bind()
+        self.source = Source(graphs["step"], graphs["part"], self.codec.moves, self.sizes["A"], self._remember)
         self._familiar = self.settings(FamiliaritySettings)
         self._read_actions(Fields(manifest.source).list_of_fields("actions"))
 
@@ -138,19 +138,16 @@ class CodesModel(GenerateModel):
         half_life = self.continuation.half_life
         return Codec(self.graphs["decoder"], self.graphs["tokens"], field, moves, self.fps, half_life)
 
-    @cached_property
-    def source(self) -> Source:
-        """The graphs that draw codes, and the memory, made when codes are first drawn; BundleError where a table of the
-        memory was altered or does not fit."""
+    def _remember(self) -> Memory:
+        """The memory of the tables; BundleError where they were altered, or hold what cannot be."""
         with self.named():
             tables = self.tables
             settings = self.settings(MemorySettings)
-            memory = Memory.of(tables["memory"], tables["moves"], tables["body"], self.sizes["A"], settings)
-        return Source(self.graphs["step"], self.graphs["part"], self.codec.moves, self.sizes["A"], memory)
+            return Memory.of(tables["memory"], tables["moves"], tables["body"], self.sizes["A"], settings)
 
     def ready(self) -> Self:
         """See :meth:`motet.models.base.BundleModel.ready`."""
-        _ = self.source
+        _ = self.source.memory
         return super().ready()
 
     def _bind(self) -> None:
