@@ -9,7 +9,7 @@ from motet.figures.feet.contacts import has_feet, lay_root_path
 from motet.formats import read_motion
 from motet.formats.amc import read
 from motet.motion.kinematics import local_translations, positions
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, rest_motion
 from motet.motion.skeleton import Joint, Skeleton
 from motet.representation.root_block import ROOT_BLOCK, from_root_block, plant_feet, to_root_block
 
@@ -256,3 +256,11 @@ def test_what_cannot_be_planted(clips):
     alone = Motion(np.zeros((3, 6)), ROOT_BLOCK, motion.units[:6], 10, lonely)
     with pytest.raises(MotionError, match="name the joints of the feet"):
         plant_feet(alone)
+
+
+def test_a_skeleton_without_height_is_refused() -> None:
+    names = ("hips", "leftFoot", "rightFoot")
+    joints = tuple(Joint(name, min(0, place - 1), (0, 0, 0), "xyz") for place, name in enumerate(names))
+    motion = rest_motion(Skeleton(joints))
+    with pytest.raises(MotionError, match="no height"):
+        lay_root_path(motion, (("leftFoot",), ("rightFoot",)))

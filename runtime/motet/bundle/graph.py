@@ -320,7 +320,7 @@ def _check_contract(kind: str, nodes: Any, declared: tuple[TensorSpec, ...]) -> 
     """BundleError where ONNX Runtime's tensors of a graph are not those that its contract declares."""
     actual = {node.name: (node.type, _sizes(node.shape)) for node in nodes}
     wanted = {tensor.name: (DTYPES[tensor.dtype], _sizes(tensor.shape)) for tensor in declared}
-    for name in actual.keys() | wanted.keys():
+    for name in sorted(actual.keys() | wanted.keys()):
         if actual.get(name) != wanted.get(name):
             difference = f"{actual.get(name, 'absent')}, declared {wanted.get(name, 'nowhere')}"
             raise BundleError(f"the graph does not match its contract: {kind} {name!r} is {difference}")

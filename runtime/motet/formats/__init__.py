@@ -24,7 +24,7 @@ from motet.figures.humanoid import JointMap, from_humanoid, grounded, on_humanoi
 from motet.figures.root_motion import travel_on_root
 from motet.files import File, check_place, place_of
 from motet.formats.text import Clip, Contents, Figure, split_clip
-from motet.motion.motion import Motion, motions_of
+from motet.motion.motion import Motion, motions_of, rest_motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, metres
 
@@ -279,7 +279,7 @@ def read_character(file: File) -> Character:
 
 def _character(like: File | Character | Motion | Skeleton) -> Character:
     if isinstance(like, Skeleton):
-        like = Motion(np.zeros((1, 0)), (), (), 1.0, like)
+        like = rest_motion(like)
     if isinstance(like, Motion):
         return Character(like)
     return like if isinstance(like, Character) else read_character(like)

@@ -32,7 +32,7 @@ from motet.formats.text import (
 )
 from motet.formats.text import Figure as FigureChoice
 from motet.motion.kinematics import motion_of
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, rest_motion
 from motet.motion.rotations import Array, inverse, product, rotated
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
@@ -248,11 +248,6 @@ def skeleton_at(names: Sequence[str], parents: Sequence[int], places: Array) -> 
     return Skeleton(joints, metres_per_unit=1.0)
 
 
-def at_rest(skeleton: Skeleton) -> Motion:
-    """One frame with every angle 0."""
-    return Motion(np.zeros((1, 0)), (), (), 30.0, skeleton)
-
-
 def _moving(skeleton: Skeleton, turned: Array, places: Array) -> dict[int, Array]:
     """Translations (T, 3) in their parents' frames: of the root, and of joints that leave their offset."""
     moving = {0: places[:, 0]}
@@ -334,7 +329,7 @@ def _humans(gltf: Gltf, groups: list[NodeSet]) -> list[NodeSet]:
         try:
             figure = figure_of(gltf, joints)
             skeleton = skeleton_at(figure.names, figure.parents, places[0, list(figure.nodes)])
-            map_of(at_rest(skeleton))
+            map_of(rest_motion(skeleton))
         except (FormatError, MotionError):
             continue
         humans.append(joints)

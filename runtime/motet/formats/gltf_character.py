@@ -18,10 +18,10 @@ from motet.figures.humanoid import BONES, REQUIRED, JointMap, check_map
 from motet.files import File, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
-from motet.formats.gltf import at_rest, figure_of, figures, likeliest, moved, skeleton_at
+from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
 from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, Json, broken, parse, read_beside
 from motet.motion.kinematics import local_rotations, local_translations
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, rest_motion
 from motet.motion.rotations import Array, product, quat_to_rotmat, rotated, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
@@ -130,7 +130,7 @@ def read_character(file: File) -> Character:
         if not np.abs(np.linalg.det(linear[joints])).min() > 0:
             raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
         nodes = Nodes(gltf, figure.nodes, skeleton, linear, places)
-        return Character(at_rest(skeleton), _joint_map(nodes), nodes, _skin(nodes))
+        return Character(rest_motion(skeleton), _joint_map(nodes), nodes, _skin(nodes))
 
 
 def _joint_map(nodes: Nodes) -> JointMap | None:

@@ -249,6 +249,11 @@ def _rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter:
     return columns_of
 
 
+def rest_motion(skeleton: Skeleton) -> Motion:
+    """One frame, of 1/30 s, of a skeleton with every angle 0."""
+    return Motion(np.zeros((1, 0)), (), (), 30.0, skeleton)
+
+
 def is_whole(ratio: float) -> bool:
     """Whether a ratio of frame rates is a whole number but for rounding, so that frames can be picked."""
     return abs(ratio - round(ratio)) < 1e-9 and ratio > 0.5

@@ -9,8 +9,6 @@ from itertools import islice
 from pathlib import PurePath
 from typing import Any, ParamSpec, TypeVar, cast
 
-import numpy as np
-
 from motet.draw.page import Captions
 from motet.errors import TextWarning, TravelWarning, collected
 from motet.figures.feet.treadmill import is_in_place
@@ -20,7 +18,7 @@ from motet.generate.base import PLAYED, Generated
 from motet.generate.model import CodesModel, Story
 from motet.models.describe import DescribeModel, Description
 from motet.motion.looping import looped
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, rest_motion
 from motet.motion.skeleton import METRES
 from motet.predict.model import PredictModel
 from motet.serve.batches import Batcher
@@ -259,7 +257,7 @@ def rig_of(data: RequestData, form: str, limits: Limits) -> Character | None:
         raise RequestError("a .vrm is an avatar: give the file of one as 'onto', or ask for .vrma")
     if onto is not None and f".{form}" not in ONTO:
         raise RequestError(f"'onto' gives the character itself: ask for {' or '.join(ONTO)}, not .{form}")
-    return Character(Motion(np.zeros((1, 0)), (), (), 1.0, rig(like))) if isinstance(like, str) else None
+    return Character(rest_motion(rig(like))) if isinstance(like, str) else None
 
 
 def order_of(

@@ -177,6 +177,8 @@ def lay_root_path(
         raise MotionError(f"the smoothing time of feet must be 0 or more seconds, not {tremble}")
     skeleton = skeleton_of(motion)
     joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
+    if skeleton.height <= 0:
+        raise MotionError("the skeleton has no height: all its joints are at one level")
     metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
     places = positions(motion)
     points_from_root = (places[:, joints] - places[:, :1]) * metres

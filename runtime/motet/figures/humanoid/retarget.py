@@ -52,7 +52,7 @@ from motet.motion.kinematics import (
     side_by_side,
     skeleton_of,
 )
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, rest_motion
 from motet.motion.rotations import (
     Array,
     angle_of,
@@ -97,7 +97,7 @@ class Figure:
     def of(like: Motion | Skeleton, joint_map: JointMap | None = None) -> "Figure":
         """The figure of a skeleton, or of a motion where the rest pose is not a standing body, whose frames then show
         how its joints stand; MotionError, with the reason, where it is not human."""
-        example = like if isinstance(like, Motion) else Motion(np.zeros((1, 0)), (), (), 1.0, like)
+        example = like if isinstance(like, Motion) else rest_motion(like)
         transforms = global_transforms(example)
         fitted = fit(skeleton_of(example), joint_map or map_of(example), *transforms)
         return Figure(fitted, example[:1], upright(fitted, transforms[1])[0])
