@@ -95,7 +95,7 @@ CEILINGS = {
     "motet.keyed": 9_300,
     "motet.live": 5_700,
     "motet.models": 10_200,
-    "motet.motion": 16_400,
+    "motet.motion": 16_500,
     "motet.papers": 7_500,
     "motet.predict": 5_400,
     "motet.representation": 9_500,
