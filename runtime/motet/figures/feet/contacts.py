@@ -177,9 +177,7 @@ def lay_root_path(
         raise MotionError(f"the smoothing time of feet must be 0 or more seconds, not {tremble}")
     skeleton = skeleton_of(motion)
     joints = feet_of(skeleton) if feet is None else [skeleton.index(name) for name in (*feet[0], *feet[1])]
-    if skeleton.height <= 0:
-        raise MotionError("the skeleton has no height: all its joints are at one level")
-    metres = skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
+    metres = _metres_per_unit(skeleton)
     places = positions(motion)
     points_from_root = (places[:, joints] - places[:, :1]) * metres
 
@@ -190,6 +188,13 @@ def lay_root_path(
     plane = smoothed(points_from_root[..., [0, 2]], tremble, motion.fps)
     velocity = velocity_by_feet(plane, points_from_root[..., 1] + height[:, None], motion.fps)
     return led_along(motion, velocity, height, metres)
+
+
+def _metres_per_unit(skeleton: Skeleton) -> float:
+    """Of a skeleton that does not say it those that make it an adult; MotionError where it has no height."""
+    if skeleton.height <= 0:
+        raise MotionError("the skeleton has no height: all its joints are at one place")
+    return skeleton.metres_per_unit or ADULT_HEIGHT / skeleton.height
 
 
 def _height_with_flight(standing: Array, fps: float) -> Array:
