@@ -71,6 +71,52 @@ def test_a_path_is_followed_to_its_end(model: SteerModel) -> None:
     assert np.hypot(*(here - path[-1])) < 0.08
 
 
+ZIGZAG = np.array([(0, 0), (0, 2), (0.5, 0), (1, 2), (1.5, 0), (2, 2)], dtype=np.float64)
+
+
+@pytest.mark.parametrize(("gait", "speed", "seconds"), [("walk", 1.28, 9.5), ("walk", 0.5, 23.0), ("run", 2.45, 6.0)])
+def test_corners_are_reached_in_turn_however_sharp(model: SteerModel, gait: str, speed: float, seconds: float) -> None:
+    session = model.start(gait, characters=2, places=[(0, 0, 0), (0, 0, 180)])
+    session.go_along(ZIGZAG, gait=gait, speed=speed)
+    ground = np.stack([session.tick().ground[:, :2] for _ in range(round(seconds * model.fps))])
+    assert session.arrived.all()
+    # one corner after the other
+    for figure in range(2):
+        tick = 0
+        for corner in ZIGZAG:
+            near = np.linalg.norm(ground[tick:, figure] - corner, axis=1) < 0.3 * max(speed, 1)
+            assert near.any()
+            tick += int(near.argmax())
+
+
+def test_figures_on_their_way_do_not_slow_down_for_a_new_way_ahead(model: SteerModel) -> None:
+    session = model.start()
+    session.control(speed=1.28, direction=0)
+    for _ in range(60):
+        session.tick()
+    x, z = session.tick().ground[0, :2]
+    session.go_to((x, z + 4))
+    places = np.stack([session.tick().ground[0, :2] for _ in range(30)])
+    assert np.linalg.norm(np.diff(places[::6], axis=0), axis=1).min() * model.fps / 6 > 1.1
+    session.go_to(None)
+    for _ in range(60):
+        pose = session.tick()
+    assert session.arrived.all()
+    assert 1.0 < pose.ground[0, 1] - z < 2.6
+
+
+@pytest.mark.parametrize(
+    "points", [[(0.0, 1.0)], [(0.5, 0.5)] * 20, [(0.0, 0.0)], np.linspace((0, 0), (0, 2), 10_000), [(0, 0), (0, 2)] * 3]
+)
+def test_odd_paths_are_walked_to_their_ends(model: SteerModel, points: Any) -> None:
+    session = model.start(characters=2)
+    session.go_along(points)
+    for _ in range(400):
+        pose = session.tick()
+    assert session.arrived.all()
+    assert np.hypot(*(pose.ground[:, :2] - points[-1]).T).max() < 0.08
+
+
 def test_figures_that_meet_go_around_each_other(model: SteerModel) -> None:
     nearest = {}
     for room in (None, 0.8):
@@ -170,7 +216,18 @@ def test_ways_that_make_no_sense_are_refused(model: SteerModel, told: dict[str, 
 
 
 @pytest.mark.parametrize(
-    "points", [[], [(0, 1, 2)], np.zeros((3, 4, 2)), [(0, np.inf)], [[0, 1], [2]], (0, 1), "there"]
+    "points",
+    [
+        [],
+        [(0, 1)] * 10_001,
+        [(0, 1), (np.nan, 2)],
+        [(0, 1, 2)],
+        np.zeros((3, 4, 2)),
+        [(0, np.inf)],
+        [[0, 1], [2]],
+        (0, 1),
+        "there",
+    ],
 )
 def test_paths_that_make_no_sense_are_refused(model: SteerModel, points: Any) -> None:
     with pytest.raises(ControlError, match="path"):

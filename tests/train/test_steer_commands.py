@@ -10,8 +10,9 @@ from steer_puppets import FPS, resting
 from motet.figures.humanoid.bones import BONES
 from motet.steering.acts import Act, ActSettings
 from motet.steering.pose import Pose
-from motet_train.evaluate.steer import following
+from motet_train.evaluate.steer import following, paths
 from motet_train.evaluate.steer.commands import act_figures, begins, from_path, going_figures
+from motet_train.evaluate.steer.paths import chase_figures, path_figures, slow_point_figures
 
 ARM = BONES.index("leftUpperArm")
 
@@ -41,7 +42,11 @@ class Told:
     short: float = 0.0
     fps: float = FPS
 
-    def start(self, gait: str | None = None, characters: int = 1) -> "Session":
+    @property
+    def usual(self) -> dict[str, float]:
+        return {"walk": 2.0}
+
+    def start(self, gait: str | None = None, characters: int = 1, places: Any = None) -> "Session":
         return Session(self, np.zeros((characters, 3)))
 
 
@@ -59,11 +64,11 @@ class Session:
     def act(self, acts: list[Act]) -> None:
         self.acts = acts
 
-    def go_to(self, points: Any) -> None:
+    def go_to(self, points: Any, speed: float | None = None) -> None:
         self.path = [points]
 
-    def go_along(self, points: Any) -> None:
-        self.path = [point[None] for point in points]
+    def go_along(self, points: Any, gait: str | None = None) -> None:
+        self.path = list(np.atleast_3d(points.T).T.swapaxes(0, 1))
 
     @property
     def acting(self) -> Any:
@@ -123,6 +128,28 @@ def test_figures_that_stand_before_their_points_are_off() -> None:
     assert [found["off_cm"], found["off_worst_cm"], found["path_end_cm"]] == pytest.approx([3, 3, 3], abs=1e-3)
     assert found["path_p95_cm"] == pytest.approx(0, abs=1e-6)
     assert going_figures(Told(pace=0.25), "walk")["never"] == 32  # 14 s are too short for the farthest
+
+
+def test_ends_of_paths_are_reached_late_or_never(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paths, "UNTIL", 12.0)
+    usual = path_figures(Told(), "walk")
+    assert usual["zigzag_never"] == usual["circles_never"] == 0
+    # corners end ticks early
+    assert 0 <= usual["zigzag_late_s"] == usual["zigzag_late_worst_s"] < 7 / FPS
+    assert usual["zigzag_p95_cm"] == pytest.approx(0, abs=1e-6)
+    slow = path_figures(Told(pace=1.0), "walk")
+    assert slow["zigzag_late_s"] == pytest.approx(paths.length(np.diff(paths.ZIGZAG, axis=0)).sum() / 2, abs=7 / FPS)
+    still = path_figures(Told(pace=0.0), "walk")
+    assert (still["polylines_never"], still["polylines_late_s"]) == (40, np.inf)
+    assert still["circles_cm"] == 0
+
+
+def test_points_are_reached_on_the_shortest_way_or_not_and_chased() -> None:
+    straight = slow_point_figures(Told())
+    assert (straight["never"], straight["long_way"]) == (0, 0)
+    assert straight["way_worst"] == pytest.approx(1, abs=0.3)  # but for the first tick
+    assert chase_figures(Told())["behind_worst_m"] < 0.05
+    assert chase_figures(Told(pace=0.0))["behind_m"] == pytest.approx(2)
 
 
 def test_how_far_a_path_is_left() -> None:

@@ -20,7 +20,7 @@ from motet.settings import Range, Settings
 from motet.steering.avoidance import AvoidanceSettings, kept_apart
 from motet.steering.gaits import Command, Gaits
 from motet.steering.matching import Flags, Playback, Rows
-from motet.steering.settings import Metres, Radians, Seconds, Speed, SteeringSettings
+from motet.steering.settings import Metres, Radians, Seconds, Share, Speed, SteeringSettings
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,18 @@ class ArrivalSettings(Settings):
 
     FEATURE: ClassVar[str] = "arrival"
 
-    ahead: Metres = 0.3
-    """How far ahead on its path a figure aims."""
-    ahead_moving: Annotated[float, Range(0, 10, "s")] = 0.25
+    ahead: Metres = 0.2
+    """How far ahead, and behind, bends of its path slow a figure down."""
+    ahead_moving: Annotated[float, Range(0, 10, "s")] = 0.1
     """What each m/s adds to that."""
-    brakes: Annotated[float, Range(0.1, 100, "m/s^2")] = 1.5
-    """Deceleration towards the end."""
+    turns_back: Share = 0.35
+    """Share of the speed where a path turns back; bends are between this and 1."""
+    brakes: Annotated[float, Range(0.1, 100, "m/s^2")] = 6.0
+    """Deceleration of the place where a figure would come to rest, towards the end."""
+    catches_up: Seconds = 0.3
+    """Time constant by which a figure returns to its path."""
+    waits: Metres = 0.4
+    """How far from its path a figure does not go on along it."""
     near: Metres = 0.08
     """Distance from the end within which a figure has arrived."""
     sidestep: Metres = 0.7
@@ -162,52 +168,62 @@ class Going:
             values[name][figures] = value
         return replace(self, paths=Paths.of(all_paths), **values)
 
-    def after(self, playback: Playback, settings: ArrivalSettings, steering: SteeringSettings) -> tuple["Going", Array]:
-        """A tick later, and the velocities (B, 2) at which figures on paths are to go, 0 for standing."""
-        root = playback.root[:, :2]
-        speed_now = np.hypot(*playback.spring[:, :2].T)
-        stands = speed_now < settings.stands
-        # pure pursuit: how far they have come along their paths, and the point ahead that they aim at
-        lengths = self.paths.lengths
-        gone = self._progress(root)
-        aim = gone + settings.ahead + settings.ahead_moving * speed_now
-        on_last_stretch = aim >= lengths
-        # stop at the end; arrived: standing there, facing as wanted
-        to_end = self.paths.ends - root
-        distance = np.hypot(*to_end.T)
-        passes_end = (_rolling_distance(playback, steering) * to_end).sum(axis=1) >= distance**2
-        stops, arrived = self._arrival(on_last_stretch, passes_end, distance, stands, playback.root[:, 2], settings)
-        # towards the aim, braking evenly
-        left = np.where(on_last_stretch, distance, np.maximum(lengths - gone, distance))
-        speed = np.where(stops, 0.0, np.minimum(self.speed, np.sqrt(2 * settings.brakes * left)))
-        going = replace(self, gone=np.minimum(gone, lengths), stops=self.goes & stops, arrived=self.goes & arrived)
-        return going, _unit(self.paths.at(aim) - root) * speed[:, None]
+    def after(
+        self, playback: Playback, settings: ArrivalSettings, steering: SteeringSettings, seconds: float
+    ) -> tuple["Going", Array]:
+        """A tick later, and the velocities (B, 2) at which figures on paths are to go, 0 for standing.
 
-    def _progress(self, root: Array) -> Array:
-        """How far (B,) figures at roots (B, 2) have come along their paths, metres."""
-        here = self.paths.at(self.gone)
-        way = _unit(self.paths.at(self.gone + 0.05) - here)
-        progress: Array = self.gone + ((root - here) * way).sum(axis=1).clip(0, 0.5)
-        return progress
-
-    def _arrival(
-        self,
-        on_last_stretch: Flags,
-        passes_end: Flags,
-        distance: Array,
-        stands: Flags,
-        facing: Array,
-        settings: ArrivalSettings,
-    ) -> tuple[Flags, Flags]:
-        """Whether the target of figures is standing, and whether they have arrived, both (B,).
-
-        passes_end: whether the springs roll on to the end. distance: to it. stands: whether they stand now.
+        The place where a figure would come to rest moves at once as its target does. That place is led along the path,
+        so nothing has to be foreseen: the figure itself follows it a third of a second later, and rounds corners.
         """
-        near = distance < settings.near
+        rests = playback.root[:, :2] + rolling_distance(playback, steering)
+        lengths = self.paths.lengths
+        # the point of the path where they are to come to rest goes on, slowly in bends and towards the end
+        left = np.maximum(lengths - self.gone, 0.0)
+        speed = np.minimum(self.speed * self._slowness(settings), np.sqrt(2 * settings.brakes * left))
+        here = self.paths.at(self.gone)
+        gone = np.minimum(self.gone + self._step(here, rests, speed * seconds, settings), lengths)
+        there = self.paths.at(gone)
+        # stop at the end; arrived: standing there, facing as wanted
+        at_end = (gone >= lengths) & (np.hypot(*(self.paths.ends - rests).T) < settings.near)
+        stops, arrived = self._arrival(at_end, playback, settings)
+        going = replace(self, gone=gone, stops=self.goes & stops, arrived=self.goes & arrived)
+        # the velocity at which they come to that point
+        velocity = (there - here) / seconds + (here - rests) / settings.catches_up
+        pace = np.hypot(*velocity.T)
+        most = np.where(stops, 0.0, self.speed)
+        return going, _unit(velocity) * np.minimum(most, pace)[:, None]
+
+    def _slowness(self, settings: ArrivalSettings) -> Array:
+        """The share (B,) of their speeds at which figures go through the bend around where they are on their paths: by
+        how much shorter the straight line through it is."""
+        around = settings.ahead + settings.ahead_moving * self.speed
+        start = np.maximum(self.gone - around, 0.0)
+        stop = np.minimum(self.gone + around, self.paths.lengths)
+        chord = np.hypot(*(self.paths.at(stop) - self.paths.at(start)).T)
+        straightness = np.where(stop - start > 1e-6, chord / np.maximum(stop - start, 1e-6), 1.0)
+        shares: Array = settings.turns_back + (1 - settings.turns_back) * straightness
+        return shares
+
+    def _step(self, here: Array, rests: Array, step: Array, settings: ArrivalSettings) -> Array:
+        """Metres (B,) that points of paths ``here`` (B, 2) go on: ``step``, or less while figures, which would come to
+        rest at ``rests``, are far from there; and as far as figures are ahead already."""
+        off = rests - here
+        waits = (1 - np.hypot(*off.T) / settings.waits).clip(0, 1)
+        way = _unit(self.paths.at(self.gone + 0.05) - here)
+        ahead = (off * way).sum(axis=1).clip(0, 0.1)
+        steps: Array = np.maximum(step * waits, ahead)
+        return steps
+
+    def _arrival(self, at_end: Flags, playback: Playback, settings: ArrivalSettings) -> tuple[Flags, Flags]:
+        """Whether the target of figures is standing, and whether they have arrived, both (B,). at_end: whether they
+        come to rest at the end."""
+        distance = np.hypot(*(self.paths.ends - playback.root[:, :2]).T)
+        stands = np.hypot(*playback.spring[:, :2].T) < settings.stands
         goes_again = stands & (distance > settings.glides_from)
-        stops = (self.stops & ~goes_again) | (on_last_stretch & (passes_end | near))
-        turned = np.isnan(self.facing) | (np.abs(wrapped(facing - self.facing)) < settings.faces)
-        return stops, stops & (self.arrived | (stands & near & turned))
+        stops = (self.stops & ~goes_again) | at_end
+        turned = np.isnan(self.facing) | (np.abs(wrapped(playback.root[:, 2] - self.facing)) < settings.faces)
+        return stops, stops & (self.arrived | (stands & (distance < settings.near) & turned))
 
     def faces(self, playback: Playback, velocity: Array, settings: ArrivalSettings) -> Array:
         """The facings (B,), in radians, of figures that go at velocities (B, 2): where they go; near the end as they
@@ -221,7 +237,7 @@ class Going:
         self, playback: Playback, settings: ArrivalSettings, steering: SteeringSettings, seconds: float
     ) -> Array:
         """The step (B, 2) by which figures that come to rest are moved to where they are to stand."""
-        missing = self.paths.ends - playback.root[:, :2] - _rolling_distance(playback, steering)
+        missing = self.paths.ends - playback.root[:, :2] - rolling_distance(playback, steering)
         distance = np.hypot(*missing.T)
         speed = np.hypot(*playback.spring[:, :2].T)
         most = (settings.glides + settings.glides_moving * speed) * seconds
@@ -253,7 +269,7 @@ class Ways(NamedTuple):
         """
         gait_before = command.gait
         # figures on paths
-        going, velocity = going.after(playback, self.arrival, self.gaits.settings)
+        going, velocity = going.after(playback, self.arrival, self.gaits.settings, seconds)
         if going.goes.any():
             step = going.settled(playback, self.arrival, self.gaits.settings, seconds)
             playback.root = playback.root + np.insert(step, 2, 0.0, axis=1)  # poses share the array
@@ -305,7 +321,7 @@ def _slowed(gaits: Gaits, gait: Rows, gait_now: Rows, speed: Array) -> Rows:
     return np.where(speed > 0, np.where(too_fast, slow_gait, gait), gait_now)
 
 
-def _rolling_distance(playback: Playback, steering: SteeringSettings) -> Array:
+def rolling_distance(playback: Playback, steering: SteeringSettings) -> Array:
     """How far (B, 2) figures still go whose target is standing: the integral of the spring."""
     damping = damping_of(steering.velocity)
     return (2 * playback.spring[:, :2] + playback.spring_rate[:, :2] / damping) / damping

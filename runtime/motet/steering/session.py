@@ -23,7 +23,7 @@ from motet.steering.gaits import Command
 from motet.steering.idle import IdleLayer, IdleSettings
 from motet.steering.look_layer import LookLayer, LookSettings
 from motet.steering.matching import Flags, Matched, Playback, Rows
-from motet.steering.paths import ArrivalSettings, Going, Ways
+from motet.steering.paths import ArrivalSettings, Going, Ways, rolling_distance
 from motet.steering.pose import Pose
 from motet.steering.reach_layer import ReachLayer, ReachSettings
 from motet.steering.scripts import Order, parse_orders
@@ -284,8 +284,7 @@ class SteerSession:
         """
         characters = self._chosen(who)
         if points is None:
-            standing = self._state.playback.root[characters, None, :2]
-            self._send(characters, standing, None, None, None)
+            self._send(characters, self._resting_places[characters, None], None, None, None)
             return
         ends = self._numbers("points need x and z", points, 2, count=len(characters))
         self._send(characters, ends[:, None], facing, gait, speed)
@@ -306,6 +305,12 @@ class SteerSession:
         """
         characters = self._chosen(who)
         self._send(characters, checked_path(points, len(characters)), facing, gait, speed)
+
+    @property
+    def _resting_places(self) -> Array:
+        """Where characters come to rest (characters, 2) that are to stand from now on."""
+        playback = self._state.playback
+        return playback.root[:, :2] + rolling_distance(playback, self.model.abilities.settings)
 
     def _send(
         self,
@@ -329,7 +334,7 @@ class SteerSession:
                 raise ControlError("speed must be above 0 m/s; points of None let characters stand")
         gaits = self._gaits(gait)[characters]
         usual = abilities.usual(gaits)
-        starts = state.playback.root[characters, None, :2]
+        starts = self._resting_places[characters, None]
         state.going = state.going.sent(
             characters,
             list(np.concatenate([starts, paths], axis=1)),

@@ -333,9 +333,12 @@ export const actSettings = {
 
 // motet.steering.paths.ArrivalSettings
 export const arrivalSettings = {
-  ahead: { default: 0.3, low: 0, high: 100, whole: false },
-  ahead_moving: { default: 0.25, low: 0, high: 10, whole: false },
-  brakes: { default: 1.5, low: 0.1, high: 100, whole: false },
+  ahead: { default: 0.2, low: 0, high: 100, whole: false },
+  ahead_moving: { default: 0.1, low: 0, high: 10, whole: false },
+  turns_back: { default: 0.35, low: 0, high: 1, whole: false },
+  brakes: { default: 6, low: 0.1, high: 100, whole: false },
+  catches_up: { default: 0.3, low: 0.01, high: 100, whole: false },
+  waits: { default: 0.4, low: 0, high: 100, whole: false },
   near: { default: 0.08, low: 0, high: 100, whole: false },
   sidestep: { default: 0.7, low: 0, high: 100, whole: false },
   glides_from: { default: 0.16, low: 0, high: 100, whole: false },

@@ -4,7 +4,7 @@ import { type Act, motionOf } from "../steering/acts.js";
 import { ControlModel } from "../steering/model.js";
 import type { Manifest } from "../bundle/bundle.js";
 import { HUMANOID, SIDES } from "../figures/humanoid/bones.js";
-import { type Going, lead } from "../steering/paths.js";
+import { type Going, lead, type Point, restingPlace } from "../steering/paths.js";
 import type { Tables } from "../steering/matching.js";
 import { worldOf } from "../motion/motion.js";
 import type { Pose as Ground } from "../motion/planar.js";
@@ -62,6 +62,11 @@ export class Figure {
   get velocity(): [x: number, z: number] {
     const [x, z] = this.steered.playback.spring;
     return [x, z];
+  }
+
+  /** Where it comes to rest if it is to stand from now on. */
+  get restingPlace(): Point {
+    return restingPlace(this.steered.playback, this.model.steerer.matcher.settings.velocity);
   }
 
   get goes(): boolean {

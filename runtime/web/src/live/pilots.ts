@@ -46,10 +46,10 @@ export function goTo(goal: readonly [number, number]): Pilot {
   let going: Going | null = null;
   return {
     goal,
-    ask(net, { root: [x, z] }) {
-      const away = Math.hypot(goal[0] - x, goal[1] - z);
+    ask(net, { restingPlace }) {
+      const away = Math.hypot(goal[0] - restingPlace[0], goal[1] - restingPlace[1]);
       const gait = away > FAR_AWAY ? fastest(net) : 0;
-      going ??= sent([[x, z], goal], { gait, speed: usual(net, gait), facing: null });
+      going ??= sent([restingPlace, goal], { gait, speed: usual(net, gait), facing: null });
       return going.arrived && away < THERE ? null : going;
     },
   };

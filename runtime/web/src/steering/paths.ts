@@ -33,35 +33,77 @@ export function sent(points: Point[], order: Pick<Going, "gait" | "speed" | "fac
   return { points, along, gone: 0, stops: false, arrived: false, ...order };
 }
 
-/** A tick later: the velocity at which the figure is to go, [0, 0] for standing. */
+/** A tick later: the velocity at which the figure is to go, [0, 0] for standing. The place where it would come to rest is led
+ *  along the path; the figure follows it. */
 export function onward(
   going: Going,
   playback: Playback,
   settings: Settings<typeof arrivalSettings>,
   halfLife: number,
+  seconds: number,
 ): [x: number, z: number] {
-  const { points, along } = going;
-  const root = at2(playback.root);
-  const velocity = at2(playback.spring);
+  const rests = restingPlace(playback, halfLife);
+  const whole = going.along.at(-1)!;
+  // the point of the path where it is to come to rest goes on, slowly in bends and towards the end
+  const left = Math.max(whole - going.gone, 0);
+  const speed = Math.min(going.speed * slowness(going, settings), Math.sqrt(2 * settings.brakes * left));
   const here = at(going, going.gone);
+  going.gone = Math.min(going.gone + step(going, here, rests, speed * seconds, settings), whole);
+  const there = at(going, going.gone);
+  // stop at the end; arrived: standing there, facing as wanted
+  const end = going.points.at(-1)!;
+  arrive(going, playback, going.gone >= whole && distance(end, rests) < settings.near, settings);
+  if (going.stops) return [0, 0];
+  // the velocity at which it comes to that point
+  const [onX, onZ] = minus(there, here);
+  const [offX, offZ] = minus(here, rests);
+  const velocity: Point = [
+    onX / seconds + offX / settings.catches_up,
+    onZ / seconds + offZ / settings.catches_up,
+  ];
+  const pace = Math.min(going.speed, Math.hypot(...velocity));
+  const [x, z] = unit(velocity);
+  return [x * pace, z * pace];
+}
+
+/** The share of its speed at which a figure goes through the bend around where it is on its path: by how much shorter the
+ *  straight line through it is. */
+function slowness(going: Going, settings: Settings<typeof arrivalSettings>): number {
+  const around = settings.ahead + settings.ahead_moving * going.speed;
+  const start = Math.max(going.gone - around, 0);
+  const stop = Math.min(going.gone + around, going.along.at(-1)!);
+  const chord = distance(at(going, start), at(going, stop));
+  const straightness = stop - start > 1e-6 ? chord / (stop - start) : 1;
+  return settings.turns_back + (1 - settings.turns_back) * straightness;
+}
+
+/** Metres that the point of the path `here` goes on: `metres`, or less while the figure, which would come to rest at `rests`,
+ *  is far from there; and as far as the figure is ahead already. */
+function step(
+  going: Going,
+  here: Point,
+  rests: Point,
+  metres: number,
+  settings: Settings<typeof arrivalSettings>,
+): number {
+  const off = minus(rests, here);
+  const waits = clamp(1 - Math.hypot(...off) / settings.waits, 0, 1);
   const way = unit(minus(at(going, going.gone + 0.05), here));
-  const gone = going.gone + clamp(dot(minus(root, here), way), 0, 0.5);
-  const pace = Math.hypot(...velocity);
-  const whole = along.at(-1)!;
-  const ahead = gone + settings.ahead + settings.ahead_moving * pace;
-  const off = minus(points.at(-1)!, root);
-  const last = ahead >= whole;
-  const far = Math.hypot(...off);
-  const left = last ? far : Math.max(whole - gone, far);
-  const arrives = last && (dot(rolling(playback, halfLife), off) >= far ** 2 || far < settings.near);
-  const stands = pace < settings.stands;
-  going.stops = (going.stops && !(stands && far > settings.glides_from)) || arrives;
-  const turned = going.facing === null || Math.abs(wrapped(playback.root[2] - going.facing)) < settings.faces;
+  return Math.max(metres * waits, clamp(dot(off, way), 0, 0.1));
+}
+
+/** Whether the figure's target is standing, and whether it has arrived. atEnd: whether it comes to rest at the end. */
+function arrive(
+  going: Going,
+  { root, spring }: Playback,
+  atEnd: boolean,
+  settings: Settings<typeof arrivalSettings>,
+): void {
+  const far = distance(going.points.at(-1)!, at2(root));
+  const stands = Math.hypot(...at2(spring)) < settings.stands;
+  going.stops = (going.stops && !(stands && far > settings.glides_from)) || atEnd;
+  const turned = going.facing === null || Math.abs(wrapped(root[2] - going.facing)) < settings.faces;
   going.arrived = going.stops && (going.arrived || (stands && far < settings.near && turned));
-  const speed = going.stops ? 0 : Math.min(going.speed, Math.sqrt(2 * settings.brakes * left));
-  going.gone = Math.min(gone, whole);
-  const [x, z] = unit(minus(at(going, ahead), root));
-  return [x * speed, z * speed];
 }
 
 /** Where a figure faces that goes at a velocity: where it goes; near the end as it does, and at the end as it is to. */
@@ -84,7 +126,7 @@ export function settle(
   seconds: number,
 ): void {
   const [x, z, facing] = playback.root;
-  const off = minus(minus(points.at(-1)!, [x, z]), rolling(playback, halfLife));
+  const off = minus(points.at(-1)!, restingPlace(playback, halfLife));
   const far = Math.hypot(...off);
   if (!stops || far >= settings.glides_from) return;
   const most =
@@ -105,10 +147,11 @@ function at({ points, along }: Going, gone: number): Point {
   return [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])];
 }
 
-/** How far a figure still goes that is told to stand: the integral of the spring. */
-function rolling({ spring, springRate }: Playback, halfLife: number): Point {
+/** Where a figure comes to rest that is to stand from now on: the springs' integral from where it is. */
+export function restingPlace({ root, spring, springRate }: Playback, halfLife: number): Point {
   const damping = dampingOf(halfLife);
-  return [0, 1].map((i) => (2 * spring[i]! + springRate[i]! / damping) / damping) as unknown as Point;
+  const rolls = (i: number) => (2 * spring[i]! + springRate[i]! / damping) / damping;
+  return [root[0] + rolls(0), root[1] + rolls(1)];
 }
 
 const at2 = ([x, z]: readonly number[]): Point => [x!, z!];
@@ -140,7 +183,7 @@ export function lead(model: SteeringModel, figures: Steered[], room: number): vo
 function follow({ abilities, steerer, arrival, fps }: SteeringModel, figure: Steered): void {
   const halfLife = steerer.matcher.settings.velocity;
   const { playback, command, going } = figure;
-  const velocity = onward(going!, playback, arrival, halfLife);
+  const velocity = onward(going!, playback, arrival, halfLife, 1 / fps);
   settle(going!, playback, arrival, halfLife, 1 / fps);
   const speed = Math.hypot(...velocity);
   const gait = speed > 0 ? slowed(abilities, going!.gait, speed) : command.gait;

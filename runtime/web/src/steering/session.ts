@@ -8,7 +8,7 @@ import { after, eventsOf, type FigureEvent } from "./events.js";
 import { newLock } from "./footLock.js";
 import { type Command, changed } from "./gaits.js";
 import { BONES, SIDES } from "../figures/humanoid/bones.js";
-import { lead, type Point, sent } from "./paths.js";
+import { lead, type Point, restingPlace, sent } from "./paths.js";
 import type { Target } from "./matching.js";
 import type { Motion } from "../motion/motion.js";
 import type { Pose } from "../representation/poses.js";
@@ -188,7 +188,7 @@ export class ControlSession {
     const figures = this.chosen(way.who);
     const ends =
       points === null
-        ? figures.map((at) => this.state.figures[at]!.playback.root.slice(0, 2))
+        ? figures.map((at) => this.restingPlace(at))
         : this.rows("points", points, ["x", "z"], figures.length);
     this.send(
       figures,
@@ -229,15 +229,20 @@ export class ControlSession {
         `${JSON.stringify(this.model.gaits[nowhere])} goes nowhere: give a gait such as ${JSON.stringify(this.model.gaits[0])}`,
       );
     figures.forEach((at, i) => {
-      const figure = this.state.figures[at]!;
-      const [x, z] = figure.playback.root;
       const order = {
         gait: gaits[i]!,
         speed: speeds?.[i] ?? abilities.speeds[gaits[i]!]![1],
         facing: facings ? wrapped(facings[i]! * RADIANS) : null,
       };
-      figure.going = sent([[x, z], ...(paths[i] as unknown as Point[])], order);
+      const path = [this.restingPlace(at), ...(paths[i] as unknown as Point[])];
+      this.state.figures[at]!.going = sent(path, order);
     });
+  }
+
+  /** Where a figure comes to rest that is to stand from now on. */
+  private restingPlace(figure: number): Point {
+    const { velocity } = this.model.steerer.matcher.settings;
+    return restingPlace(this.state.figures[figure]!.playback, velocity);
   }
 
   /** Of each figure whether it stands, within 8 cm and 8 degrees, where it was told to go last. */

@@ -42,6 +42,7 @@ from motet_train.evaluate.steer.following import (
     way_off,
     ways_errors,
 )
+from motet_train.evaluate.steer.paths import chase_figures, path_figures, slow_point_figures
 from motet_train.evaluate.steer.players import SEED, reversal_figures, stick_figures
 from motet_train.evaluate.tables import Report, gathered, read_goals, report_table
 
@@ -370,6 +371,9 @@ def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
         measures[f"act_{gait}"] = partial(act_figures, acts=acts, leap=limits.leap, gait=gait)
     for gait in MEASURED_SPEEDS:
         measures[f"going_{gait}"] = partial(going_figures, gait=gait)
+        measures[f"paths_{gait}"] = partial(path_figures, gait=gait)
+    measures["slow_points"] = slow_point_figures
+    measures["chase"] = chase_figures
     return measures
 
 
