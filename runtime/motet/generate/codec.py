@@ -186,11 +186,12 @@ class StreamingDecoder:
         """The frames of steps up to one, which nothing that follows changes any more."""
         if until <= self.count:
             return np.empty((0, self.codec.decoder.spec.output("frames").size(-1)))
-        # The steps, and those that the decoder looks back and ahead at; two rows, as a lone one is rounded differently.
+        # The steps, and those that the decoder looks back and ahead at; a lone one is rounded differently, so two of it.
         field = self.codec.field
         start = max(0, self.count - field.back)
         steps = np.array(self.codes[start : until + field.ahead])
-        decoded = self.codec.decoder({"codes": np.stack([steps, steps])})
+        rows = np.tile(steps, (2 if len(steps) == 1 else 1, 1, 1))
+        decoded = self.codec.decoder({"codes": rows})
         new = slice(self.count - start, until - start)
         self.count = until
         # The root, which the decoder gives as seen from the way, as rates.

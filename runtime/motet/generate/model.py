@@ -48,6 +48,9 @@ STANDING = "a person stands still"
 STANDING_SECONDS = 0.8
 """Duration of standing there."""
 
+TOGETHER = 64
+"""Steps of a story that are decoded at once."""
+
 NEVER = -1e9
 """Log-probability of an action that is not drawn."""
 
@@ -405,7 +408,7 @@ class CodesModel(GenerateModel):
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
-        requests, after, drawn = self._telling(sentences, **settings)
+        requests, after, drawn = self._telling(sentences, together=TOGETHER, **settings)
         pieces = list(drawn)
         frames = np.concatenate([piece.frames for piece in pieces])
         passages = self._passages(requests, pieces, frames)
@@ -499,10 +502,11 @@ class CodesModel(GenerateModel):
         stand: Stand | None = None,
         seed: Seed = 0,
         strict: bool = False,
+        together: int = 1,
         **settings: Unpack[ReadSettings],
     ) -> tuple[list[Request], Motion | None, Iterator[Piece]]:
         """A story about to be drawn: its requests with those of standing, the motion on the model's figure that it
-        continues, and its pieces as they are drawn."""
+        continues, and its pieces as they are drawn. together: steps that are decoded at once."""
         sentences = texts_of(sentences)
         numbers = settings.pop("numbers", True)
         whole = settings.pop("whole", False)
@@ -518,7 +522,7 @@ class CodesModel(GenerateModel):
         requests, noise, chosen = self._requests(timed, numbers, seed, strict, loop_settings)
 
         # They are drawn after the end of the motion before.
-        teller = Teller(self.source, self.codec, self.contract, noise, chosen, self.continuation.context)
+        teller = Teller(self.source, self.codec, self.contract, noise, chosen, self.continuation.context, together)
         if after is None:
             return requests, None, teller.pieces(requests, None)
         figure = self.contract.on_figure(self.at_own_rate(after))

@@ -148,6 +148,9 @@ class Teller:
     seconds: float
     """The length of a motion's end that the next request continues."""
 
+    together: int = 1
+    """Steps that are decoded at once: 1 gives each frame as soon as it is final, more take less time in all."""
+
     def pieces(self, requests: Sequence[Request], context: Context | None) -> Iterator[Piece]:
         """The pieces of all requests. context: the end of the motion that they continue."""
         runs = _runs(requests)
@@ -182,7 +185,7 @@ class Teller:
         return self._measured(number, request, context)
 
     def _flowing(self, run: Sequence[tuple[int, Request]], context: Context | None) -> Iterator[Piece]:
-        """Pieces of one step of codes each, of requests without numbers; then the remaining frames."""
+        """Pieces of the steps that are decoded at once, of requests without numbers; then the remaining frames."""
         writer = self._writer(context)
         decoder = StreamingDecoder(self.codec, context)
         hop = self.codec.field.hop
@@ -200,9 +203,9 @@ class Teller:
             exactly = request.seconds > 0
             longest = self.codec.steps(end) - steps_drawn if exactly else self.codec.steps(self.settings["max_seconds"])
             shown.limit = max(1, round(end * self.contract.fps)) if exactly else None
-            for _, step in drawn_steps(writer, actions, longest, exactly=exactly):
-                steps_drawn += 1
-                yield Piece(number, action, shown.next(decoder.push(step)), hop)
+            for codes in _grouped(drawn_steps(writer, actions, longest, exactly=exactly), self.together):
+                steps_drawn += len(codes)
+                yield Piece(number, action, shown.next(decoder.push(codes)), hop * len(codes))
             if not exactly:
                 end = steps_drawn * self.codec.seconds
         # What the decoder held back, as nothing follows; its steps have been counted in full.
@@ -278,6 +281,12 @@ class Teller:
         """Steps after which a motion is not continued, by the slowest progress towards its numbers."""
         seconds = sum(abs(quantities.amounts.get(kind, 0)) / slowest for kind, slowest in SLOWEST.items())
         return self.codec.steps(min(LONGEST, 10 + seconds))
+
+
+def _grouped(drawn: Iterator[tuple[Ids, Ids]], count: int) -> Iterator[Ids]:
+    """The codes (count, P) of so many steps that one row draws, and those (N, P) that are left in the end."""
+    while steps := [step for _, step in islice(drawn, count)]:
+        yield np.concatenate(steps)
 
 
 def _runs(requests: Sequence[Request]) -> list[list[tuple[int, Request]]]:
