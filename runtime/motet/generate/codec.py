@@ -44,10 +44,22 @@ def seen_from(pose: Array, other: Array) -> Array:
 
 def way_of(start: Array, moves: Array) -> Array:
     """The poses (..., N + 1, 3) on the way from ``start`` (..., 3) by moves (..., N, 3), both ends included."""
-    poses = [start]
-    for place in range(moves.shape[-2]):
-        poses.append(moved(poses[-1], moves[..., place, :]))
-    return np.stack(poses, axis=-2)
+    # Facings first, as each move is made from one; then the places, adding up in the order of single moves.
+    facing = np.cumsum(np.concatenate([start[..., None, 2], moves[..., 2]], axis=-1), axis=-1)
+    sin = np.sin(facing[..., :-1])
+    cos = np.cos(facing[..., :-1])
+    forward = moves[..., 0]
+    left = moves[..., 1]
+    x = _added_in_turn(start[..., None, 0], forward * sin, left * cos)
+    z = _added_in_turn(start[..., None, 1], forward * cos, -left * sin)
+    return np.stack([x, z, facing], axis=-1)
+
+
+def _added_in_turn(start: Array, first: Array, second: Array) -> Array:
+    """The sums (..., N + 1) of a start (..., 1) and two terms (..., N) a step, the first before the second."""
+    terms = np.stack([first, second], axis=-1).reshape(*first.shape[:-1], -1)
+    sums: Array = np.cumsum(np.concatenate([start, terms], axis=-1), axis=-1)[..., ::2]
+    return sums
 
 
 def nearest_moves(poses: Array, book: Array) -> tuple[NDArray[np.int64], Array]:
@@ -186,7 +198,7 @@ class StreamingDecoder:
         """The frames of steps up to one, which nothing that follows changes any more."""
         if until <= self.count:
             return np.empty((0, self.codec.decoder.spec.output("frames").size(-1)))
-        # The steps, and those that the decoder looks back and ahead at; a lone one is rounded differently, so two of it.
+        # The steps, and those that the decoder looks back and ahead at; twice a lone one, which is rounded differently.
         field = self.codec.field
         start = max(0, self.count - field.back)
         steps = np.array(self.codes[start : until + field.ahead])

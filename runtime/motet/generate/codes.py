@@ -76,7 +76,7 @@ class Source:
         """The memory, made when it is first used; BundleError where a table of it was altered or does not fit."""
         return self.remember()
 
-    @property
+    @cached_property
     def parts(self) -> int:
         """P, the codes of a step."""
         return self.part.spec.input("codes").size(1)
@@ -150,7 +150,7 @@ class Writer:
         again = self._parts(known, uniform[:, 2:], codes, ends, is_early)
 
         # Actions that begin again have age 0 at the next step.
-        self.last = np.tile(codes, (2, 1))
+        self.last = np.concatenate([codes, codes])
         self.age = np.where(again, 0, self.age + 1)
         self.done = np.where(again, 0.0, self.done)
         return codes
@@ -188,7 +188,7 @@ class Writer:
         inputs = {
             "codes": self.last,
             "action": np.concatenate([actions, no_action]).astype(np.int64),
-            "age": np.tile(self.age, 2),
+            "age": np.concatenate([self.age, self.age]),
         }
         outputs, self.state = advance(self.source.step, self.state, inputs)
         self._keep_window()
@@ -245,7 +245,7 @@ class Writer:
 
     def _chances(self, known: Floats, codes: Ids, part: int) -> Scores:
         """Guided log-probabilities (R, K) of a part of rows, from the parts (R, P) drawn before it."""
-        outputs = self.source.part({"known": known, "codes": np.tile(codes, (2, 1))})
+        outputs = self.source.part({"known": known, "codes": np.concatenate([codes, codes])})
         log_probabilities = outputs["log_probabilities"][:, part].astype(np.float64)
         with_action, without = np.split(log_probabilities, 2)
         chances: Scores = without + self.drawing.guidance * (with_action - without)

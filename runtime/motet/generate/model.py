@@ -299,12 +299,16 @@ class CodesModel(GenerateModel):
         heard = sum(self._rare.get(word, 0.0) for word in words)
         share = heard / (sum(self._rare.get(word, unheard) for word in words) or 1.0)
         order = np.argsort(-context, kind="stable")
-        nearest = dict.fromkeys(self._sentences[action] for action in order)
+        nearest: dict[str, None] = {}
+        for action in order.tolist():
+            nearest[self._sentences[action]] = None
+            if len(nearest) == 3:
+                break
         likeliest = float(context[order[0]])
         if likeliest > 0.01:  # more than rounding
             raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
         confidence = share * math.exp(likeliest) ** self._familiar.doubt
-        return Understood(confidence, tuple(nearest)[:3], confidence >= self._familiar.confident)
+        return Understood(confidence, tuple(nearest), confidence >= self._familiar.confident)
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """See :meth:`GenerateModel.note`."""
