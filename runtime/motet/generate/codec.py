@@ -135,6 +135,12 @@ class Codec:
         moves, _ = nearest_moves(poses[:: self.field.hop], self.book)
         return np.concatenate([moves[:, None], body], axis=1)
 
+    def decoded(self, codes: Ids) -> tuple[Array, Array]:
+        """What the decoder makes of steps (N, P): frames (N, hop, D) with the root seen from the way; moves (N, 3)."""
+        # a lone step is rounded differently, so it comes twice
+        outputs = self.decoder({"codes": np.repeat(codes[None], 2 if len(codes) == 1 else 1, axis=0)})
+        return outputs["frames"][0].astype(np.float64), outputs["moves"][0].astype(np.float64)
+
     def frames_of(self, codes: Ids) -> Array:
         """Frames (T, D) in the contract's units of steps of codes (N, P), from the origin."""
         decoder = StreamingDecoder(self)
@@ -198,17 +204,15 @@ class StreamingDecoder:
         """The frames of steps up to one, which nothing that follows changes any more."""
         if until <= self.count:
             return np.empty((0, self.codec.decoder.spec.output("frames").size(-1)))
-        # The steps, and those that the decoder looks back and ahead at; twice a lone one, which is rounded differently.
+        # The steps, and those that the decoder looks back and ahead at.
         field = self.codec.field
         start = max(0, self.count - field.back)
-        steps = np.array(self.codes[start : until + field.ahead])
-        rows = np.tile(steps, (2 if len(steps) == 1 else 1, 1, 1))
-        decoded = self.codec.decoder({"codes": rows})
+        frames, moves = self.codec.decoded(np.array(self.codes[start : until + field.ahead]))
         new = slice(self.count - start, until - start)
         self.count = until
         # The root, which the decoder gives as seen from the way, as rates.
-        frames = decoded["frames"][0, new].astype(np.float64)
-        rates = self._rates(decoded["moves"][0, new].astype(np.float64), frames[..., :PATH])
+        frames = frames[new]
+        rates = self._rates(moves[new], frames[..., :PATH])
         body = frames.reshape(len(rates), -1)[:, PATH:]
         return self._joined(np.concatenate([rates, body], axis=1))
 

@@ -338,9 +338,7 @@ class Memory:
         # The last steps, the first one repeated where there are fewer than K.
         past = np.stack([recent[min(back, len(recent) - 1)] for back in range(settings.past_steps)])
         present = (np.sqrt(settings.past_weights)[:, None] * past).ravel()
-        off = self.keys[action] - present
-        off *= off
-        distances = off.sum(axis=1)
+        distances = ((self.keys[action] - present) ** 2).sum(axis=1)
         # Differences in age cost a little, without a limit where the motion is to end as remembered ones do.
         age_costs = settings.age_cost * (ages - age) ** 2
         distances += age_costs if ends else np.minimum(age_costs, settings.age_cost_limit)
