@@ -56,6 +56,7 @@ EDGES = {
     ("formats", "draw"): "a .glb has the body that pages draw",
     ("composition", "generate"): "prompts are drawn as a story",
     ("generate", "formats"): "Generated.write is public",
+    ("generate", "keyed"): "a sentence may name an act by key poses",
     ("papers", "generate"): "the mixture of Plappert et al. is one more model that generates",
     ("predict", "generate"): "PredictModel.predict goes on after its horizon with a generate model",
     ("search", "formats"): "an index is made of a folder of files",

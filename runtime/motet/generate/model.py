@@ -28,6 +28,8 @@ from motet.generate.base import Generated, GenerateModel, LoopSettings, LoopValu
 from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.continue_codes import ContinuationSettings
+from motet.generate.keyed_acts import STANDING, NamedAct, act_named
+from motet.generate.keyed_acts import verbs as keyed_verbs
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
 from motet.generate.story_decoder import Piece, Request, Teller, pace_of
@@ -41,9 +43,6 @@ from motet.text.numeric_phrases import PACES, Quantities, known_turns, quantitie
 
 DONE = re.compile(r"(?:ing|ed|[^s]s)$")
 """The ending of a word for an action."""
-
-STANDING = "a person stands still"
-"""The sentence shown where a figure stands at the start or end of a story."""
 
 STANDING_SECONDS = 0.8
 """Duration of standing there."""
@@ -184,7 +183,7 @@ class CodesModel(GenerateModel):
         self._words = [entry.texts("words") for entry in entries]
         actions_with = Counter(chain.from_iterable(self._words))
         self._rare = {word: math.log((1 + len(entries)) / count) for word, count in actions_with.items()}
-        self._verbs = verbs_of(actions_with)
+        self._verbs = verbs_of(actions_with) | (keyed_verbs() if self.contract.skeleton == HUMANOID else set())
 
     def _stems(self, action: int) -> frozenset[str]:
         """The stems of the words that describe an action."""
@@ -194,9 +193,39 @@ class CodesModel(GenerateModel):
         """The stems of those of its words that are what is done."""
         return frozenset(stem(word) for word in self._words[action] if DONE.search(word))
 
+    def keyed(self, sentence: str) -> NamedAct | None:
+        """The act by key poses that a sentence names; None where there is none, or a recorded action has all its words,
+        those of the act in its own sentence."""
+        if self.contract.skeleton != HUMANOID:
+            return None
+        words = self.vocabulary.rules.words(sentence)
+        act = act_named(words) or self._keyed_counted(sentence)
+        if act is None:
+            return None
+        if not all(map(self.vocabulary.meant, words)) or self.lacking(sentence):
+            return act
+        recorded = frozenset(map(stem, self.likeliest_recorded(sentence).split()))
+        return None if act.stems <= recorded else act
+
+    def _keyed_counted(self, sentence: str) -> NamedAct | None:
+        """The act that a sentence names beside how often: "nods three times"."""
+        try:
+            quantities = quantities_of(sentence)
+        except TextError:  # it is said when the sentence is read
+            return None
+        if quantities.amounts.keys() != {"times"}:
+            return None
+        return act_named(self.vocabulary.rules.words(quantities.text), quantities.amounts["times"])
+
+    def likeliest_recorded(self, sentence: str) -> str:
+        """The sentence of the recorded action that a sentence most likely is."""
+        return self._sentences[int(self._context(sentence).argmax())]
+
     def parts(self, sentence: str) -> list[str]:
         """The things that a text requests one after another: its sentences, and the parts of a sentence
         (:func:`motet.text.clauses.parts_of`) whose likeliest action leaves something out; errors like :meth:`ids`."""
+        if self.keyed(sentence):
+            return [sentence]
         self.vocabulary.encode(sentence)
         shown_in_turn = []
         for whole in sentences_of(sentence):
@@ -210,7 +239,7 @@ class CodesModel(GenerateModel):
 
     def _shown_at_once(self, quantities: Quantities, parts: Sequence[str]) -> bool:
         """Whether the likeliest action of a sentence shows all its parts, and no part has numbers of its own."""
-        if self.lacking(quantities.text):
+        if self.lacking(quantities.text) or any(map(self.keyed, parts)):
             return False
         for part in parts:
             amounts = dict(quantities_of(part).amounts)
@@ -224,6 +253,8 @@ class CodesModel(GenerateModel):
         like :func:`motet.text.numeric_phrases.quantities_of`."""
         if self.contract.skeleton != HUMANOID:
             return Quantities(sentence)
+        if self.keyed(sentence):
+            return Quantities(STANDING)
         quantities = quantities_of(sentence)
         if quantities.amounts and quantities.text != sentence:
             texts = known_turns(quantities)
@@ -260,6 +291,8 @@ class CodesModel(GenerateModel):
 
     def _composed(self, sentence: str, numbers: bool, whole: bool, settings: LoopValues) -> bool:
         seconds = self._settled(settings)["seconds"]
+        if numbers and self.keyed(sentence):
+            return True
         if super()._composed(sentence, numbers, whole, settings):
             return True
         if not (numbers and seconds):
@@ -272,6 +305,8 @@ class CodesModel(GenerateModel):
         """A request to show a text. seconds: 0 where the text says them, or it ends by itself. paced: whether it is
         played faster or slower to last as long."""
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
+        if quantities.text == STANDING and (act := self.keyed(text)):
+            return replace(request, keyed=act)
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
     def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:
@@ -290,6 +325,8 @@ class CodesModel(GenerateModel):
         numbers: judge the text that it is read as without its numbers (:meth:`quantities`), which :meth:`generate`
         shows.
         """
+        if numbers and (act := self.keyed(sentence)):
+            return Understood(1.0, (act.says,), True)
         text = self.quantities(sentence).text if numbers else sentence
         return self._understood(text, self.embed(text))
 
@@ -336,15 +373,20 @@ class CodesModel(GenerateModel):
         shown: dict[int | None, Shown] = {}
         for sample in samples:
             if sample.action not in shown:
-                shown[sample.action] = self._shown(sentence, sample.action)
+                shown[sample.action] = self._warned(sentence, self._shown_as(sentence, sample.action))
         motions = []
         for motion, sample in zip(super().results(sentence, samples), samples, strict=True):
             motions.append(replace(motion, **shown[sample.action]._asdict()))
         return motions
 
-    def _shown(self, sentence: str, action: int | None) -> Shown:
-        """How a sentence is shown by an action; a TextWarning names the words that are left out."""
-        shown = self._shown_as(sentence, action)
+    def _shown(self, request: Request, action: int) -> Shown:
+        """How a request is shown; a TextWarning names the words that are left out."""
+        if request.keyed is not None:
+            return Shown(request.keyed.says, (), 1.0)
+        sentence = request.quantities.text
+        return self._warned(sentence, self._shown_as(sentence, action))
+
+    def _warned(self, sentence: str, shown: Shown) -> Shown:
         if shown.lacking:
             warn(shown.left_out(sentence), TextWarning)
         return shown
@@ -352,6 +394,8 @@ class CodesModel(GenerateModel):
     def likeliest(self, sentence: str) -> Shown:
         """How a sentence is shown by its likeliest action; motions that are drawn may show another likely one.
         Errors like :meth:`ids`, without warnings."""
+        if act := self.keyed(sentence):
+            return Shown(act.says, (), 1.0)
         return self._shown_as(self.quantities(sentence).text)
 
     def _shown_as(self, sentence: str, action: int | None = None) -> Shown:
@@ -447,7 +491,7 @@ class CodesModel(GenerateModel):
         start = 0
         for number, (request, length) in enumerate(zip(requests, lengths, strict=True)):
             stop = start + length
-            shown = self._shown(request.quantities.text, actions[number])
+            shown = self._shown(request, actions[number])
             measured = self._measured(request, frames[start:stop])
             wanted = dict(cast(Mapping[str, float], request.quantities.amounts))
             passages.append(Passage(request.text, start / self.fps, stop / self.fps, *shown, wanted, measured))
@@ -489,7 +533,7 @@ class CodesModel(GenerateModel):
             begun = 0
             for piece in drawn:
                 if piece.number == begun:
-                    self._shown(requests[begun].quantities.text, piece.action)
+                    self._shown(requests[begun], piece.action)
                     begun += 1
                 if len(piece.frames):
                     last, pose = in_world(self.contract.features(piece.frames), last, pose)

@@ -12,6 +12,7 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
+from motet.generate.keyed_acts import NamedAct, seed_of
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -46,10 +47,13 @@ class Request:
     pace: float = 1.0
     """Factor by which it is played faster than drawn, to last as long."""
 
+    keyed: NamedAct | None = None
+    """The act by key poses that is laid over the text that is shown."""
+
     @property
     def to_measure(self) -> bool:
         """Whether it is drawn until its numbers are reached; a length alone is kept by the decoder."""
-        return bool(self.quantities.amounts.keys() - {"seconds"}) or self.pace != 1
+        return bool(self.quantities.amounts.keys() - {"seconds"}) or self.pace != 1 or self.keyed is not None
 
     @property
     def exactly(self) -> bool:
@@ -180,6 +184,8 @@ class Teller:
         number, request = run[0]
         if not request.to_measure:
             return self._flowing(run, context)
+        if request.keyed is not None:
+            return self._keyed(number, request, request.keyed, context)
         if request.exactly:
             return self._timed(number, request, context)
         return self._measured(number, request, context)
@@ -236,6 +242,19 @@ class Teller:
             shown = played(frames, len(frames) / (len(lead) + stop - start))[len(lead) :]
             lead = frames[-1:]
             yield Piece(number, int(actions[0]), shown, len(shown))
+
+    def _keyed(self, number: int, request: Request, act: NamedAct, context: Context | None) -> Iterator[Piece]:
+        """An act by key poses, over a figure that stands as long."""
+        seed = seed_of(self.noise[0])
+        actions = self._action(request)
+        count = round(max(act.seconds(seed), request.seconds) * self.contract.fps) + 1
+        steps = self.codec.steps(count / self.contract.fps)
+        drawn = drawn_steps(self._writer(context), actions, steps, exactly=True, whole=True)
+        codes = np.concatenate([step for _, step in drawn])
+        decoder = StreamingDecoder(self.codec, context)
+        frames = np.concatenate([decoder.push(codes), decoder.finish()])[:count]
+        shown = act.laid_over(frames, self.contract, seed)
+        yield Piece(number, int(actions[0]), shown, len(shown))
 
     @property
     def _no_frames(self) -> Array:

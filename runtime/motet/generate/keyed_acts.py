@@ -1,0 +1,102 @@
+"""Acts by key poses (:mod:`motet.keyed`) as generated motions: which sentences name one, and how it is laid over a
+figure that stands."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from motet.decode.loop import Noise
+from motet.keyed import KeyedAct, ours
+from motet.keyed.keys import mirrored_keys
+from motet.motion.rotations import Array
+from motet.representation.contract import MotionContract
+from motet.text.clauses import FUNCTION_WORDS, stem
+
+STANDING = "a person stands still"
+"""The sentence of what they are laid over."""
+
+IDLE = frozenset(map(stem, (*FUNCTION_WORDS, "does", "do", "makes", "gives", "human", "subject", "somebody", "please")))
+"""Stems of words that name no act."""
+
+SIDES = frozenset(("left", "right"))
+
+
+@dataclass(frozen=True)
+class NamedAct:
+    """An act as a sentence names it: on its side, and as often as it says. says: the act's sentence."""
+
+    act: KeyedAct
+    says: str
+
+    @property
+    def stems(self) -> frozenset[str]:
+        """The stems of the words of its sentence that name an act."""
+        return stems_of(self.says.split())
+
+    def seconds(self, seed: int) -> float:
+        """How long it lasts."""
+        return self.act.seconds(seed)
+
+    def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
+        """Frames (T, D) of a figure that stands, in the contract's channels, that do the act."""
+        base = contract.motion(frames, plant=False)
+        acted = self.act.motion(base, seed)
+        shown = frames.copy()
+        # what the act changes is added: the frames of a motion are not quite those that it was made of
+        shown[: len(acted)] += contract.frames(acted) - contract.frames(base)[: len(acted)]
+        return shown
+
+
+def seed_of(noise: Noise) -> int:
+    """The seed of an act that is drawn next."""
+    return int(noise.random((1,), np.float32)[0] * (1 << 24))
+
+
+def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:
+    """The act that lower-case words name, None where there is none: all of them are words of its sentences, but for a
+    side, and one of its sentences has no others. times: how often it is to be done, where the words say it."""
+    stems = stems_of(words)
+    best: tuple[int, str, str] | None = None
+    for name, (sentences, known) in _sentences().items():
+        act = ours()[name]
+        sides = stems & SIDES if act.mirrored else frozenset()
+        for sentence, of_sentence in sentences.items():
+            if of_sentence and of_sentence <= stems and stems - sides <= known | of_sentence:
+                best = max(best or (0, "", ""), (len(of_sentence), name, sentence))
+    if best is None:
+        return None
+    _, name, sentence = best
+    act = _on_side(ours()[name], stems & SIDES - _sentences()[name][0][sentence])
+    if times is not None and act.repeat is not None:
+        act = replace(act, repeat=replace(act.repeat, times=(round(times), round(times))))
+    return NamedAct(act, sentence)
+
+
+def stems_of(words: Iterable[str]) -> frozenset[str]:
+    """The stems of words that name an act."""
+    return frozenset(map(stem, words)) - IDLE
+
+
+def verbs() -> frozenset[str]:
+    """The stems of the first words of all orders, which say what is done."""
+    return frozenset(stem(sentence.split()[0]) for act in ours().values() for sentence in act.says) - IDLE
+
+
+@cache
+def _sentences() -> Mapping[str, tuple[Mapping[str, frozenset[str]], frozenset[str]]]:
+    """Of each act the stems of each of its sentences, and those of all."""
+    table = {}
+    for name, act in ours().items():
+        sentences = {sentence: stems_of(sentence.split()) for sentence in act.says}
+        table[name] = (sentences, frozenset[str]().union(*sentences.values()))
+    return table
+
+
+def _on_side(act: KeyedAct, sides: frozenset[str]) -> KeyedAct:
+    """An act of either hand with the hand of a side; acts are written for the right one."""
+    if not act.mirrored or len(sides) != 1:
+        return act
+    keys = mirrored_keys(act.keys) if "left" in sides else act.keys
+    return replace(act, keys=keys, mirrored=False)

@@ -1,0 +1,103 @@
+"""Sentences of acts that nobody recorded: laid by their key poses over a figure that stands."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import motet
+from motet.figures.humanoid import HUMANOID
+from motet.generate.keyed_acts import act_named
+from motet.motion.kinematics import global_transforms
+
+
+@pytest.fixture(scope="module")
+def model() -> motet.CodesModel:
+    return motet.load_as(motet.CodesModel, "generate")
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("salute", "salute"),
+        ("a person salutes", "salute"),
+        ("someone nods", "nod"),
+        ("waves with left", "wave"),
+        ("walk", None),
+        ("nod and walk", None),
+        ("salute the flag", None),
+        ("a person", None),
+        ("", None),
+    ],
+)
+def test_an_act_is_named_by_all_words_and_no_others(words: str, name: str | None) -> None:
+    named = act_named(words.split())
+    assert (named and named.act.name) == name
+
+
+def test_a_side_is_that_of_the_hand() -> None:
+    right = act_named(["wave", "right"])
+    left = act_named(["wave", "left"])
+    assert right is not None
+    assert set(right.act.keys[0].hands) == {"right_hand"}
+    assert left is not None
+    assert set(left.act.keys[0].hands) == {"left_hand"}
+
+
+def test_a_salute_is_done_where_the_hand_belongs(model: motet.CodesModel) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (generated,) = model.generate("a person salutes")
+    assert (generated.action, generated.lacking) == ("salute", ())
+    rotations, places = global_transforms(generated.motion)
+    head = HUMANOID.index("head")
+    tip = places[:, HUMANOID.index("rightHand_end")]
+    seen_from_head = np.einsum("tji,tj->ti", rotations[:, head], tip - places[:, head])
+    assert np.linalg.norm(seen_from_head - [-0.1, 0.1, 0.07], axis=1).min() < 0.06
+    # the feet stay where they stood
+    for foot in ("leftFoot", "rightFoot"):
+        assert np.ptp(places[:, HUMANOID.index(foot)], axis=0).max() < 0.05
+
+
+def test_it_is_done_as_often_as_the_sentence_says(model: motet.CodesModel) -> None:
+    counts = []
+    for sentence in ("nod twice", "nod five times"):
+        rotations, _ = global_transforms(model.generate(sentence)[0].motion)
+        head = rotations[:, HUMANOID.index("head")]
+        down = -np.degrees(np.arcsin(head[:, 1, 2]))
+        is_down = down > (down.min() + down.max()) / 2
+        counts.append(np.count_nonzero(np.diff(is_down.astype(int)) == 1))
+    assert counts == [2, 5]
+
+
+def test_recorded_actions_come_first(model: motet.CodesModel) -> None:
+    assert model.keyed("a person walks forward") is None
+    assert model.keyed("a person waves") is None
+    assert model.keyed("salute") is not None
+
+
+def test_a_story_goes_on_before_and_after_it(model: motet.CodesModel) -> None:
+    story = model.story("walk forward, then salute, then walk forward", seed=1)
+    assert [passage.action == "salute" for passage in story.passages] == [False, True, False]
+    # no leap at the joints of its parts: no joint moves farther in a frame than in the walk
+    places = global_transforms(story.motion)[1]
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=2).max(axis=1)
+    assert steps.max() < 0.3
+    pieces = list(model.stream("walk forward, then salute", seed=1))
+    assert sum(map(len, pieces)) > 60
+
+
+def test_alone_is_as_in_a_batch_and_seeds_differ(model: motet.CodesModel) -> None:
+    alone = model.generate("salute", seed=5)[0]
+    batch = model.generate(["a person walks", "salute"], seed=4)[1][0]
+    assert np.array_equal(alone.frames, batch.frames)
+    assert not np.array_equal(alone.frames[:20], model.generate("salute", seed=6)[0].frames[:20])
+
+
+def test_what_is_understood_says_the_act(model: motet.CodesModel) -> None:
+    understood = model.understood("salute")
+    assert understood.confident
+    assert understood.nearest == ("salute",)
+    assert model.likeliest("a person salutes").lacking == ()
+    model.check("a person salutes")
+    assert len(model.generate("salute", seconds=6.0)[0].frames) == pytest.approx(180, abs=4)
