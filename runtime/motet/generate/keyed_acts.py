@@ -1,7 +1,7 @@
 """Acts by key poses (:mod:`motet.keyed`) as generated motions: which sentences name one, and how it is laid over a
 figure that stands."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -58,20 +58,29 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
     """The act that lower-case words name, None where there is none: all of them are words of its sentences, but for a
     side, and one of its sentences has no others. times: how often it is to be done, where the words say it."""
     stems = stems_of(words)
-    best: tuple[int, str, str] | None = None
-    for name, (sentences, known) in _sentences().items():
-        act = ours()[name]
-        sides = stems & SIDES if act.mirrored else frozenset()
-        for sentence, of_sentence in sentences.items():
-            if of_sentence and of_sentence <= stems and stems - sides <= known | of_sentence:
-                best = max(best or (0, "", ""), (len(of_sentence), name, sentence))
-    if best is None:
+    matches = [(len(of_sentence), name, sentence) for name, sentence, of_sentence in _sentences_within(stems)]
+    if not matches:
         return None
-    _, name, sentence = best
-    act = _on_side(ours()[name], stems & SIDES - _sentences()[name][0][sentence])
+    # the sentence that says the most of it
+    _, name, sentence = max(matches)
+    act = ours()[name]
+    act = _on_side(act, stems & SIDES - stems_of(sentence.split()))
     if times is not None and act.repeat is not None:
         act = replace(act, repeat=replace(act.repeat, times=(round(times), round(times))))
     return NamedAct(act, sentence)
+
+
+def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozenset[str]]]:
+    """The acts that have all of some stems, but for a side, by name; each with its sentences that have no others, and
+    their stems."""
+    for name, sentences in _sentences().items():
+        sides = stems & SIDES if ours()[name].mirrored else frozenset()
+        known = frozenset[str]().union(*sentences.values())
+        if not stems - sides <= known:
+            continue
+        for sentence, of_sentence in sentences.items():
+            if of_sentence and of_sentence <= stems:
+                yield name, sentence, of_sentence
 
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
@@ -79,18 +88,21 @@ def stems_of(words: Iterable[str]) -> frozenset[str]:
     return frozenset(map(stem, words)) - IDLE
 
 
+@cache
 def verbs() -> frozenset[str]:
     """The stems of the first words of all orders, which say what is done."""
-    return frozenset(stem(sentence.split()[0]) for act in ours().values() for sentence in act.says) - IDLE
+    first_words = []
+    for act in ours().values():
+        first_words += [sentence.split()[0] for sentence in act.says]
+    return stems_of(first_words)
 
 
 @cache
-def _sentences() -> Mapping[str, tuple[Mapping[str, frozenset[str]], frozenset[str]]]:
-    """Of each act the stems of each of its sentences, and those of all."""
+def _sentences() -> Mapping[str, Mapping[str, frozenset[str]]]:
+    """The stems of each sentence of each act."""
     table = {}
     for name, act in ours().items():
-        sentences = {sentence: stems_of(sentence.split()) for sentence in act.says}
-        table[name] = (sentences, frozenset[str]().union(*sentences.values()))
+        table[name] = {sentence: stems_of(sentence.split()) for sentence in act.says}
     return table
 
 
