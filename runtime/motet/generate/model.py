@@ -193,7 +193,7 @@ class CodesModel(GenerateModel):
         """The stems of those of its words that are what is done."""
         return frozenset(stem(word) for word in self._words[action] if DONE.search(word))
 
-    def keyed(self, sentence: str) -> NamedAct | None:
+    def _keyed(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or a recorded action has all its words,
         those of the act in its own sentence."""
         if self.contract.skeleton != HUMANOID:
@@ -204,7 +204,7 @@ class CodesModel(GenerateModel):
             return None
         if not all(map(self.vocabulary.meant, words)) or self.lacking(sentence):
             return act
-        recorded = frozenset(map(stem, self.likeliest_recorded(sentence).split()))
+        recorded = frozenset(map(stem, self._likeliest_recorded(sentence).split()))
         return None if act.stems <= recorded else act
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
@@ -217,14 +217,14 @@ class CodesModel(GenerateModel):
             return None
         return act_named(self.vocabulary.rules.words(quantities.text), quantities.amounts["times"])
 
-    def likeliest_recorded(self, sentence: str) -> str:
+    def _likeliest_recorded(self, sentence: str) -> str:
         """The sentence of the recorded action that a sentence most likely is."""
         return self._sentences[int(self._context(sentence).argmax())]
 
     def parts(self, sentence: str) -> list[str]:
         """The things that a text requests one after another: its sentences, and the parts of a sentence
         (:func:`motet.text.clauses.parts_of`) whose likeliest action leaves something out; errors like :meth:`ids`."""
-        if self.keyed(sentence):
+        if self._keyed(sentence):
             return [sentence]
         self.vocabulary.encode(sentence)
         shown_in_turn = []
@@ -239,7 +239,7 @@ class CodesModel(GenerateModel):
 
     def _shown_at_once(self, quantities: Quantities, parts: Sequence[str]) -> bool:
         """Whether the likeliest action of a sentence shows all its parts, and no part has numbers of its own."""
-        if self.lacking(quantities.text) or any(map(self.keyed, parts)):
+        if self.lacking(quantities.text) or any(map(self._keyed, parts)):
             return False
         for part in parts:
             amounts = dict(quantities_of(part).amounts)
@@ -253,7 +253,7 @@ class CodesModel(GenerateModel):
         like :func:`motet.text.numeric_phrases.quantities_of`."""
         if self.contract.skeleton != HUMANOID:
             return Quantities(sentence)
-        if self.keyed(sentence):
+        if self._keyed(sentence):
             return Quantities(STANDING)
         quantities = quantities_of(sentence)
         if quantities.amounts and quantities.text != sentence:
@@ -291,7 +291,7 @@ class CodesModel(GenerateModel):
 
     def _composed(self, sentence: str, numbers: bool, whole: bool, settings: LoopValues) -> bool:
         seconds = self._settled(settings)["seconds"]
-        if numbers and self.keyed(sentence):
+        if numbers and self._keyed(sentence):
             return True
         if super()._composed(sentence, numbers, whole, settings):
             return True
@@ -305,7 +305,7 @@ class CodesModel(GenerateModel):
         """A request to show a text. seconds: 0 where the text says them, or it ends by itself. paced: whether it is
         played faster or slower to last as long."""
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
-        if quantities.text == STANDING and (act := self.keyed(text)):
+        if quantities.text == STANDING and (act := self._keyed(text)):
             return replace(request, keyed=act)
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
@@ -325,7 +325,7 @@ class CodesModel(GenerateModel):
         numbers: judge the text that it is read as without its numbers (:meth:`quantities`), which :meth:`generate`
         shows.
         """
-        if numbers and (act := self.keyed(sentence)):
+        if numbers and (act := self._keyed(sentence)):
             return Understood(1.0, (act.says,), True)
         text = self.quantities(sentence).text if numbers else sentence
         return self._understood(text, self.embed(text))
@@ -394,7 +394,7 @@ class CodesModel(GenerateModel):
     def likeliest(self, sentence: str) -> Shown:
         """How a sentence is shown by its likeliest action; motions that are drawn may show another likely one.
         Errors like :meth:`ids`, without warnings."""
-        if act := self.keyed(sentence):
+        if act := self._keyed(sentence):
             return Shown(act.says, (), 1.0)
         return self._shown_as(self.quantities(sentence).text)
 
