@@ -92,7 +92,7 @@ CEILINGS = {
     "motet.draw": 12_000,
     "motet.figures": 32_000,
     "motet.formats": 37_400,
-    "motet.generate": 27_900,
+    "motet.generate": 28_300,
     "motet.keyed": 9_300,
     "motet.live": 5_700,
     "motet.models": 10_200,
