@@ -83,7 +83,7 @@ ONE_WAY = {
 
 CEILINGS = {
     "motet": 3_500,
-    "motet.bench": 5_400,
+    "motet.bench": 5_500,
     "motet.bundle": 11_000,
     "motet.cli": 17_400,
     "motet.composition": 7_800,

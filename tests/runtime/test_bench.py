@@ -87,6 +87,24 @@ def test_a_busy_machine_is_said(monkeypatch: pytest.MonkeyPatch, quick: list[str
     assert quick == ["fill"]
 
 
+def test_a_load_is_that_of_others_while_it_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    counts = iter([2, 1, 3] * 9)
+    waits: list[float] = []
+
+    class State:
+        def read_text(self) -> str:
+            return f"cpu  1 2 3\nprocs_running {next(counts)}\nprocs_blocked 7\n"
+
+    monkeypatch.setattr(machine, "STATE", State())
+    monkeypatch.setattr(machine.time, "sleep", waits.append)
+    assert machine.wanted_by_others() == 1.0
+    assert sum(waits) == pytest.approx(0.5)
+    # elsewhere it is that of the last minute
+    monkeypatch.setattr(machine, "STATE", tmp_path / "none")
+    monkeypatch.setattr(machine.os, "getloadavg", lambda: (0.61, 9.0, 9.0))
+    assert machine.wanted_by_others() == 0.6
+
+
 def test_an_overloaded_machine_measures_nothing_without_force(
     monkeypatch: pytest.MonkeyPatch, quick: list[str]
 ) -> None:

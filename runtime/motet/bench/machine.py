@@ -6,6 +6,7 @@ import platform
 import re
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -19,6 +20,13 @@ from motet.jobs import cores
 
 POOLS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 """Variables that say how many threads numpy's products take; read when numpy is imported."""
+
+
+STATE = Path("/proc/stat")
+"""Where Linux says how many processes run at the moment."""
+
+LOOKS = 25
+"""How often that is read."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +47,7 @@ class Machine:
 
     @property
     def busy(self) -> bool:
-        """Whether others work here, so that figures may be far too low."""
+        """Whether others work here, so that figures may be too low; times of the processor are disturbed least."""
         return self.load is not None and self.load > 0.3
 
     @property
@@ -54,11 +62,26 @@ class Machine:
     @staticmethod
     def here() -> "Machine":
         """This one, measured for a second or two."""
-        load = round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
+        load = wanted_by_others()
         versions = {name: version(name) for name in ("motet", "onnxruntime", "numpy")}
         ceilings_of = {str(count): fresh("ceilings", threads=count) for count in sorted({1, cores()})}
         gflops = {count: ceilings["gflops"] for count, ceilings in ceilings_of.items()}
         return Machine(processor(), cores(), versions, load, gflops, ceilings_of["1"]["gigabytes"])
+
+
+def wanted_by_others() -> float | None:
+    """Processes that want a core, beside this one: the mean of half a second on Linux, elsewhere of the last minute,
+    which also counts what this one did; None where the system does not tell."""
+    counts: list[int] = []
+    with suppress(OSError):
+        for _ in range(LOOKS):
+            counts += [
+                int(count) - 1 for count in re.findall(r"^procs_running (\d+)$", STATE.read_text(), re.MULTILINE)
+            ]
+            time.sleep(0.5 / LOOKS)
+    if counts:
+        return round(sum(counts) / len(counts), 1)
+    return round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None
 
 
 def processor() -> str:

@@ -50,7 +50,7 @@ def bench(
     if machine.overloaded and not force:
         raise click.UsageError(f"{busy}: wait until other programs are done, or measure with --force")
     if machine.busy:
-        log.warning("%s: figures are too low", busy)
+        log.warning("%s: figures are too low; times of the processor (cpu) are disturbed least", busy)
     for key in ("processor", "cores", "versions"):
         if old and old["machine"].get(key) != (now := getattr(machine, key)):
             log.warning("%s: another machine or version: %s %s, now %s", compare, key, old["machine"].get(key), now)
