@@ -89,7 +89,7 @@ CEILINGS = {
     "motet.composition": 7_800,
     "motet.corpus": 9_300,
     "motet.decode": 4_400,
-    "motet.draw": 12_000,
+    "motet.draw": 12_300,
     "motet.figures": 32_000,
     "motet.formats": 37_400,
     "motet.generate": 28_300,

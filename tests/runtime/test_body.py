@@ -5,7 +5,7 @@ import pytest
 from figures import walker
 from test_retarget import SKELETONS
 
-from motet.draw.body import human_mesh
+from motet.draw.body import BODY, LEFT_PART, RIGHT_PART, human_mesh
 from motet.draw.figure import Body, figure_of
 from motet.draw.mesh import loft, normals_of, ring
 from motet.draw.skinned import person, skinned
@@ -23,16 +23,20 @@ def volume(places, triangles):
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
-@pytest.mark.parametrize(("detail", "most"), [(1.0, 5000), (0.6, 2000), (0.3, 500), (0.22, 250)])
-def test_the_body_is_closed_and_carried_whole(detail, most):
-    mesh = human_mesh(detail)
-    assert 0.6 * most < len(mesh.triangles) <= most
+@pytest.mark.parametrize(("level", "most"), [(0, 5200), (1, 1300), (2, 300)])
+def test_the_body_is_closed_and_carried_whole(level, most):
+    mesh = human_mesh(level)
+    assert 0.9 * most < len(mesh.triangles) <= most
     edges = edges_of(mesh.triangles)
     assert all(count == 1 and edges[b, a] == 1 for (a, b), count in edges.items())
+    assert set(mesh.triangles.reshape(-1).tolist()) == set(range(len(mesh.places)))
     assert mesh.weights.min() >= 0
     np.testing.assert_allclose(mesh.weights.sum(axis=1), 1)
     assert mesh.joints.max() < len(HUMANOID.joints)
-    assert set(mesh.parts.tolist()) == set(range(6))
+    assert set(mesh.parts.tolist()) == {BODY, LEFT_PART, RIGHT_PART}
+    assert mesh.shares.min() >= 0
+    assert (mesh.shares.sum(axis=1) == 255).all()
+    np.testing.assert_allclose(mesh.shares / 255, mesh.weights, atol=0.005)
     assert volume(mesh.places, mesh.triangles) == pytest.approx(0.065, abs=0.016)  # cubic metres, as a slim adult
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1)
 
@@ -40,8 +44,8 @@ def test_the_body_is_closed_and_carried_whole(detail, most):
 def test_the_body_stands_on_the_ground_around_its_joints():
     places = human_mesh().places
     low, high = places.min(axis=0), places.max(axis=0)
-    assert low == pytest.approx([-0.88, 0, -0.12], abs=0.01)
-    assert high == pytest.approx([0.88, 1.72, 0.21], abs=0.01)
+    assert low == pytest.approx([-0.87, 0, -0.12], abs=0.015)
+    assert high == pytest.approx([0.87, 1.75, 0.21], abs=0.015)
     np.testing.assert_allclose(np.sort(places[:, 0]), np.sort(-places[:, 0]), atol=1e-12)  # both sides are alike
 
 
@@ -56,13 +60,14 @@ def test_shoulders_go_on_from_the_neck(slope):
             turns[at] = turns[joint.parent] @ turned_about_z(angle)
             places[at] = places[joint.parent] + turns[joint.parent] @ (T_POSE[at] - T_POSE[joint.parent])
     corners = mesh.carried(turns, places - np.einsum("jab,jb->ja", turns, T_POSE))
-    left = [names.index(name) for name in ("upperChest", "leftShoulder", "leftUpperArm")]
-    own = mesh.triangles[np.isin(mesh.joints[mesh.triangles], left).all(axis=(1, 2))]
+    left = [names.index(name) for name in ("upperChest", "neck", "leftShoulder", "leftUpperArm")]
+    is_left = (mesh.weights * np.isin(mesh.joints, left)).sum(axis=1) > 0.5
+    own = mesh.triangles[is_left[mesh.triangles].all(axis=1)]
     shares = np.array([(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]) / 8
     x, height, _ = np.einsum("pk,tki->itp", shares, corners[own]).reshape(3, -1)
     outline = [height[(x > at) & (x < at + 0.01)].max() for at in np.arange(0.07, 0.2, 0.01)]
     assert np.diff(outline).max() < 0.006
-    assert np.diff(outline).min() > -0.018
+    assert np.diff(outline).min() > -0.03
 
 
 def turned_about_z(degrees):

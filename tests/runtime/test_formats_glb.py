@@ -13,7 +13,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import quat_to_rotmat
 from motet.motion.skeleton import Joint, Skeleton
 
-TYPES = {5126: "<f4", 5123: "<u2", 5125: "<u4"}
+TYPES = {5121: "<u1", 5126: "<f4", 5123: "<u2", 5125: "<u4"}
 WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
@@ -102,7 +102,7 @@ def test_body_follows_the_joints(tmp_path):
     (primitive,) = file.document["meshes"][0]["primitives"]
     arrays = {name: file.array(index) for name, index in primitive["attributes"].items()}
     corners, joints, weights = arrays["POSITION"], arrays["JOINTS_0"][:, 0], arrays["WEIGHTS_0"]
-    assert np.all(weights == [1, 0, 0, 0])
+    assert np.all(weights == [255, 0, 0, 0])
     assert joints.max() < 14
     assert np.linalg.norm(arrays["NORMAL"], axis=1) == pytest.approx(1, abs=1e-6)
     inverse = file.array(file.document["skins"][0]["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)

@@ -83,7 +83,7 @@ def test_page_holds_a_person_on_the_humanoid(tmp_path):
         sizes.append(len(mesh["triangles"]))
         mesh = mesh.get("coarse")
     assert sizes == sorted(sizes, reverse=True)
-    assert len(sizes) == 4
+    assert len(sizes) == 3
 
 
 def test_page_needs_no_other_file(tmp_path):

@@ -1,8 +1,10 @@
-"""The body that figures of people have in pages and pictures: one mesh on the humanoid, made here from its measures.
+"""The body that figures of people have in pages, pictures and files: a faceless mannequin, made from its outlines.
 
-Limbs, trunk, head, hands and shoes are lofts through rings; tables give each ring's place and half axes in metres, on
-the humanoid in its T-pose. Shoulders and hips begin with balls around their joints, which look alike however they turn;
-a yoke lies between neck and shoulder.
+Tables give key rings along trunk and head, leg, arm and finger in metres, around the humanoid's joints; half-way
+between them lie smooth ones. Trunk, legs and arms are one closed surface: a leg begins with half of the trunk's lowest
+ring and a bridge through the crotch, an arm with the border of a hole in the trunk. Arms are shaped as they mostly are,
+hanging by SLOPE, and then turned up into the T-pose. Each corner belongs to the joint of its ring at first, from where
+weights even out.
 """
 
 from collections.abc import Sequence
@@ -11,369 +13,346 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from motet.draw.mesh import Mesh, Surface, eased, loft, ring, shared, together
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.draw.figure import COLOURS
+from motet.draw.mesh import Mesh, patch_triangles, ring, smooth_weights, smoothed
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
 from motet.motion.rotations import Array
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
 
-SHIRT, TROUSERS, SKIN, LEFT_PART, RIGHT_PART, DARK, MIDDLE_PART = range(7)
-"""Parts that have a colour each: of people also the glove and the shoe of either side, hair and eyes; of others bones
-of either side and of the middle."""
+BODY, LEFT_PART, RIGHT_PART, MIDDLE_PART = range(4)
+"""Parts that have a colour each: of people the body and the bands at wrist and ankle of either side; of others bones of
+either side and of the middle."""
 
-GLOVES_AND_SHOES = {"left": LEFT_PART, "right": RIGHT_PART}
+INKS = np.array([(168, 179, 198), COLOURS[LEFT], COLOURS[RIGHT], COLOURS[MIDDLE]])
+"""Their colours, as of the player."""
+
+BANDS = {"left": LEFT_PART, "right": RIGHT_PART}
 
 TRUNK = (
-    (0.832, 0.040, 0.040, 0.045),
-    (0.850, 0.100, 0.070, 0.078),
-    (0.880, 0.146, 0.090, 0.104),
-    (0.920, 0.166, 0.097, 0.120),
-    (0.965, 0.168, 0.096, 0.118),
-    (1.010, 0.157, 0.094, 0.101),
-    (1.036, 0.151, 0.093, 0.093),
-    (1.038, 0.155, 0.097, 0.097),
-    (1.080, 0.143, 0.094, 0.084),
-    (1.130, 0.135, 0.093, 0.077),
-    (1.190, 0.141, 0.102, 0.086),
-    (1.250, 0.154, 0.115, 0.098),
-    (1.310, 0.166, 0.119, 0.105),
-    (1.360, 0.170, 0.109, 0.105),
-    (1.400, 0.158, 0.088, 0.098),
-    (1.432, 0.122, 0.070, 0.084),
-    (1.452, 0.086, 0.060, 0.072),
-    (1.464, 0.066, 0.056, 0.064),
+    (0.855, 0.086, 0.845, -0.106, 0.174, 0.0),
+    (0.905, 0.090, 0.900, -0.118, 0.174, 0.0),
+    (0.955, 0.096, 0.960, -0.114, 0.168, 0.0),
+    (1.020, 0.095, 1.020, -0.090, 0.149, 0.0),
+    (1.090, 0.092, 1.090, -0.078, 0.133, 0.0),
+    (1.170, 0.098, 1.180, -0.082, 0.137, 0.0),
+    (1.280, 0.114, 1.290, -0.098, 0.153, 0.0),
+    (1.365, 0.104, 1.370, -0.100, 0.160, 0.0),
+    (1.430, 0.072, 1.440, -0.088, 0.150, 0.0),
+    (1.452, 0.052, 1.472, -0.074, 0.098, 0.0),
+    (1.466, 0.046, 1.500, -0.064, 0.064, 0.0),
+    (1.496, 0.046, 1.530, -0.056, 0.054, 0.0),
+    (1.522, 0.058, 1.560, -0.060, 0.053, 0.0),
+    (1.530, 0.098, 1.590, -0.076, 0.060, 0.0),
+    (1.570, 0.107, 1.625, -0.094, 0.071, 0.0),
+    (1.625, 0.108, 1.660, -0.102, 0.078, 0.0),
+    (1.685, 0.096, 1.695, -0.096, 0.075, 0.0),
+    (1.733, 0.060, 1.735, -0.064, 0.051, 0.0),
+    (1.750, 0.012, 1.750, -0.016, 0.012, 0.0),
 )
-"""Of each ring its height, half its width, and its depth in front and behind."""
-
-BELT = 1.037
-"""From which height on the shirt covers the trunk."""
-
-HEAD = (
-    (1.482, 0.018, 0.086, 0.046),
-    (1.491, 0.036, 0.099, 0.014),
-    (1.509, 0.050, 0.104, -0.022),
-    (1.533, 0.060, 0.102, -0.050),
-    (1.560, 0.067, 0.101, -0.070),
-    (1.588, 0.072, 0.100, -0.083),
-    (1.615, 0.075, 0.101, -0.090),
-    (1.642, 0.076, 0.101, -0.092),
-    (1.668, 0.071, 0.092, -0.086),
-    (1.689, 0.058, 0.072, -0.068),
-    (1.702, 0.036, 0.044, -0.042),
-    (1.707, 0.014, 0.018, -0.016),
-)
-"""Of each ring its height, half its width, and where it is in front and behind."""
-
-NECK = (
-    (1.425, 0.060, -0.012),
-    (1.455, 0.056, -0.008),
-    (1.480, 0.053, -0.002),
-    (1.510, 0.052, 0.002),
-    (1.550, 0.05, 0.006),
-)
-"""Of each ring its height, its radius, and how far it is in front."""
-
-ARM = (
-    (0.118, 0.016, 0.016),
-    (0.126, 0.034, 0.034),
-    (0.143, 0.051, 0.051),
-    (0.170, 0.061, 0.060),
-    (0.200, 0.062, 0.058),
-    (0.240, 0.056, 0.054),
-    (0.290, 0.051, 0.051),
-    (0.340, 0.048, 0.049),
-    (0.390, 0.045, 0.046),
-    (0.420, 0.043, 0.043),
-    (0.440, 0.042, 0.042),
-    (0.460, 0.042, 0.042),
-    (0.480, 0.043, 0.044),
-    (0.510, 0.044, 0.046),
-    (0.550, 0.043, 0.045),
-    (0.600, 0.037, 0.041),
-    (0.650, 0.032, 0.037),
-    (0.686, 0.031, 0.036),
-    (0.688, 0.026, 0.030),
-)
-"""Of each ring of the left arm its place along x, half its height and half its depth."""
-
-YOKE = (
-    (0.010, 0.024, 0.036, 0.028),
-    (0.045, 0.034, 0.050, 0.026),
-    (0.085, 0.039, 0.057, 0.018),
-    (0.120, 0.044, 0.059, 0.007),
-    (0.150, 0.049, 0.056, -0.001),
-    (0.175, 0.043, 0.046, -0.002),
-    (0.192, 0.024, 0.024, 0.002),
-)
-"""As of the hand, of what lies on the left collar bone, from the neck to the shoulder."""
-
-HAND = (
-    (0.680, 0.018, 0.024, 0.000),
-    (0.684, 0.024, 0.030, 0.000),
-    (0.705, 0.023, 0.032, 0.000),
-    (0.730, 0.022, 0.039, 0.000),
-    (0.765, 0.021, 0.044, 0.000),
-    (0.800, 0.019, 0.044, -0.004),
-    (0.830, 0.018, 0.041, -0.013),
-    (0.855, 0.015, 0.034, -0.024),
-    (0.871, 0.010, 0.022, -0.033),
-    (0.876, 0.004, 0.010, -0.037),
-)
-"""As of the arm, and how high its middle is above the arm's: the fingers bend a little."""
-
-THUMB = ((0.0, 0.010), (0.06, 0.015), (0.35, 0.0155), (0.7, 0.0135), (0.93, 0.010), (1.0, 0.004))
-"""Of each ring how far along it is, and its radius."""
-
-THUMB_FROM = np.array([0.704, 1.396, 0.020])
-THUMB_TO = np.array([0.782, 1.376, 0.070])
+"""Of each ring its height and place in front, those behind, half its width, and where its middle is from side to side:
+from the crotch to the crown."""
 
 LEG = (
-    (1.004, 0.026, 0.026, 0.0),
-    (0.990, 0.054, 0.054, -0.002),
-    (0.965, 0.078, 0.080, -0.005),
-    (0.925, 0.089, 0.093, -0.008),
-    (0.880, 0.089, 0.094, -0.006),
-    (0.830, 0.085, 0.091, -0.002),
-    (0.770, 0.080, 0.086, 0.002),
-    (0.700, 0.073, 0.079, 0.004),
-    (0.630, 0.066, 0.071, 0.003),
-    (0.570, 0.060, 0.064, 0.001),
-    (0.535, 0.057, 0.061, 0.001),
-    (0.505, 0.055, 0.060, 0.002),
-    (0.475, 0.053, 0.057, -0.002),
-    (0.440, 0.053, 0.057, -0.008),
-    (0.380, 0.053, 0.058, -0.013),
-    (0.310, 0.050, 0.054, -0.013),
-    (0.240, 0.045, 0.048, -0.009),
-    (0.170, 0.041, 0.044, -0.005),
-    (0.110, 0.042, 0.047, -0.002),
-    (0.082, 0.043, 0.049, 0.000),
-    (0.080, 0.034, 0.038, 0.000),
+    (0.775, 0.084, 0.775, -0.090, 0.084, 0.091),
+    (0.640, 0.069, 0.640, -0.069, 0.068, 0.091),
+    (0.540, 0.058, 0.540, -0.052, 0.055, 0.090),
+    (0.470, 0.052, 0.470, -0.054, 0.051, 0.090),
+    (0.360, 0.040, 0.360, -0.070, 0.053, 0.091),
+    (0.210, 0.034, 0.210, -0.050, 0.039, 0.090),
+    (0.110, 0.036, 0.100, -0.046, 0.033, 0.090),
+    (0.088, 0.056, 0.018, -0.064, 0.034, 0.091),
+    (0.072, 0.082, 0.000, -0.030, 0.038, 0.093),
+    (0.054, 0.118, 0.000, 0.060, 0.043, 0.096),
+    (0.030, 0.185, 0.000, 0.175, 0.044, 0.098),
+    (0.016, 0.206, 0.006, 0.206, 0.020, 0.096),
 )
-"""Of each ring of the left leg its height, half its width and depth, and how far it is in front."""
+"""As of the trunk, of the left leg from the thigh to the toes."""
 
-SHOE = (
-    (-0.066, 0.014, 0.010, 0.040),
-    (-0.060, 0.026, 0.003, 0.062),
-    (-0.042, 0.037, 0.0, 0.084),
-    (-0.005, 0.040, 0.0, 0.096),
-    (0.035, 0.040, 0.0, 0.092),
-    (0.070, 0.043, 0.0, 0.073),
-    (0.105, 0.047, 0.0, 0.058),
-    (0.135, 0.048, 0.0, 0.050),
-    (0.165, 0.045, 0.001, 0.044),
-    (0.190, 0.036, 0.003, 0.037),
-    (0.206, 0.022, 0.006, 0.028),
-    (0.212, 0.008, 0.012, 0.020),
+ARM = (
+    (0.045, 0.054, -0.046, 0.056, -0.056),
+    (0.110, 0.050, -0.048, 0.052, -0.050),
+    (0.195, 0.044, -0.044, 0.044, -0.046),
+    (0.260, 0.038, -0.039, 0.040, -0.042),
+    (0.310, 0.039, -0.040, 0.043, -0.040),
+    (0.370, 0.038, -0.039, 0.043, -0.039),
+    (0.460, 0.028, -0.028, 0.035, -0.032),
+    (0.530, 0.020, -0.020, 0.029, -0.027),
+    (0.585, 0.014, -0.017, 0.041, -0.037),
+    (0.618, 0.004, -0.007, 0.033, -0.029),
 )
-"""Of each ring of the left shoe its place along z, half its width, its bottom and its top."""
-
-LEG_X = 0.09
-ARM_Y = 1.40
-"""Where the joints of the left leg lie along x, and those of the arm above the ground."""
+"""Of each ring of the left arm and palm how far from the shoulder it is, and how far it reaches over the arm's axis,
+under it, in front and behind."""
 
 
-class Ball(NamedTuple):
-    """An ellipsoid on the head: its middle and half axes, and whether there is another one on the right."""
+class Finger(NamedTuple):
+    """Where a finger begins along the arm, over it and in front; its length and radius; and in degrees its turn towards
+    the thumb's side, and how much it is curled at first and at each of its joints."""
 
-    middle: tuple[float, float, float]
-    half: tuple[float, float, float]
-    part: int
-    twice: bool = True
+    start: tuple[float, float, float]
+    length: float
+    radius: float
+    aside: float
+    curl: tuple[float, float]
 
 
-FACE = (
-    Ball((0.030, 1.604, 0.0895), (0.0120, 0.0105, 0.0100), DARK),
-    Ball((0.031, 1.628, 0.0920), (0.0180, 0.0042, 0.0090), DARK),
-    Ball((0.077, 1.590, -0.006), (0.0100, 0.0270, 0.0170), SKIN),
-    Ball((0.000, 1.572, 0.1000), (0.0110, 0.0260, 0.0120), SKIN, twice=False),
-    Ball((0.000, 1.560, 0.1060), (0.0150, 0.0110, 0.0170), SKIN, twice=False),
-    Ball((0.000, 1.527, 0.0980), (0.0220, 0.0040, 0.0085), DARK, twice=False),
+FINGERS = (
+    Finger((0.588, -0.003, 0.011), 0.130, 0.0102, 1.0, (8.0, 14.0)),
+    Finger((0.588, -0.003, 0.030), 0.119, 0.0100, 3.0, (7.0, 12.0)),
+    Finger((0.586, -0.003, -0.009), 0.121, 0.0098, -2.0, (9.0, 16.0)),
+    Finger((0.584, -0.003, -0.027), 0.098, 0.0088, -5.0, (10.0, 18.0)),
+    Finger((0.540, -0.008, 0.014), 0.088, 0.0118, 36.0, (14.0, 5.0)),
 )
-"""Eyes, brows, ears, nose and mouth."""
+"""The middle one first, the thumb last."""
+
+PHALANGES = ((0.0, 1.0), (0.45, 1.06), (0.74, 0.95), (0.94, 0.74), (1.0, 0.3))
+"""Of each ring of a finger how far along it is, and how much of the radius it has."""
+
+AROUND = 24
+AROUND_FINGER = 6
+"""Corners of the trunk's rings, the first in front, and of fingers'. Limbs have 16."""
+
+HOLE_ROW = 12
+HOLE_COLUMNS = (4, 16)
+HOLE = 4
+"""Where holes for arms, the left one first, begin in the smoothed trunk; how many squares they are wide and high."""
+
+BRIDGE = np.array([(0.22, -0.018), (0.48, -0.026), (0.74, -0.020)])
+"""Of corners from the trunk's lowest ring in front to the one behind how far along they are, and how far above."""
+
+SLOPE = np.radians(50.0)
+"""How far arms hang as they are shaped."""
+
+SHOULDER = T_POSE[HUMANOID.index("leftUpperArm")]
+DOWN_ARM = np.array([[np.cos(SLOPE), -np.sin(SLOPE), 0.0], [np.sin(SLOPE), np.cos(SLOPE), 0.0], [0.0, 0.0, 1.0]])
+"""The axes of the left arm as it is shaped: along it, over it, and in front."""
+
+SPINE = ("hips", "spine", "chest", "upperChest", "neck", "head")
+
+Numbers = NDArray[np.intp]
+
+BAND_AT_ARM = 0.535
+BAND_AT_LEG = 0.12
+BAND = 0.025
+"""Where bands are, from the shoulder on and over the ground, and half of their width."""
+
+COARSE_PATCHES = 5
+"""Of the coarsest body: trunk, legs and arms without fingers."""
+
+SMOOTH = 6
+"""How often weights even out between neighbours."""
 
 
-Chain = tuple[tuple[int, float, float], ...]
-"""Joints that carry a surface along an axis, as :func:`shared` takes them."""
+class Patch(NamedTuple):
+    """Rings (R, C) of numbered corners; which squares (R - 1, C) from a ring to the next are drawn; and whether the
+    first ring and the last one are closed."""
+
+    grid: Numbers
+    is_drawn: NDArray[np.bool_]
+    closes: tuple[bool, bool]
+
+
+class Limb(NamedTuple):
+    """Rings (R, C, 3) on the left side; of each (R,), or all (1,), the bone without its side, and whether it is in a
+    band."""
+
+    rings: Array
+    bones: NDArray[np.str_]
+    in_band: NDArray[np.bool_]
+
+
+class Corners:
+    """Corners as they are numbered: lists of their places, joints and parts."""
+
+    def __init__(self) -> None:
+        self.places = np.zeros((0, 3))
+        self.bones = np.zeros(0, np.intp)
+        self.parts = np.zeros(0, np.intp)
+
+    def add(self, rings: Array, bones: Numbers, parts: Numbers) -> Numbers:
+        """Number rings (R, C, 3), with joints and parts that go with (R, C): their numbers (R, C)."""
+        size = rings.shape[:2]
+        numbers = len(self.places) + np.arange(size[0] * size[1]).reshape(size)
+        self.places = np.concatenate([self.places, rings.reshape(-1, 3)])
+        self.bones = np.append(self.bones, np.broadcast_to(bones, size))
+        self.parts = np.append(self.parts, np.broadcast_to(parts, size))
+        return numbers
 
 
 @cache
-def human_mesh(detail: float = 1.0) -> Mesh:
+def human_mesh(level: int = 0) -> Mesh:
     """The body on the humanoid in its T-pose: metres, y up, facing z, the soles at y = 0.
 
-    detail: how many of the corners and rings there are: 1 is the whole body; below .5 it has no face and no thumbs.
+    level: 0 is the whole body; 1 and 2 have a half and a quarter of its corners around and along.
     """
-    meshes = [_trunk(detail), _neck(detail), *_head(detail)]
+    mesh, patches = _whole()
+    places = mesh.places.copy()
+    triangles = []
+    for patch in patches[: None if level < 2 else COARSE_PATCHES]:
+        step = min(2**level, patch.grid.shape[1] // 3)
+        kept = patch.grid[:: 2**level, ::step]
+        triangles.append(patch_triangles(kept, patch.is_drawn[:: 2**level, ::step], patch.closes))
+        # those of two patches are the trunk's
+        rings = kept if patch is patches[0] else kept[1:]
+        places[rings] = _wider(mesh.places[rings])
+    used, numbers = np.unique(np.concatenate(triangles), return_inverse=True)
+    return Mesh(places[used], numbers.reshape(-1, 3), mesh.joints[used], mesh.weights[used], mesh.parts[used])
+
+
+def _wider(rings: Array) -> Array:
+    """Rings (R, C, 3) that take as much room as if they had many corners."""
+    angle = 2 * np.pi / rings.shape[1]
+    middles = rings.mean(axis=1, keepdims=True)
+    wider: Array = middles + np.sqrt(angle / np.sin(angle)) * (rings - middles)
+    return wider
+
+
+@cache
+def _whole() -> tuple[Mesh, list[Patch]]:
+    """The whole body, and the rings that it is made of, those of the trunk first."""
+    corners = Corners()
+    patches = _patches(corners)
+    triangles = np.concatenate([patch_triangles(patch.grid, patch.is_drawn, patch.closes) for patch in patches])
+    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], SMOOTH)
+    return _with_arms_up(Mesh(corners.places, triangles, joints, weights, corners.parts)), patches
+
+
+def _patches(corners: Corners) -> list[Patch]:
+    """Number the corners of all rings: of the trunk, of legs and arms, and of fingers."""
+    trunk = _trunk(corners)
+    leg = _leg(corners.places[_hip(trunk)])
+    arm = _arm(corners.places[_shoulder(trunk)])
+    patches = [Patch(trunk, _without_holes(trunk), (False, True))]
     for side in LEFT_RIGHT:
-        meshes += _limbs(side, detail)
-    return together(meshes)
+        on_side = trunk if side == "left" else trunk[:, -np.arange(AROUND)]
+        patches.append(_limb(corners, leg, side, _hip(on_side)))
+        patches.append(_limb(corners, arm, side, _shoulder(on_side)))
+    for finger in map(_finger, FINGERS):
+        patches += [_limb(corners, finger, side) for side in LEFT_RIGHT]
+    return patches
 
 
-def _chain(*links: tuple[str, float, float]) -> Chain:
-    """Bones of the humanoid with where each begins to carry and the length of its transition."""
-    return tuple((HUMANOID.index(name), start, length) for name, start, length in links)
+def _trunk(corners: Corners) -> Numbers:
+    """Number the trunk's rings (R, C), and after them a bridge from front to back through the crotch."""
+    rings = smoothed(_spanned(TRUNK, *ring(AROUND, 2.3).T))
+    trunk = corners.add(rings, _bones_of_trunk(rings), np.array(BODY))
+    front = rings[0, 0]
+    bridge = front + BRIDGE[:, :1] * (rings[0, AROUND // 2] - front) + BRIDGE[:, 1:] * [0.0, 1.0, 0.0]
+    corners.add(bridge[None], np.array(HUMANOID.index("hips")), np.array(BODY))
+    return trunk
 
 
-def _carried(surface: Surface, along: Array, chain: Chain, part: int) -> Mesh:
-    """A surface that a chain of joints carries, by how far along it each of its corners (V,) is; see :func:`shared`."""
-    places, triangles = surface
-    joints, weights = shared(along, chain)
-    return Mesh(places, triangles, joints, weights, np.full(len(places), part))
+def _limb(corners: Corners, limb: Limb, side: str, start: Numbers | None = None) -> Patch:
+    """Number a limb's rings on a side, which go on from a ring of the trunk or are closed."""
+    sign = 1 if side == "left" else -1
+    bones = np.array([HUMANOID.index(sided(side, bone)) for bone in limb.bones])[:, None]
+    parts = np.where(limb.in_band, BANDS[side], BODY)[:, None]
+    grid = corners.add(limb.rings * [sign, 1, 1], bones, parts)
+    if start is not None:
+        grid = np.vstack([start, grid])
+    # mirrored rings go round the other way from the same corner
+    grid = grid[:, sign * np.arange(grid.shape[1])]
+    return Patch(grid, grid[1:] >= 0, (start is None, True))
 
 
-def _along(axis: int, rings: Array, chain: Chain, part: int) -> Mesh:
-    """A loft that a chain of joints carries, along an axis."""
-    surface = loft(rings)
-    return _carried(surface, surface[0][:, axis], chain, part)
+def _spanned(table: Sequence[Sequence[float]], front: Array, left: Array) -> Array:
+    """Rings (R, C, 3) of a table like TRUNK or LEG, from how far each corner (C,) is in front and to the left."""
+    front_y, front_z, back_y, back_z, half, middle_x = np.array(table).T[..., None]
+    x = middle_x + half * left
+    y = (front_y + back_y + (front_y - back_y) * front) / 2
+    z = (front_z + back_z + (front_z - back_z) * front) / 2
+    return np.stack([x, y, z], axis=-1)
 
 
-def _rings(corners: int, power: float, across: tuple[int, int], rows: Sequence[Array | float], detail: float) -> Array:
-    """Rings (R, C, 3) in planes that two axes span.
+def _bones_of_trunk(rings: Array) -> Numbers:
+    """The joint of each corner (R, C): by its ring's height one of the spine, beside it a collar bone or a leg."""
+    spine = np.array([HUMANOID.index(name) for name in SPINE])
+    on_spine = np.searchsorted(T_POSE[spine[1:], 1], rings[..., 1].mean(axis=1), "right")
+    bones = np.repeat(spine[on_spine][:, None], rings.shape[1], axis=1)
+    x, y, _ = np.moveaxis(rings, -1, 0)
+    for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
+        bones[(sign * x > 0.04) & (y > 1.31) & (y < 1.47)] = HUMANOID.index(sided(side, "Shoulder"))
+        bones[(sign * x > 0.04) & (y < 0.92)] = HUMANOID.index(sided(side, "UpperLeg"))
+    return bones
 
-    rows: x, y and z of each ring's middle and its two half axes, each (R,) or one number.
-    """
-    # as many rings and corners as the detail asks for
-    least = 4 if detail >= 0.3 else 3
-    corners = max(least, 2 * round(corners * detail / 2))
-    columns = np.stack(np.broadcast_arrays(*rows), axis=1)
-    count = max(least, round(len(columns) * detail))
-    columns = columns[np.linspace(0, len(columns) - 1, count).round().astype(int)]
-    # coarse rings are widened until they take as much room as fine ones
-    outline = ring(corners, power)
-    outline = outline * np.sqrt(_area(ring(64, power)) / _area(outline))
-    rings = np.repeat(columns[:, None, :3], corners, axis=1)
-    rings[:, :, across] += outline * columns[:, None, 3:]
+
+def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
+    """Which squares of the trunk are drawn."""
+    is_drawn = np.full((len(trunk) - 1, AROUND), True)
+    for column in HOLE_COLUMNS:
+        is_drawn[HOLE_ROW : HOLE_ROW + HOLE, column : column + HOLE] = False
+    return is_drawn
+
+
+def _hip(trunk: Numbers) -> Numbers:
+    """Corners (16,) that a left leg begins with: half of the lowest ring from the back, and the bridge."""
+    return np.append(trunk[0, AROUND // 2 :: -1], trunk.size + np.arange(len(BRIDGE)))
+
+
+def _shoulder(trunk: Numbers) -> Numbers:
+    """Corners (16,) that a left arm begins with: the hole's border from its upper end at the back, over the top."""
+    rows = trunk[HOLE_ROW : HOLE_ROW + HOLE + 1, HOLE_COLUMNS[0] : HOLE_COLUMNS[0] + HOLE + 1]
+    return np.concatenate([rows[-1, :0:-1], rows[:0:-1, 0], rows[0, :-1], rows[:-1, -1]])
+
+
+def _leg(start: Array) -> Limb:
+    """The leg from corners (16, 3) of the trunk on: its rings begin behind, and go round by the outer side."""
+    outline = np.roll(ring(len(start), 2.2), 6, axis=0)
+    rings = smoothed(np.concatenate([start[None], _spanned(LEG, outline[:, 1], outline[:, 0])]))[1:]
+    _, height, ahead = rings.mean(axis=1).T
+    bones = np.array(["UpperLeg", "LowerLeg", "Foot"])[np.searchsorted([-0.5, -0.08], -height)]
+    bones[ahead > 0.13] = "Toes"
+    return Limb(rings, bones, np.abs(height - BAND_AT_LEG) < BAND)
+
+
+def _arm(start: Array) -> Limb:
+    """The arm and the palm from corners (16, 3) of the trunk on: its rings begin behind, and go round over the top."""
+    up, ahead = np.roll(ring(len(start), 2.2), 2, axis=0).T
+    along, over, under, front, back = np.array(ARM).T[..., None]
+    height = np.where(up > 0, over, -under) * up
+    depth = np.where(ahead > 0, front, -back) * ahead
+    rings = _hanging(np.stack(np.broadcast_arrays(along, height, depth), axis=-1))
+    rings = smoothed(np.concatenate([start[None], rings]))[1:]
+    reach = (rings.mean(axis=1) - SHOULDER) @ DOWN_ARM[0]
+    bones = np.array(["UpperArm", "LowerArm", "Hand"])[np.searchsorted([0.28, 0.53], reach)]
+    return Limb(rings, bones, np.abs(reach - BAND_AT_ARM) < BAND)
+
+
+def _hanging(places: Array) -> Array:
+    """Places (..., 3) of how far along the arm, over it, and in front."""
+    hanging: Array = SHOULDER + places @ DOWN_ARM
+    return hanging
+
+
+def _finger(finger: Finger) -> Limb:
+    """A chain of bones, each more curled than the one before."""
+    share, wide = np.array(PHALANGES).T[..., None]
+    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(PHALANGES)))[:, None]
+    aside = np.radians(finger.aside)
+    way = np.cos(curl) * [np.cos(aside), 0.0, np.sin(aside)] - [0.0, 1.0, 0.0] * np.sin(curl)
+    middles = finger.start + np.cumsum(np.diff(share, axis=0, prepend=0.0) * finger.length * way, axis=0)
+    # rings at right angles to its way
+    sideways = np.array([-np.sin(aside), 0.0, np.cos(aside)])
+    rings = _hanging(_rings_around(middles, np.cross(sideways, way), sideways, finger.radius * wide))
+    return Limb(rings, np.array(["Hand"]), np.array([False]))
+
+
+def _rings_around(middles: Array, upward: Array, sideways: Array, radii: Array) -> Array:
+    """Rings (R, 6, 3) around middles (R, 3) in planes that two axes (R, 3) and (3,) span, with radii (R, 1)."""
+    up, side = ring(AROUND_FINGER).T[..., None]
+    rings: Array = middles[:, None] + radii[:, None] * (up * upward[:, None] + side * sideways)
     return rings
 
 
-def _area(outline: Array) -> float:
-    """Twice the area within a ring (C, 2)."""
-    edges = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
-    area: float = np.linalg.det(edges).sum()
-    return area
-
-
-def _trunk(detail: float) -> Mesh:
-    height, wide, front, back = np.array(TRUNK).T
-    rings = _rings(16, 2.4, (2, 0), [0.0, height, (front - back) / 2, (front + back) / 2, wide], detail)
-    spine = _chain(("hips", 0.0, 0.10), ("spine", 1.07, 0.10), ("chest", 1.17, 0.10), ("upperChest", 1.27, 0.10))
-    mesh = _along(1, rings, spine, SHIRT)
-    mesh.parts[mesh.places[:, 1] < BELT] = TROUSERS
-    _share_with_collar_bones(mesh)
-    return mesh
-
-
-def _share_with_collar_bones(mesh: Mesh) -> None:
-    """Towards the shoulders they carry more of the chest, in place: recorded ones often slope by 40 degrees."""
-    x = mesh.places[:, 0]
-    share = eased((np.abs(x) - 0.03) / 0.10) * eased((mesh.places[:, 1] - 1.29) / 0.09)
-    weights = np.stack([1 - share, share], axis=1)
-    for bone, is_on_side in (("leftShoulder", x > 0), ("rightShoulder", x < 0)):
-        near = is_on_side & (share > 0)
-        mesh.joints[near] = [HUMANOID.index("upperChest"), HUMANOID.index(bone)]
-        mesh.weights[near] = weights[near]
-
-
-def _neck(detail: float) -> Mesh:
-    height, radius, front = np.array(NECK).T
-    rings = _rings(10, 2.0, (2, 0), [0.0, height, front, radius, radius], detail)
-    return _along(1, rings, _chain(("upperChest", 0.0, 0.0), ("neck", 1.46, 0.04), ("head", 1.53, 0.05)), SKIN)
-
-
-def _head(detail: float) -> list[Mesh]:
-    """The skull and the hair, and unless the detail is low the face."""
-    height, wide, front, back = np.array(HEAD).T
-    skull = _rings(14, 2.3, (2, 0), [0.0, height, (front + back) / 2, (front - back) / 2, wide], detail)
-    head = _chain(("head", 0.0, 0.0))
-    if detail < 0.5:
-        return [_along(1, skull, head, SKIN), _along(1, _hair(skull)[::3], head, DARK)]
-    meshes = [_along(1, skull, head, SKIN), _along(1, _hair(skull), head, DARK)]
-    for ball in FACE:
-        for sign in (1, -1) if ball.twice else (1,):
-            rings = _ellipsoid(np.array(ball.middle) * [sign, 1, 1], np.array(ball.half))
-            meshes.append(_along(1, rings, head, ball.part))
-    return meshes
-
-
-def _hair(head: Array, thick: float = 1.075) -> Array:
-    """Rings (R, C, 3) around the head's (K, C, 3): from the hairline, which is low behind and high in front, up."""
-    angles = np.arange(head.shape[1]) * 2 * np.pi / head.shape[1]  # 0 in front
-    hairline = 1.604 + 0.056 * np.cos(angles) + 0.010 * np.cos(2 * angles)
-    crown = head[-1, 0, 1]
-    rings = []
-    for share in (0.0, 0.02, 0.25, 0.5, 0.72, 0.88, 0.97, 1.0):
-        heights = hairline + (crown - hairline) * share
-        # the lowest ring is within the head, so that no gap shows under the hair
-        wide = thick if share else 0.9
-        x = _at_heights(head, heights, 0)
-        z = _at_heights(head, heights, 2)
-        rings.append(np.stack([x * wide, heights + 0.008 * bool(share) + 0.004 * share, z * wide], axis=1))
-    return np.array(rings)
-
-
-def _at_heights(head: Array, heights: Array, axis: int) -> Array:
-    """Where the lines up the head (K, C, 3) are along an axis at a height each (C,)."""
-    return np.array([np.interp(y, head[:, n, 1], head[:, n, axis]) for n, y in enumerate(heights)])
-
-
-def _ellipsoid(middle: Array, half: Array, corners: int = 6) -> Array:
-    """Rings (4, C, 3) around an ellipsoid."""
-    turns = np.linspace(-0.43, 0.43, 4) * np.pi
-    flat = ring(corners)[None] * np.cos(turns)[:, None, None]
-    heights = np.repeat(np.sin(turns)[:, None], corners, axis=1)
-    rings: Array = middle + half * np.stack([flat[..., 1], heights, flat[..., 0]], axis=-1)
-    return rings
-
-
-def _limbs(side: str, detail: float) -> list[Mesh]:
-    """Arm, hand, thumb, leg, shoe and yoke of a side: of the right one mirrored."""
-    meshes = [*_arm(side, detail), _leg(side, detail), _shoe(side, detail)]
-    if detail >= 0.3:
-        shoulder = _chain((sided(side, "Shoulder"), 0.0, 0.0))
-        meshes.append(_along(0, _beside_arm(10, 2.0, YOKE, detail), shoulder, SHIRT))
-    return meshes if side == "left" else list(map(_mirrored, meshes))
-
-
-def _arm(side: str, detail: float) -> list[Mesh]:
-    """Sleeve, hand, and unless the detail is low the thumb."""
-    x, tall, deep = np.array(ARM).T
-    sleeve = _rings(10, 2.0, (1, 2), [x, ARM_Y, 0.0, tall, deep], detail)
-    hand = sided(side, "Hand")
-    arm = _chain((sided(side, "UpperArm"), 0.0, 0.0), (sided(side, "LowerArm"), 0.45, 0.07), (hand, 0.70, 0.04))
-    glove = GLOVES_AND_SHOES[side]
-    meshes = [_along(0, sleeve, arm, SHIRT), _along(0, _beside_arm(8, 2.5, HAND, detail), arm, glove)]
-    if detail >= 0.5:
-        meshes.append(_along(0, _thumb(detail), _chain((hand, 0.0, 0.0)), glove))
-    return meshes
-
-
-def _beside_arm(corners: int, power: float, table: tuple[tuple[float, ...], ...], detail: float) -> Array:
-    """Rings around x, whose table says how high each is over the arm."""
-    x, tall, deep, above = np.array(table).T
-    return _rings(corners, power, (1, 2), [x, ARM_Y + above, 0.0, tall, deep], detail)
-
-
-def _leg(side: str, detail: float) -> Mesh:
-    height, wide, deep, front = np.array(LEG).T
-    surface = loft(_rings(10, 2.1, (0, 2), [LEG_X, height, front, wide, deep], detail))
-    upper_leg = (sided(side, "UpperLeg"), -9.0, 0.0)
-    leg = _chain(upper_leg, (sided(side, "LowerLeg"), -0.50, 0.10), (sided(side, "Foot"), -0.09, 0.05))
-    return _carried(surface, -surface[0][:, 1], leg, TROUSERS)  # from the hip down
-
-
-def _thumb(detail: float) -> Array:
-    """Rings around the thumb's axis, in planes across x."""
-    share, radius = np.array(THUMB).T
-    middles = THUMB_FROM + share[:, None] * (THUMB_TO - THUMB_FROM)
-    return _rings(6, 2.0, (1, 2), [*middles.T, radius, 1.3 * radius], detail)
-
-
-def _shoe(side: str, detail: float) -> Mesh:
-    z, wide, low, high = np.array(SHOE).T
-    rings = _rings(10, 2.8, (0, 1), [LEG_X, (low + high) / 2, z, wide, (high - low) / 2], detail)
-    foot = _chain((sided(side, "Foot"), 0.0, 0.0), (sided(side, "Toes"), 0.13, 0.05))
-    return _along(2, rings, foot, GLOVES_AND_SHOES[side])
-
-
-def _mirrored(mesh: Mesh) -> Mesh:
-    """The mesh on the other side of x = 0."""
-    return replace(mesh, places=mesh.places * [-1, 1, 1], triangles=mesh.triangles[:, ::-1])
+def _with_arms_up(mesh: Mesh) -> Mesh:
+    """The mesh in the T-pose, whose joints bring it back to where it was shaped when arms hang by SLOPE."""
+    places = mesh.places
+    for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
+        arm = [HUMANOID.index(sided(side, bone)) for bone in ("UpperArm", "LowerArm", "Hand")]
+        share = (mesh.weights * np.isin(mesh.joints, arm)).sum(axis=1)
+        shoulder = SHOULDER * [sign, 1, 1]
+        hangs = DOWN_ARM.T * np.outer([1, sign, 1], [1, sign, 1])
+        mixed = np.eye(3) + share[:, None, None] * (hangs - np.eye(3))
+        places = np.linalg.solve(mixed, (places - shoulder)[..., None])[..., 0] + shoulder
+    return replace(mesh, places=places)

@@ -1,8 +1,8 @@
 """Write a motion as a looping animated GIF: a figure on a ground, the camera beside it. Pillow draws and packs it.
 
 GIF delays are whole hundredths of a second, and viewers slow down those under 2. So the picture rate is the motion's
-if that gives a whole delay of at least 4, else 20 per second; either way it plays in real time. Bones are round, the
-ground has squares and a shadow.
+if that gives a whole delay of at least 4, else 20 per second; either way it plays in real time. The body is the
+player's, the ground has squares and a shadow.
 """
 
 import io
@@ -10,7 +10,10 @@ import io
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
-from motet.draw.figure import COLOURS, YAW, Bone, camera_axes, figure_of
+from motet.draw.figure import YAW, camera_axes
+from motet.draw.mesh import Mesh, normals_of
+from motet.draw.skinned import skinned
+from motet.draw.svg import SUN, lit
 from motet.files import File, write_whole
 from motet.motion.motion import Motion, resampled
 from motet.motion.rotations import Array
@@ -21,26 +24,21 @@ BACK = (232, 235, 241)
 LINES = (150, 158, 176)
 SHADE = (166, 172, 186)
 
-LIGHT = np.array([0.35, 1.0, 0.45])
-"""Towards the light."""
-
-ANGLES = np.arange(12) * np.pi / 6
-CIRCLE = np.stack([np.cos(ANGLES), 0 * ANGLES, np.sin(ANGLES)], axis=1)
-"""On the ground."""
-
 DRAWN_LARGER = 3
 """Pictures are drawn larger by this factor and scaled down, for smooth edges."""
 
 
 def write(file: File, motion: Motion, size: int = 320) -> None:
     """Write a square GIF of ``size`` pixels; MotionError for a motion without skeleton or frames."""
-    figure = figure_of(motion)
+    figure = skinned(motion)
     delay = delay_of(figure.fps)
-    points = resampled(figure.points, figure.fps * delay / 100)
+    # corners go straight from frame to frame where turns and places do
+    turns, places = (resampled(values, figure.fps * delay / 100) for values in figure.frames())
     stage = Stage(size, figure.heading + YAW)
-    targets = _targets(points[:, 0, ::2], 100 / delay)
-    pictures = (stage.picture(pose, figure.bones, target) for pose, target in zip(points, targets, strict=True))
-    first = next(pictures).quantize(64)
+    targets = _targets(places[:, 0, ::2], 100 / delay)
+    bodies = map(figure.corners, turns, places)
+    pictures = (stage.picture(figure.mesh, body, target) for body, target in zip(bodies, targets, strict=True))
+    first = next(pictures).quantize(128)
     rest = (picture.quantize(palette=first, dither=Image.Dither.NONE) for picture in pictures)
     content = io.BytesIO()
     first.save(content, "GIF", save_all=True, append_images=rest, duration=10 * delay, loop=0, optimize=False)
@@ -72,19 +70,26 @@ class Stage:
         self.pixels = size * DRAWN_LARGER
         self.axes = camera_axes(yaw)
 
-    def picture(self, points: Array, bones: tuple[Bone, ...], target: Array) -> Image.Image:
-        """The points (P, 3), in heights, joined by bones, with the camera at ``target`` (x, z) on the ground."""
+    def picture(self, mesh: Mesh, corners: Array, target: Array) -> Image.Image:
+        """A mesh with corners (V, 3), in heights, and the camera at ``target`` (x, z) on the ground."""
         image = Image.new("RGB", (self.pixels, self.pixels), BACK)
         draw = ImageDraw.Draw(image)
-        local = points - [target[0], 0.0, target[1]]
+        local = corners - [target[0], 0.0, target[1]]
         self._draw_ground(draw, target)
-        image.paste(SHADE, mask=self._shadow(local, bones))
-        # bones from the furthest to the nearest
-        screen, scale = self._seen(local)
-        for bone in sorted(bones, key=lambda bone: float(scale[bone.start] + scale[bone.end])):
-            ends = [bone.start, bone.end]
-            _draw_bone(draw, screen[ends], np.array([bone.start_radius, bone.end_radius]) * scale[ends], bone.side)
+        normals = normals_of(corners, mesh.triangles)[mesh.triangles[:, 0]]
+        image.paste(SHADE, mask=self._shadow(local[mesh.triangles[normals @ SUN > -0.3]]))
+        self._draw_body(draw, mesh, corners, *self._seen(local))
         return image.resize((self.size, self.size), Image.Resampling.BOX)
+
+    def _draw_body(self, draw: ImageDraw.ImageDraw, mesh: Mesh, corners: Array, screen: Array, scale: Array) -> None:
+        """The triangles that face the camera, from the furthest to the nearest."""
+        seen = screen[mesh.triangles]
+        order = np.argsort(scale[mesh.triangles].sum(axis=1))
+        is_facing = np.linalg.det(np.diff(seen, axis=1)) < 0
+        shown = order[is_facing[order]]
+        inks = lit(mesh, corners)[shown].astype(int)
+        for triangle, ink in zip(seen[shown].reshape(-1, 6).tolist(), inks.tolist(), strict=True):
+            draw.polygon(triangle, fill=tuple(ink))
 
     def _seen(self, places: Array) -> tuple[Array, Array]:
         """Pixels (N, 2) where places (N, 3) from the target are seen, and how many pixels a height has there (N,).
@@ -113,41 +118,14 @@ class Stage:
         for start, end, share in zip(pixels[:-1], pixels[1:], shares.tolist(), strict=True):
             draw.line([*start, *end], fill=_mixed(BACK, LINES, share), width=DRAWN_LARGER - 1)
 
-    def _shadow(self, points: Array, bones: tuple[Bone, ...]) -> Image.Image:
-        """How much of a shadow there is at each pixel."""
-        mask = Image.new("L", (self.pixels, self.pixels))
+    def _shadow(self, triangles: Array) -> Image.Image:
+        """How much of a shadow of triangles (F, 3, 3) there is at each pixel."""
+        mask = Image.new("L", (self.size, self.size))
         draw = ImageDraw.Draw(mask)
-        flat = points - points[:, 1:2] * LIGHT / LIGHT[1]
-        for bone in bones:
-            start = self._disc(flat[bone.start], bone.start_radius)
-            end = self._disc(flat[bone.end], bone.end_radius)
-            for i in range(len(start)):
-                draw.polygon([start[i - 1], start[i], end[i], end[i - 1]], fill=255)
-            draw.polygon(start, fill=255)
-            draw.polygon(end, fill=255)
-        return mask.filter(ImageFilter.GaussianBlur(self.pixels / 160))
-
-    def _disc(self, middle: Array, radius: float) -> list[tuple[float, ...]]:
-        """Pixels around a disc that lies on the ground."""
-        return list(map(tuple, self._seen(middle + radius * CIRCLE)[0].tolist()))
-
-
-def _draw_bone(draw: ImageDraw.ImageDraw, ends: Array, radii: Array, side: str) -> None:
-    """A round bone between pixels (2, 2): a rim, the side, and what faces the light."""
-    for share, light in ((1.0, 0.68), (0.82, 0.86), (0.5, 1.0)):
-        lifted = ends - np.array([0.25, 0.3]) * ((1 - share) * radii)[:, None]
-        _draw_capsule(draw, lifted, share * radii, _mixed((0, 0, 0), COLOURS[side], light))
-
-
-def _draw_capsule(draw: ImageDraw.ImageDraw, ends: Array, radii: Array, colour: Colour) -> None:
-    """Two discs at ``ends`` (2, 2), and all between them."""
-    way = ends[1] - ends[0]
-    beside = np.array([-way[1], way[0]]) / max(float(np.hypot(*way)), 1e-9)
-    a, b = map(tuple, (ends + beside * radii[:, None]).tolist())
-    c, d = map(tuple, (ends - beside * radii[:, None]).tolist())
-    draw.polygon([a, b, d, c], fill=colour)
-    for (x, y), radius in zip(ends.tolist(), radii.tolist(), strict=True):
-        draw.ellipse([x - radius, y - radius, x + radius, y + radius], fill=colour)
+        flat = triangles - triangles[..., 1:2] * SUN / SUN[1]
+        for triangle in (self._seen(flat.reshape(-1, 3))[0] / DRAWN_LARGER).reshape(-1, 6).tolist():
+            draw.polygon(triangle, fill=255)
+        return mask.filter(ImageFilter.GaussianBlur(self.size / 160)).resize((self.pixels, self.pixels))
 
 
 def _mixed(under: Colour, over: Colour, part: float) -> Colour:

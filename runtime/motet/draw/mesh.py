@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ class Mesh:
     """A skinned surface of V corners and F triangles.
 
     places: (V, 3) at rest. triangles: (F, 3) corners, counterclockwise from outside.
-    joints, weights: (V, 2) which joints carry a corner, and how much of it; a corner's weights add up to 1.
+    joints, weights: (V, K) which K joints carry a corner, and how much of it; a corner's weights add up to 1.
     parts: (V,) of what a corner is a part, which gives its colour.
     """
 
@@ -32,6 +31,13 @@ class Mesh:
     def normals(self) -> Array:
         """Normals (V, 3) at rest, see :func:`normals_of`."""
         return normals_of(self.places, self.triangles)
+
+    @property
+    def shares(self) -> Array:
+        """The weights (V, K) as whole numbers that add up to 255."""
+        shares = np.round(255 * self.weights)
+        shares[:, 0] += 255 - shares.sum(axis=1)
+        return shares
 
     def carried(self, turned: Array, moved: Array) -> Array:
         """The corners (V, 3) as joints bring them to x -> turned x + moved: matrices (J, 3, 3), vectors (J, 3)."""
@@ -71,17 +77,37 @@ def loft(rings: Array) -> Surface:
 
     A ring goes counterclockwise as seen from the ring after it. The first and the last are closed.
     """
-    count, around = rings.shape[:2]
-    corner = np.arange(around)
+    numbers = np.arange(rings[..., 0].size).reshape(rings.shape[:2])
+    return rings.reshape(-1, 3), patch_triangles(numbers, numbers[1:] >= 0, (True, True))
+
+
+def patch_triangles(grid: NDArray[np.intp], is_drawn: NDArray[np.bool_], closes: tuple[bool, bool]) -> NDArray[np.intp]:
+    """Triangles (F, 3) of a surface through rings (R, C) of numbered corners, as of :func:`loft`.
+
+    is_drawn: (R - 1, C) from which corners a square leads to the next ring. closes: whether the first ring and the last
+    one are closed.
+    """
     # between a ring and the next each corner has two triangles with the one beside it
-    start = around * np.arange(count - 1)[:, None]
-    below = (start + corner).reshape(-1)
-    beside = (start + (corner + 1) % around).reshape(-1)
-    sides = np.stack([below, beside, beside + around, below, beside + around, below + around], axis=1).reshape(-1, 3)
+    beside = np.roll(grid, -1, axis=1)
+    sides = np.stack([grid[:-1], beside[:-1], beside[1:], grid[:-1], beside[1:], grid[1:]], axis=-1)
+    triangles = [sides[is_drawn].reshape(-1, 3)]
     # the first and the last ring are fans around their first corners
-    fan = np.stack([0 * corner[1:-1], corner[1:-1], corner[2:]], axis=1)
-    triangles = np.concatenate([fan[:, ::-1], sides, fan + (count - 1) * around])
-    return rings.reshape(-1, 3), triangles
+    for ends, is_closed in zip((grid[0, ::-1], grid[-1]), closes, strict=True):
+        fan = np.stack([np.full(len(ends) - 2, ends[0]), ends[1:-1], ends[2:]], axis=1)
+        triangles.append(fan[: len(fan) * is_closed])
+    return np.concatenate(triangles)
+
+
+def smoothed(rings: Array) -> Array:
+    """Rings (R, C, 3), and between each and the next one that goes on smoothly: (2 R - 1, C, 3).
+
+    By the four-point rule of Dyn, Levin and Gregory 1987.
+    """
+    before = 2 * rings[:1] - rings[1:2]
+    after = 2 * rings[-1:] - rings[-2:-1]
+    padded = np.concatenate([before, rings, after])
+    between = (9 * (padded[1:-2] + padded[2:-1]) - padded[:-3] - padded[3:]) / 16
+    return np.insert(rings, np.arange(1, len(rings)), between, axis=0)
 
 
 def ring(corners: int, power: float = 2.0) -> Array:
@@ -92,23 +118,33 @@ def ring(corners: int, power: float = 2.0) -> Array:
     return corners_on_it
 
 
-def shared(at: Array, chain: Sequence[tuple[int, float, float]]) -> tuple[NDArray[np.intp], Array]:
-    """Which joints (V, 2) of a chain carry corners, with weights (V, 2), by how far along the chain they are (V,).
+def smooth_weights(
+    joints: NDArray[np.intp], grids: Sequence[NDArray[np.intp]], times: int
+) -> tuple[NDArray[np.intp], Array]:
+    """The three joints that carry corners most, and their weights: both (V, 3).
 
-    chain: of each joint its index, from where on it carries, and over which length it takes over from the one before.
+    joints: (V,) of each corner its only joint at first. grids: rings (R, C) of corners, which are neighbours along and
+    across them. times: how often weights are evened out between neighbours.
     """
-    joints = np.full((len(at), 2), chain[0][0])
-    weights = np.tile([1.0, 0.0], (len(at), 1))
-    for (before, _, _), (joint, start, length) in pairwise(chain):
-        share = eased((at - start) / length + 0.5)
-        taken = share > 0
-        joints[taken] = [before, joint]
-        weights[taken] = np.stack([1 - share, share], axis=1)[taken]
-    return joints, weights
+    neighbours = np.unique(np.concatenate(list(map(_neighbours, grids))), axis=0)
+    first = np.searchsorted(neighbours[:, 0], np.arange(len(joints)))
+    weights = np.eye(joints.max() + 1)[joints]
+    for _ in range(times):
+        sums = np.add.reduceat(weights[neighbours[:, 1]], first, axis=0)
+        weights = (weights + sums / sums.sum(axis=1, keepdims=True)) / 2
+    return _largest(weights)
 
 
-def eased(part: Array) -> Array:
-    """From 0 to 1 as a number goes from 0 to 1, slowly at both ends."""
-    within = np.clip(part, 0.0, 1.0)
-    smooth: Array = within * within * (3 - 2 * within)
-    return smooth
+def _neighbours(grid: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Pairs (E, 2) of neighbours in a grid (R, C), each both ways."""
+    along = np.stack([grid, np.roll(grid, 1, axis=1)])
+    across = np.stack([grid[:-1], grid[1:]])
+    pairs = np.concatenate([along.reshape(2, -1), across.reshape(2, -1)], axis=1).T
+    return np.concatenate([pairs, pairs[:, ::-1]])
+
+
+def _largest(weights: Array) -> tuple[NDArray[np.intp], Array]:
+    """Of weights (V, J) the three largest of each corner: their joints and they, both (V, 3), with a sum of 1."""
+    most = np.argsort(-weights, axis=1, kind="stable")[:, :3]
+    largest = np.take_along_axis(weights, most, axis=1)
+    return np.where(largest > 0, most, 0), largest / largest.sum(axis=1, keepdims=True)

@@ -2,8 +2,8 @@
 
 A motion is written as one HTML page with a player: no network, no other file, any browser with WebGL 2. The page is
 ``player.html`` with bodies and figures inserted as JSON; arrays are base64 of little-endian bytes. A body is a mesh
-(:mod:`motet.draw.mesh`) in body heights: corners as int16 in steps of ``step``, normals as int8, the weight of a
-corner's first joint as uint8. A figure holds the path of its root as float32 (T, 3); of each joint that turns its
+(:mod:`motet.draw.mesh`) in body heights: corners as int16 in steps of ``step``, normals as int8, the weights of
+a corner's joints as uint8. A figure holds the path of its root as float32 (T, 3); of each joint that turns its
 quaternion x, y, z, w in the parent's frame as int16 (T, N, 4); and of each joint that moves in its parent's frame its
 place there as int16 (T, M, 3) in steps of ``step`` heights.
 """
@@ -27,8 +27,8 @@ from motet.files import File, place_of, write_whole
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 
-COARSER = (0.6, 0.3, 0.22)
-"""How much of the detail coarser bodies of people have."""
+COARSER = (1, 2)
+"""Levels of coarser bodies of people."""
 
 SHORT = 32767
 """The largest int16."""
@@ -118,8 +118,8 @@ def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
     body: dict[str, Any] = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
     if mesh is person():
         finer = body
-        for detail in COARSER:
-            coarse = _mesh_data(person(detail))
+        for level in COARSER:
+            coarse = _mesh_data(person(level))
             finer["coarse"] = coarse
             finer = coarse
     return body
@@ -132,7 +132,7 @@ def _mesh_data(mesh: Mesh) -> dict[str, Any]:
         "places": _text(np.round(mesh.places / step), "<i2"),
         "normals": _text(np.round(mesh.normals * 127), "<i1"),
         "joints": _text(mesh.joints, "<u2"),
-        "weights": _text(np.round(mesh.weights[:, 0] * 255), "<u1"),
+        "weights": _text(mesh.shares, "<u1"),
         "parts": _text(mesh.parts, "<u1"),
         "triangles": _text(mesh.triangles, "<u4"),
     }

@@ -1,14 +1,14 @@
 // Bodies: meshes that joints carry. Corners are moved here, once for a picture and its shadow, not on the graphics card:
 // so a figure costs the same with and without one.
 
-const CLOTHES = { trousers: [70, 78, 98], skin: [232, 200, 176], dark: [58, 52, 54] };
-const SHIRTS = [
-  [112, 148, 190], [196, 140, 120], [134, 168, 130], [170, 146, 190], [202, 172, 110], [110, 168, 172], [188, 128, 150],
-  [142, 150, 166],
+/** The colours of bodies, of which each figure has one. */
+const BODIES = [
+  [168, 179, 198], [203, 168, 154], [160, 186, 162], [184, 169, 202], [205, 189, 150], [148, 186, 190], [202, 164, 178],
+  [176, 178, 182],
 ];
-/** The colours of a body's parts in their order, of which the first is the shirt; and of these and further shirts, from 0 to 1. */
-const PARTS = [SHIRTS[0], CLOTHES.trousers, CLOTHES.skin, COLOURS.left, COLOURS.right, CLOTHES.dark, COLOURS.middle];
-const PALETTE = [...PARTS, ...SHIRTS.slice(1)].flat().map((x) => x / 255);
+/** The colours of a body's parts in their order, of which the first is the body; and of these and further bodies, from 0 to 1. */
+const PARTS = [BODIES[0], COLOURS.left, COLOURS.right, COLOURS.middle];
+const PALETTE = [...PARTS, ...BODIES.slice(1)].flat().map((x) => x / 255);
 
 const CAST = `
 uniform mat4 clip;
@@ -101,16 +101,15 @@ void main() {
 
 /** The numbers of a body out of the page's data, see motet/draw/page.py. coarser: how often it was made coarser. */
 function decodedBody({ rest, coarse, step, places, normals, joints, weights, parts, triangles }, coarser = 0) {
-  const shares = new Uint8Array(bytesOf(weights)), part = new Uint8Array(bytesOf(parts));
+  const part = new Uint8Array(bytesOf(parts)), carriers = new Uint16Array(bytesOf(joints));
   const primitive = {
     positions: Float32Array.from(new Int16Array(bytesOf(places)), (x) => x * step),
     normals: Float32Array.from(new Int8Array(bytesOf(normals))),
-    joints: new Uint16Array(bytesOf(joints)), weights: Float32Array.from({ length: 2 * part.length }, (_, n) => (
-      n % 2 ? 255 - shares[n >> 1] : shares[n >> 1]) / 255),
+    joints: carriers, weights: Float32Array.from(new Uint8Array(bytesOf(weights)), (x) => x / 255),
     parts: part, indices: new Uint32Array(bytesOf(triangles)),
   };
   const simple = coarse ? decodedBody({ rest, ...coarse }, coarser + 1) : null;
-  return { rest, simple, coarser, colours: PARTS, sided: part.includes(3), joints: rest.length, influences: 2, primitives: [primitive] };
+  return { rest, simple, coarser, colours: PARTS, sided: part.includes(1), joints: rest.length, influences: carriers.length / part.length, primitives: [primitive] };
 }
 
 /** A skinned mesh that was handed over, as the stage has bodies. */
@@ -181,22 +180,22 @@ function repeated(values, times, more) {
 function moveCorners(gl, mesh, figures) {
   for (const primitive of mesh.primitives) {
     const room = roomFor(gl, primitive, figures.length), floats = 4 * primitive.positions.length / 3;
-    figures.forEach(({ rows, figure }, n) => blend(primitive, rows, mesh.influences, room, n * floats, shirtOf(figure)));
+    figures.forEach(({ rows, figure }, n) => blend(primitive, rows, mesh.influences, room, n * floats, colourOf(figure)));
     gl.bindBuffer(gl.ARRAY_BUFFER, room.buffers[0]);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, room.floats, 0, figures.length * floats);
   }
 }
 
-/** The colour of a figure's shirt in the palette. */
-function shirtOf({ shirt = 0 }) {
-  const own = shirt % SHIRTS.length;
+/** Which colour of the palette a figure's body has. */
+function colourOf({ colour = 0 }) {
+  const own = colour % BODIES.length;
   return own && PARTS.length - 1 + own;
 }
 
 const mixed = new Float32Array(12);
 
-/** to: where in the room a figure begins. shirt: its colour in the palette. */
-function blend({ positions, normals, joints, weights, parts }, rows, influences, { floats, bytes }, to, shirt) {
+/** to: where in the room a figure begins. own: the colour of its body in the palette. */
+function blend({ positions, normals, joints, weights, parts }, rows, influences, { floats, bytes }, to, own) {
   for (let p = 0, k = 0; p < positions.length; p += 3, k += influences, to += 4) {
     let m = rows, i = 12 * joints[k];
     if (weights[k] !== 1) [m, i] = [mix12(rows, joints, weights, k, influences), 0];
@@ -209,7 +208,7 @@ function blend({ positions, normals, joints, weights, parts }, rows, influences,
     bytes[4 * to + 12] = nx * scale;
     bytes[4 * to + 13] = ny * scale;
     bytes[4 * to + 14] = nz * scale;
-    if (parts) bytes[4 * to + 15] = parts[p / 3] || shirt;
+    if (parts) bytes[4 * to + 15] = parts[p / 3] || own;
   }
 }
 

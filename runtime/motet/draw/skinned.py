@@ -96,9 +96,9 @@ def _on_person(motion: Motion) -> Skinned | None:
 
 
 @cache
-def person(detail: float = 1.0) -> Mesh:
+def person(level: int = 0) -> Mesh:
     """The body of people in heights; see :func:`motet.draw.body.human_mesh`."""
-    mesh = human_mesh(detail)
+    mesh = human_mesh(level)
     return replace(mesh, places=mesh.places / Body(HUMANOID).height)
 
 
@@ -150,13 +150,13 @@ def _on_bones(motion: Motion) -> Skinned:
     turns[:, 0] = global_transforms(motion)[0][:, first]
     moves[:, 0] = figure.points[:, 0]
     rest = body.points(skeleton.rest_positions / body.height)
-    mesh = _mesh_of_bones(body, rest, moves)
+    mesh = mesh_of_bones(body, rest, moves)
     parents = tuple(joint.parent for joint in skeleton.joints)
     scales = np.ones((len(parents), 3))
     return Skinned(mesh, rest[: len(parents)], scales, parents, turns, moves, figure.heading, figure.fps)
 
 
-def _mesh_of_bones(body: Body, rest: Array, moves: Array) -> Mesh:
+def mesh_of_bones(body: Body, rest: Array, moves: Array) -> Mesh:
     """The bones of a body at rest (P, 3). moves: (T, J, 3) places of its joints in their parents' frames."""
     # a bone whose end moves there is stretched: its end goes with that joint
     is_stretched = np.ptp(moves, axis=0).max(axis=-1) > SAME_SPOT
@@ -178,9 +178,8 @@ def _capsule(bone: Bone, rest: Array, end_carrier: int, corners: int = 10) -> Me
     radii = np.repeat([bone.start_radius, bone.end_radius], 3)[:, None, None]
     places, triangles = loft(middles + radii * _unit_rings(rest[bone.end] - rest[bone.start], corners))
     carriers = np.repeat([bone.carriers[0], end_carrier], 3 * corners)
-    joints = np.stack([carriers, carriers], axis=1)
-    weights = np.tile([1.0, 0.0], (len(places), 1))
-    return Mesh(places, triangles, joints, weights, np.full(len(places), PARTS[bone.side]))
+    parts = np.full(len(places), PARTS[bone.side])
+    return Mesh(places, triangles, carriers[:, None], np.ones((len(places), 1)), parts)
 
 
 def _unit_rings(axis: Array, corners: int) -> Array:

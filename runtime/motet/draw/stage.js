@@ -17,14 +17,16 @@ const FIRST_VIEW = { yaw: 40, pitch: 12, zoom: 1 };
 const DISTANCE = 3.4, FOCAL = 2.45, NEAR = 0.2;
 const view = { ...FIRST_VIEW, dirty: true };
 
-/** The camera that looks at a place; yaw of the view is from heading (radians), away adds to its distance. */
-function cameraAt(target, heading, away, width, height) {
+/** The camera that looks at a place; yaw of the view is from heading (radians), away adds to its distance. covered: pixels
+ *  at the lower end that something lies over, above which the place is in the middle. */
+function cameraAt(target, heading, away, width, height, covered = 0) {
   const yaw = heading + view.yaw * Math.PI / 180, pitch = view.pitch * Math.PI / 180;
   const [sinY, cosY, sinP, cosP] = [Math.sin(yaw), Math.cos(yaw), Math.sin(pitch), Math.cos(pitch)];
+  const up = [-sinP * sinY, cosP, -sinP * cosY], distance = (DISTANCE + away) / view.zoom;
+  const focal = FOCAL * Math.min(height - covered, width * 1.1), down = covered / 2 * distance / focal;
   return {
-    target, right: [cosY, 0, -sinY], up: [-sinP * sinY, cosP, -sinP * cosY], toward: [cosP * sinY, sinP, cosP * cosY],
-    distance: (DISTANCE + away) / view.zoom,
-    focal: FOCAL * Math.min(height, width * 1.1), x: width / 2, y: height / 2,
+    target: target.map((x, n) => x - down * up[n]), right: [cosY, 0, -sinY], up, toward: [cosP * sinY, sinP, cosP * cosY],
+    distance, focal, x: width / 2, y: height / 2,
   };
 }
 

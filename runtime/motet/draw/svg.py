@@ -6,19 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.draw.body import DARK, LEFT_PART, MIDDLE_PART, RIGHT_PART, SHIRT, SKIN, TROUSERS
-from motet.draw.figure import COLOURS, YAW, camera_axes
+from motet.draw.body import INKS
+from motet.draw.figure import YAW, camera_axes
 from motet.draw.mesh import Mesh, normals_of
 from motet.draw.skinned import Skinned, person, skinned
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, unit
-from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
-
-CLOTHES = {SHIRT: (112, 148, 190), TROUSERS: (70, 78, 98), SKIN: (232, 200, 176), DARK: (58, 52, 54)}
-INKS = {**CLOTHES, LEFT_PART: COLOURS[LEFT], RIGHT_PART: COLOURS[RIGHT], MIDDLE_PART: COLOURS[MIDDLE]}
-"""The colours of a body's parts, as of the player."""
-
-COLOUR_TABLE = np.array([INKS[part] for part in range(len(INKS))])
 
 SUN = unit(np.array([0.42, 1.0, 0.5]))
 """Towards the sun."""
@@ -47,7 +40,7 @@ def strip(motion: Motion, poses: int = 5) -> str:
 def shapes(motion: Motion, poses: int) -> Iterator[Shape]:
     """The shapes of :func:`strip`."""
     figure = skinned(motion)
-    figure = replace(figure, mesh=person(0.6)) if figure.mesh is person() else figure
+    figure = replace(figure, mesh=person(1)) if figure.mesh is person() else figure
     turns, places = figure.frames()
     places = places - places[:, :1] * [1, 0, 1]
     for at in np.linspace(0, len(turns) - 1, poses).round().astype(int):
@@ -67,14 +60,14 @@ def _shape(figure: Skinned, corners: Array) -> Shape:
     # the shadow is of those that face the sun
     flat = corners - corners[:, 1:2] * SUN / SUN[1]
     shadow = (flat @ axes)[triangles[normals @ SUN > 0]]
-    return Shape((corners @ axes)[triangles[shown]], _lit(figure.mesh, corners)[shown], shadow)
+    return Shape((corners @ axes)[triangles[shown]], lit(figure.mesh, corners)[shown], shadow)
 
 
-def _lit(mesh: Mesh, corners: Array) -> Array:
+def lit(mesh: Mesh, corners: Array) -> Array:
     """The colours of a mesh's triangles (F, 3) as light falls on them, whose corners are rounded off."""
     normals = unit(normals_of(corners, mesh.triangles)[mesh.triangles].sum(axis=1))
     light = 0.55 + 0.1 * normals[:, 1] + 0.45 * np.maximum(normals @ SUN, 0)
-    inks = COLOUR_TABLE[mesh.parts[mesh.triangles[:, 0]]]
+    inks = INKS[mesh.parts[mesh.triangles[:, 0]]]
     return np.clip(inks * light[:, None], 0, 255)
 
 

@@ -13,12 +13,16 @@ path by its hip height. The fingers form a relaxed hand.
 import json
 import struct
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.draw.figure import COLOURS, Body, Bone
+from motet.draw.body import INKS, human_mesh
+from motet.draw.figure import Body
+from motet.draw.mesh import Mesh
+from motet.draw.skinned import mesh_of_bones
 from motet.errors import MotionError
 from motet.figures.humanoid import BONES, FINGERS, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
 from motet.files import File, write_whole
@@ -49,10 +53,18 @@ class Buffer:
         self.views: list[Json] = list(document.get("bufferViews", []))
         self.accessors: list[Json] = list(document.get("accessors", []))
 
-    def add(self, values: NDArray[Any], dtype: str = "<f4", target: int = 0, bounded: bool = False) -> int:
+    def add(
+        self,
+        values: NDArray[Any],
+        dtype: str = "<f4",
+        target: int = 0,
+        bounded: bool = False,
+        normalized: bool = False,
+    ) -> int:
         """Index of the new accessor of values (N, ...), for a use in a mesh or none.
 
-        bounded: with their minimum and maximum, required for times and corners.
+        bounded: with their minimum and maximum, required for times and corners. normalized: whole numbers from 0 to
+        the largest stand for 0 to 1.
         """
         # each array gets a view of its own, filled up to four bytes
         content = np.ascontiguousarray(values, dtype=dtype)
@@ -67,6 +79,8 @@ class Buffer:
             "count": len(content),
             "type": TYPES[content.shape[1:]],
         }
+        if normalized:
+            accessor["normalized"] = True
         if bounded:
             rows = content.reshape(len(content), -1)
             accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
@@ -180,77 +194,29 @@ def _rest(skeleton: Skeleton) -> Array:
     return rest
 
 
-CORNERS = 10
-"""Of a bone's prism, around the bone."""
-
-
 def _body(buffer: Buffer, skeleton: Skeleton) -> Json:
-    """The primitive of the body: a tapered prism for each bone, its ends moving with the bone's carriers."""
-    body = Body(skeleton)
-    points = body.points(_rest(skeleton) / body.height)
-    prisms = [_prism(bone, points[bone.start], points[bone.end]) for bone in body.bones]
-    places = np.concatenate([places for places, _ in prisms])
-    normals = np.concatenate([normals for _, normals in prisms])
-    joints, colours = _joints_and_colours(body)
+    """The primitive of the body."""
+    mesh = _mesh(skeleton)
+    # four joints for each corner, and colours from sRGB to linear
+    missing = ((0, 0), (0, 4 - mesh.joints.shape[1]))
+    colours = np.pad((INKS[mesh.parts] / 255) ** 2.2, ((0, 0), (0, 1)), constant_values=1.0)
     attributes = {
-        "POSITION": buffer.add(places * body.height, target=VERTICES, bounded=True),
-        "NORMAL": buffer.add(normals, target=VERTICES),
-        "COLOR_0": buffer.add((colours / 255) ** 2.2, target=VERTICES),  # from sRGB to linear
-        "JOINTS_0": buffer.add(joints, "<u2", VERTICES),
-        "WEIGHTS_0": buffer.add(np.tile([1.0, 0, 0, 0], (len(places), 1)), target=VERTICES),
+        "POSITION": buffer.add(mesh.places, target=VERTICES, bounded=True),
+        "NORMAL": buffer.add(mesh.normals, target=VERTICES),
+        "COLOR_0": buffer.add(np.round(255 * colours), "<u1", VERTICES, normalized=True),
+        "JOINTS_0": buffer.add(np.pad(mesh.joints, missing), "<u2", VERTICES),
+        "WEIGHTS_0": buffer.add(np.pad(mesh.shares, missing), "<u1", VERTICES, normalized=True),
     }
-    triangles = buffer.add(_triangles(len(prisms)), "<u4", INDICES)
-    return {"attributes": attributes, "indices": triangles, "material": 0}
+    return {"attributes": attributes, "indices": buffer.add(mesh.triangles.reshape(-1), "<u4", INDICES), "material": 0}
 
 
-def _joints_and_colours(body: Body) -> tuple[Array, Array]:
-    """Of all prisms' corners the joints (N, 4) that move them, the first alone, and their colours (N, 3), 0 to 255."""
-    carriers = np.repeat([bone.carriers for bone in body.bones], CORNERS + 1)
-    joints = np.zeros((len(carriers), 4))
-    joints[:, 0] = carriers
-    colours = np.repeat([COLOURS[bone.side] for bone in body.bones], 2 * CORNERS + 2, axis=0)
-    return joints, colours
-
-
-def _triangles(prisms: int) -> NDArray[Any]:
-    """The corners of all prisms' triangles, counterclockwise from outside, three after three."""
-    near = np.arange(1, CORNERS + 1)  # of the ring at the start
-    near_next = near % CORNERS + 1
-    far = near + CORNERS  # of the ring at the end
-    far_next = near_next + CORNERS
-    first_tip = 0 * near
-    last_tip = first_tip + 2 * CORNERS + 1
-    first_cap = (first_tip, near_next, near)
-    side = ((near, near_next, far), (near_next, far_next, far))
-    last_cap = (last_tip, far, far_next)
-    # from (part, corner, triangle) to triangle after triangle, and from one prism to all
-    triangles = np.array([first_cap, *side, last_cap]).swapaxes(1, 2).reshape(-1)
-    first_corners = (2 * CORNERS + 2) * np.arange(prisms)[:, None]
-    return (triangles + first_corners).reshape(-1)
-
-
-def _prism(bone: Bone, start: Array, end: Array) -> tuple[Array, Array]:
-    """Corners and normals (2 * CORNERS + 2, 3): tip and ring at the start, ring and tip at the end."""
-    # a prism about the bone; one without length stands upright
-    axis = end - start
-    length = float(np.linalg.norm(axis))
-    axis = axis / length if length else np.array([0.0, 1.0, 0.0])
-    ring = _ring(axis)
-    near = start + bone.start_radius * ring
-    far = end + bone.end_radius * ring
-    near_tip = start - 0.7 * bone.start_radius * axis
-    far_tip = end + 0.7 * bone.end_radius * axis
-    return np.array([near_tip, *near, *far, far_tip]), np.array([-axis, *ring, *ring, axis])
-
-
-def _ring(axis: Array) -> Array:
-    """Points (CORNERS, 3) of a circle of radius 1 about an axis."""
-    # any direction across the axis: from the coordinate along which it is shortest
-    side = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-    side /= np.linalg.norm(side)
-    angles = np.arange(CORNERS)[:, None] * 2 * np.pi / CORNERS
-    ring: Array = np.cos(angles) * side + np.sin(angles) * np.cross(axis, side)
-    return ring
+def _mesh(skeleton: Skeleton) -> Mesh:
+    """The body on a skeleton at rest: on the humanoid the player's, on others round bones."""
+    if skeleton == HUMANOID:
+        return human_mesh()
+    body = Body(skeleton)
+    mesh = mesh_of_bones(body, body.points(_rest(skeleton) / body.height), skeleton.offsets[None])
+    return replace(mesh, places=mesh.places * body.height)
 
 
 def _with_fingers() -> Skeleton:

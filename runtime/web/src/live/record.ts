@@ -71,11 +71,13 @@ function surfaceOf({
   const rows = (values: ArrayLike<number>, width: number) =>
     Array.from(parts, (_, at) => Array.from({ length: width }, (_, i) => values[width * at + i]!));
   const size = (row: number[]) => Math.hypot(...row);
+  const carriers = weights.length / parts.length;
+  const four = (row: number[]) => [...row, 0, 0, 0, 0].slice(0, 4);
   return {
     positions: rows(positions, 3).map((row) => row.map((x) => x * height)),
     normals: rows(normals, 3).map((row) => row.map((x) => x / size(row))),
-    joints: rows(joints, 2).map((row) => [...row, 0, 0]),
-    weights: rows(weights, 2).map((row) => [...row, 0, 0]),
+    joints: rows(joints, carriers).map(four),
+    weights: rows(weights, carriers).map(four),
     parts: colours.flatMap((colour, part) => {
       const triangles = indices.filter((_, at) => parts[indices[at - (at % 3)]!] === part);
       return triangles.length ? [{ colour: colour.map((x) => (x / 255) ** 2.2), triangles }] : [];

@@ -15,8 +15,8 @@ const TRACED = 12;
 /** Seconds of the asked path, and between its points. */
 const SOON = 1.4;
 const APART = 0.1;
-/** Seconds in which the camera comes half of the way after a figure, and how far it steps back for each further row. */
-const LATE = 0.12;
+/** Seconds in which the camera comes half of the way after a figure, along the ground and up, and how far it steps back for each further row. */
+const LATE = [0.12, 0.5, 0.12] as const;
 const STEP_BACK = 0.28;
 
 export interface Shows {
@@ -39,7 +39,7 @@ export class Scene {
   /** height: of the usual body, in metres, by which all is drawn. */
   constructor(
     private readonly stage: Stage,
-    canvas: HTMLCanvasElement,
+    private readonly canvas: HTMLCanvasElement,
     body: unknown,
     readonly height: number,
   ) {
@@ -47,7 +47,7 @@ export class Scene {
     if (!painter) throw new Error("it has no WebGL2");
     this.painter = painter;
     const first = (this.body = painter.body(body));
-    this.looks = ({ turned, places }, n) => ({ body: first, turned, places, unit: 1 / height, shirt: n });
+    this.looks = ({ turned, places }, n) => ({ body: first, turned, places, unit: 1 / height, colour: n });
   }
 
   /** From now on the first figure is an avatar. */
@@ -109,19 +109,28 @@ export class Scene {
     return point ? [point[0] * this.height, point[1] * this.height] : null;
   }
 
-  /** The camera comes after the first figure without its sway, further away where there are many. */
+  /** The camera comes after the first figure without its sway, at half of the height it takes, further away where there are many. */
   private follow(poses: Shown[], passed: number, width: number, height: number): Camera {
-    const [x, z] = poses[0]!.ground;
-    const goal: Vector = [x / this.height, 0.5, z / this.height];
-    const part = this.target ? 1 - 0.5 ** (passed / LATE) : 1;
-    this.target = (this.target ?? goal).map((value, i) => value + part * (goal[i]! - value)) as Vector;
+    const { ground, places } = poses[0]!;
+    const heights = places.map(([, y]) => y);
+    const middle = (Math.min(...heights) + Math.max(...heights)) / 2;
+    const goal = [ground[0], middle, ground[1]].map((x) => x / this.height) as Vector;
+    const before = this.target ?? goal;
+    this.target = before.map((x, i) => goal[i]! + (x - goal[i]!) * 0.5 ** (passed / LATE[i]!)) as Vector;
     return this.stage.cameraAt(
       [...this.target],
       0,
       STEP_BACK * Math.sqrt(4 * (poses.length - 1)),
       width,
       height,
+      this.covered(height),
     );
+  }
+
+  /** Pixels at the lower end of the canvas that the text box takes, if it is there. */
+  private covered(height: number): number {
+    const top = this.canvas.parentElement!.querySelector("form")?.offsetTop ?? 0;
+    return top > height / 2 ? height - top : 0;
   }
 
   private gone(figure: Figure, n: number): Strip {

@@ -12,14 +12,14 @@ export interface View {
 /** From where is looked; only the stage looks into it. */
 export type Camera = { readonly camera: unique symbol };
 
-/** What is drawn of a figure: a body of the stage, where its joints are, and their rotations, or matrices instead of both. unit: heights of one unit. shirt: which colour it has; 0 is the usual one. */
+/** What is drawn of a figure: a body of the stage, where its joints are, and their rotations, or matrices instead of both. unit: heights of one unit. colour: which one it has; 0 is the usual one. */
 export interface Drawn {
   body: unknown;
   unit: number;
   turned?: Quaternion[];
   places: Vector[];
   matrices?: Float32Array;
-  shirt?: number;
+  colour?: number;
 }
 
 /** A strip on the ground, in heights. fade: towards its end; arrows: little heads along it. */
@@ -55,7 +55,7 @@ export interface Primitive {
   twoSided: boolean;
 }
 
-/** A body of people as the stage has it: numbers of its corners, in heights, one corner after the other, on two joints each. */
+/** A body of people as the stage has it: numbers of its corners, in heights, one corner after the other, each on as many joints. */
 export interface Body {
   primitives: [
     {
@@ -94,7 +94,15 @@ export interface Stage {
   FIRST_VIEW: View;
   COLOURS: Record<"left" | "right" | "middle", readonly number[]>;
   openStage(canvas: HTMLCanvasElement): Painter | null;
-  cameraAt(target: Vector, heading: number, away: number, width: number, height: number): Camera;
+  /** covered: pixels of the page at its lower end that something lies over. */
+  cameraAt(
+    target: Vector,
+    heading: number,
+    away: number,
+    width: number,
+    height: number,
+    covered?: number,
+  ): Camera;
   onGround(camera: Camera, x: number, y: number): readonly [x: number, z: number] | null;
   listen(canvas: HTMLCanvasElement): void;
   turn(yaw: number, pitch: number): void;
