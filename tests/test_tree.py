@@ -91,7 +91,7 @@ CEILINGS = {
     "motet.decode": 4_400,
     "motet.draw": 12_300,
     "motet.figures": 32_000,
-    "motet.formats": 37_400,
+    "motet.formats": 36_800,
     "motet.generate": 28_300,
     "motet.keyed": 9_300,
     "motet.live": 5_700,
