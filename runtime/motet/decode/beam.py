@@ -121,8 +121,7 @@ def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Sco
     pool = pool.reshape(rows, -1)
     words = words.reshape(rows, -1)
     best = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
-    places = best + np.arange(rows)[:, None] * pool.shape[1]
-    return pool.take(places), best // width, words.take(places)
+    return np.take_along_axis(pool, best, 1), best // width, np.take_along_axis(words, best, 1)
 
 
 def _likeliest(log_probabilities: NDArray[Any], count: int) -> tuple[Ids, NDArray[Any]]:
