@@ -84,7 +84,7 @@ ONE_WAY = {
 CEILINGS = {
     "motet": 3_500,
     "motet.bench": 5_500,
-    "motet.bundle": 11_000,
+    "motet.bundle": 11_400,
     "motet.cli": 17_400,
     "motet.composition": 7_800,
     "motet.corpus": 9_300,
@@ -102,7 +102,7 @@ CEILINGS = {
     "motet.representation": 9_500,
     "motet.search": 3_600,
     "motet.serve": 17_100,
-    "motet.steering": 35_500,
+    "motet.steering": 43_300,
     "motet.text": 5_300,
     "motet_export": 10_500,
     "motet_train": 9_500,
@@ -111,7 +111,7 @@ CEILINGS = {
     "motet_train.evaluate": 46_400,
     "motet_train.models": 21_200,
     "motet_train.papers": 41_600,
-    "motet_train.recipes": 15_500,
+    "motet_train.recipes": 16_900,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

@@ -59,6 +59,7 @@ if TYPE_CHECKING:
     from motet.steering.pose import Pose
     from motet.steering.sentence_acts import SaidActs
     from motet.steering.session import SteerSession, SteerSnapshot
+    from motet.steering.spoken import Reading
     from motet.text.clauses import Passage, Shown
     from motet.text.numeric_phrases import Quantities
 
@@ -70,12 +71,12 @@ __all__ = [
     "Composition", "ControlError", "ControlModel", "ControlWarning", "DecodingError", "DescribeModel", "Description",
     "Event", "FillModel", "FormatError", "GenerateModel", "GenerateSettings", "Generated", "Hit", "Humanoid", "Index",
     "Matched", "Met", "MixtureModel", "Moment", "MotetError", "Motion", "MotionError", "OutputError", "Part",
-    "Passage", "Pose", "PredictModel", "PredictSession", "Quantities", "SaidActs", "ScriptError", "SearchModel",
-    "SessionOptions", "SettingError", "Shown", "SteerModel", "SteerSession", "SteerSnapshot", "Story", "StorySettings",
-    "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning", "TravelWarning", "Understood",
-    "UnitError", "check", "clips", "compose", "figures_in", "from_humanoid", "list_bundles", "live_page", "load",
-    "load_as", "motion", "parse_plan", "read", "read_map", "read_plan", "to_humanoid", "write", "write_demo",
-    "write_live_page",
+    "Passage", "Pose", "PredictModel", "PredictSession", "Quantities", "Reading", "SaidActs", "ScriptError",
+    "SearchModel", "SessionOptions", "SettingError", "Shown", "SteerModel", "SteerSession", "SteerSnapshot",
+    "Story", "StorySettings", "TdbnModel", "TdbnSession", "TdbnSnapshot", "TextError", "TextWarning",
+    "TravelWarning", "Understood", "UnitError", "check", "clips", "compose", "figures_in", "from_humanoid",
+    "list_bundles", "live_page", "load", "load_as", "motion", "parse_plan", "read", "read_map", "read_plan",
+    "to_humanoid", "write", "write_demo", "write_live_page",
 ]
 # fmt: on
 
@@ -111,6 +112,7 @@ _PLACES = {
     "motet.steering.model": "SteerModel",
     "motet.steering.pose": "Pose",
     "motet.steering.sentence_acts": "SaidActs",
+    "motet.steering.spoken": "Reading",
     "motet.steering.session": "SteerSession SteerSnapshot",
     "motet.text.clauses": "Passage Shown",
     "motet.text.numeric_phrases": "Quantities",

@@ -315,11 +315,6 @@ def test_a_sentence_that_is_not_known_is_refused_and_nothing_moves(
     assert np.array_equal(session.tick().rotations, plain.tick().rotations)
 
 
-def test_a_sentence_needs_a_model_that_makes_its_act(model: SteerModel) -> None:
-    with pytest.raises(ControlError, match="start\\(words="):
-        model.start().act("wave")
-
-
 def test_scripts_have_acts(model: SteerModel, said: SaidActs) -> None:
     orders = parse_orders("walk 2s, act 'sit down' 1.5s, act wave", model.gaits)
     assert [(order.act, order.seconds) for order in orders] == [(None, 2.0), ("sit down", 1.5), ("wave", 3.0)]

@@ -7,17 +7,17 @@ bundle's own numbers: its settings, and its tables, gzipped.
 from dataclasses import asdict
 from typing import Any
 
+from motet.bundle.packing import packed
 from motet.draw.figure import Body
 from motet.draw.page import body_data, filled, source
 from motet.draw.skinned import person
 from motet.errors import BundleError, ControlError
 from motet.figures.humanoid import HUMANOID, T_POSE
 from motet.files import File, place_of, write_whole
-from motet.live.packing import packed
-from motet.live.repertoire import repertoire
 from motet.settings import checked_int
 from motet.steering.foot_lock import FootLockSettings
 from motet.steering.model import SteerModel
+from motet.steering.repertoire import document
 from motet.steering.settings import SteeringSettings
 
 
@@ -40,7 +40,7 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
         raise BundleError(f"{model} is not steered: a page needs a model such as motet.load('control')")
     most = 50
     characters = checked_int("characters", characters, 1, most, ControlError)
-    data = {"net": net_data(model), "body": live_body(), "characters": characters, "most": most, "acts": repertoire()}
+    data = {"net": net_data(model), "body": live_body(), "characters": characters, "most": most, "acts": document()}
     return filled(source("motet.live", "page.html"), title, data, CONTROL=source("motet.live", "control.js"))
 
 

@@ -36,10 +36,14 @@ KEYS = {
     "look_at": ("points",),
     "reach": ("hand", "points"),
     "act": ("motion", "upper"),
+    "say": ("text", "here"),
 }
 """Type of a client's message -> what may stand in it."""
 
-NEEDED = {"put": "places", "push": "velocity", "reach": "hand"}
+NUMBERS = ("speed", "direction", "facing", "velocity", "places", "points", "here")
+"""What may stand in a message as numbers, or lists of them."""
+
+NEEDED = {"put": "places", "push": "velocity", "reach": "hand", "say": "text"}
 """What a message needs."""
 
 
@@ -69,7 +73,7 @@ class ClientSession:
         return [*unknown, *each_once(notes)]
 
     def _obey(self, kind: str, arguments: dict[str, Any]) -> list[str]:
-        """Do what a message says; why an act is not known."""
+        """Do what a message says; why an act is not known, and what is answered to a sentence."""
         if kind == "start":
             self._start(arguments)
         elif kind == "act":
@@ -77,6 +81,8 @@ class ClientSession:
                 self.session.act(arguments.pop("motion", None), **arguments)
             except TextError as error:
                 return [str(error)]
+        elif kind == "say":
+            return [self.session.say(**arguments).caption]
         else:
             nowhere = {"points": None} if "points" in KEYS[kind] else {}
             getattr(self.session, kind)(**{**nowhere, **arguments})
@@ -155,18 +161,26 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
 
 def _unfit(kind: str, name: str, value: Any) -> str | None:
     """What a value should be, where it is not."""
-    if name in ("speed", "direction", "facing", "velocity", "places", "points") and not _numeric(value, depth=2):
+    if name in ("speed", "direction", "facing", "velocity", "places", "points", "here") and not _numeric(
+        value, depth=2
+    ):
         return f"numbers up to {LARGEST_COMMAND:g}, or lists of them"
     one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
     if name == "gait" and not (isinstance(value, str) or one_for_each):
         return "the name of a gait"
     if name == "hand" and value not in LEFT_RIGHT:
         return " or ".join(LEFT_RIGHT)
-    if name == "motion" and not all(text is None or isinstance(text, str) for text in _each(value)):
-        return "a sentence, or a list of sentences and null"
+    if name in ("motion", "text") and not _are_sentences(name, value):
+        return "a sentence" if name == "text" else "a sentence, or a list of sentences and null"
     if name in ("hold_feet", "positions", "upper") and not isinstance(value, bool):
         return "true or false"
     return None
+
+
+def _are_sentences(name: str, value: Any) -> bool:
+    if name == "text":
+        return isinstance(value, str)
+    return all(text is None or isinstance(text, str) for text in _each(value))
 
 
 def sentences(text: str | bytes) -> list[str]:

@@ -195,6 +195,8 @@ class LiveClients:
         if (words := self.words) is None:
             return
         for sentence in protocol.sentences(text):
+            if self.model.act_said(sentence) is not None:
+                continue
             with suppress(TextError), collected(TextWarning):  # of which the client is told
                 await asyncio.to_thread(words.act, sentence)
 

@@ -78,7 +78,7 @@ class Act:
     """Whether it is done by the legs: it bends them, jumps, raises a foot, or turns around."""
 
     @staticmethod
-    def of(name: str, numbers: Floats, fps: float, settings: ActSettings) -> "Act":
+    def of(name: str, numbers: Floats | Array, fps: float, settings: ActSettings) -> "Act":
         """The act of frames (T, :data:`WIDTH`), without the rest at both ends. ControlError for fewer than
         :data:`SHORTEST` frames, and for numbers that are not finite or too large."""
         values = _checked(numbers)
@@ -120,7 +120,7 @@ class Act:
         return np.array([cos * x + sin * z, cos * z - sin * x, turn])
 
 
-def _checked(numbers: Floats) -> Array:
+def _checked(numbers: Floats | Array) -> Array:
     """Frames (T, :data:`WIDTH`) in float64; ControlError if they are no act."""
     if numbers.ndim != 2 or numbers.shape[1] != WIDTH or len(numbers) < SHORTEST:
         raise ControlError(f"an act needs {SHORTEST} or more frames of {WIDTH} numbers, not {numbers.shape}")

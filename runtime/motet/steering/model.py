@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from motet.bundle.fields import LARGEST, Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
-from motet.errors import ArgumentError, BundleError, ControlError
+from motet.errors import ArgumentError, BundleError, ControlError, quoted
 from motet.figures.feet.treadmill import travelling
 from motet.figures.humanoid import BONES
 from motet.models.control import LARGEST_CROWD, ControlModel, captions
@@ -30,11 +30,14 @@ from motet.steering.matching import FEATURES, Matcher, Playback, Rows, Table
 from motet.steering.paths import ArrivalSettings
 from motet.steering.pose import Pose
 from motet.steering.reach_layer import ReachSettings
+from motet.steering.repertoire import Repertoire, entries
 from motet.steering.scripts import parse_orders
 from motet.steering.sentence_acts import SaidActs, SentenceModel
 from motet.steering.session import SteerSession
 from motet.steering.settings import SteeringSettings
+from motet.steering.spoken import Reading, words_for
 from motet.steering.step import LOOPS, PoseCodes
+from motet.text.clauses import Shown
 
 SPREAD_FROM = 32
 """Number of characters from which the searches of a session are spread over the ticks."""
@@ -187,6 +190,29 @@ class SteerModel(ControlModel):
         """
         features = self.contract.features(self.contract.frames(self.at_own_rate(travelling(motion))))
         return self._act(name, *self._bodies(features), features.select(ROOT_SIXD[:3]).values)
+
+    @cached_property
+    def _repertoire(self) -> Repertoire:
+        return Repertoire(self)
+
+    def act_named(self, name: str, side: str = "", tempo: float = 1.0, count: int = 1) -> Act:
+        """An act of the repertoire (:mod:`motet.steering.repertoire`) by its name; with a hand or foot, or to a side,
+        "left" or "right"; so many times as fast; so often in a row. ControlError for another name."""
+        if name not in entries():
+            raise ControlError(f"there is no act {quoted(name)}; session.say finds the nearest names")
+        return self._repertoire.act(name, side, tempo, count)
+
+    def read_said(self, text: str) -> Reading:
+        """What a sentence is read as, for :meth:`motet.steering.session.SteerSession.say`."""
+        return words_for(tuple(gait for gait in self.gaits if self.usual[gait])).read(text)
+
+    def act_said(self, sentence: str) -> tuple[Act, Shown] | None:
+        """The act that a sentence names, and what it is shown as; None for any other sentence."""
+        steps = self.read_said(sentence).steps
+        if len(steps) != 1 or steps[0].kind != "act":
+            return None
+        (step,) = steps
+        return self.act_named(step.name, step.side, step.tempo, step.count), Shown(step.caption, (), 1.0)
 
     @cached_property
     def takes(self) -> dict[str, tuple[Act, ...]]:

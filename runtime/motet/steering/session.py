@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motet.errors import ControlError, ControlWarning, needs, warn
+from motet.errors import ControlError, ControlWarning, TextError, needs, warn
 from motet.figures.humanoid import BONES, LEFT_RIGHT
 from motet.models.control import LARGEST_CROWD
 from motet.motion.motion import Motion, is_many
@@ -26,7 +26,9 @@ from motet.steering.matching import Flags, Matched, Playback, Rows
 from motet.steering.paths import ArrivalSettings, Going, Ways, rolling_distance
 from motet.steering.pose import Pose
 from motet.steering.reach_layer import ReachLayer, ReachSettings
+from motet.steering.saying import Saying
 from motet.steering.scripts import Order, parse_orders
+from motet.steering.spoken import Reading
 from motet.steering.step import tick
 from motet.steering.targets import CharacterIds, checked_path, chosen_ids, numbers_of
 from motet.text.clauses import Shown
@@ -63,10 +65,13 @@ class SteerSnapshot:
     """How far the display is from the first to the second, in ticks."""
     late: tuple[Event, ...] = ()
     """Events of a tick that was to be shown next when characters were put elsewhere."""
+    saying: Saying | None = None
+    """What was said, as long as something of it is to come."""
 
     def copy(self) -> "SteerSnapshot":
         """A copy that changes independently."""
-        return replace(self, playback=self.playback.copy(), actions=self.actions.copy())
+        saying = None if self.saying is None else self.saying.copy()
+        return replace(self, playback=self.playback.copy(), actions=self.actions.copy(), saying=saying)
 
     def __repr__(self) -> str:
         return f"SteerSnapshot({len(self.command.gait)} characters)"
@@ -152,6 +157,38 @@ class SteerSession:
         """Velocity along x and z, m/s, and facing, radians (characters, 3), within the limits of gaits."""
         return self._target.copy()
 
+    @property
+    def places(self) -> Array:
+        """Where the characters are (characters, 3): x and z in metres, facing in degrees, as :meth:`put` takes them."""
+        places = self._state.playback.root.copy()
+        places[:, 2] = np.degrees(places[:, 2])
+        return places
+
+    @property
+    def gaits(self) -> list[str]:
+        """The gait of each character."""
+        return [self.model.gaits[gait] for gait in self._state.command.gait.tolist()]
+
+    def say(self, text: str, here: ArrayLike = (0.0, 0.0)) -> Reading:
+        """Let all characters do what a sentence says: "wave", "walk slowly, then bow twice", "turn left and run".
+
+        It is read by the table of acts and orders that ships (docs/steer.md). Of a sentence that has an unknown part
+        nothing is done: the reading names that part and the three nearest acts, and its ``caption`` says so. Steps
+        follow each other as the session ticks, until another command comes.
+        here: x and z in metres, where "come here" leads. ControlError for another.
+        """
+        needs(text, str, "a sentence")
+        (point,) = numbers_of("here needs x and z", here, 1, 2)
+        reading = self.model.read_said(text)
+        if reading.steps:
+            self._continue(Saying(reading.steps, (float(point[0]), float(point[1]))))
+        return reading
+
+    def _continue(self, saying: Saying) -> None:
+        """Begin the steps of what was said that are next, and keep it as long as more is to come."""
+        saying.tick(self)
+        self._state.saying = None if saying.is_over else saying
+
     def _command_numbers(
         self, speed: ArrayLike | None, direction: ArrayLike | None, facing: ArrayLike | None
     ) -> dict[str, Array]:
@@ -178,6 +215,7 @@ class SteerSession:
         self._target = target
         state.command = command
         state.going = state.going.ended()
+        state.saying = None
 
     def _gaits(self, names: str | Sequence[str] | None) -> Rows:
         """The numbers of gaits (characters,), None for the present ones."""
@@ -190,6 +228,8 @@ class SteerSession:
 
     def tick(self) -> Pose:
         """The next pose of all characters, 1 / ``model.fps`` seconds later."""
+        if self._state.saying is not None:
+            self._continue(self._state.saying)
         state = self._state
         # those that are on a path go on, and those that move keep apart
         if state.going.goes.any() or state.room:
@@ -322,6 +362,7 @@ class SteerSession:
     ) -> None:
         """Let characters (n,) go along paths (n, P, 2) from where they are."""
         state = self._state
+        state.saying = None
         abilities = self.model.abilities
         count = len(characters)
         facings = np.full(count, np.nan)
@@ -406,16 +447,17 @@ class SteerSession:
 
         what: a motion of any human figure, without the rest at both ends; an act, made of a motion once by
             :meth:`motet.steering.model.SteerModel.act_of`; the name of a gait that goes nowhere, such as "jump", which
-            is done once, forward by characters that move; or a sentence such as "wave", for which the session's
-            ``words`` generate a motion, once; None ends the present act. One for all, or one for each of ``who``.
+            is done once, forward by characters that move; or a sentence: an act by name, such as "wave with the left
+            hand" or "kick twice", or what the session's ``words`` generate, once. None ends the present act. One for
+            all, or one for each of ``who``.
         who: numbers of characters, by default all.
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
             the ground. By default by the whole body where a character stands, until it is steered elsewhere; or
             where the act is one of the legs, such as a kick, after which a character that moves goes on.
         Returns how each sentence is shown, and warns (TextWarning) of words that are left out.
-        MotionError for a motion that is not of a human figure, TextError for a sentence that the model does not know
-        or, in a strict session, with words that are left out, ControlError for a motion of less than three ticks, for
-        unknown characters, and for a sentence without ``words``; nothing changes then.
+        MotionError for a motion that is not of a human figure, TextError for a sentence that is no act that is known
+        or, in a strict session, with words that are left out, ControlError for a motion of less than three ticks and
+        for unknown characters; nothing changes then.
         """
         characters = self._chosen(who).tolist()
         each = list(what) if is_many(what) and not isinstance(what, Action) else [what] * len(characters)
@@ -427,6 +469,7 @@ class SteerSession:
         for action in each:
             if id(action) not in made:
                 made[id(action)] = self._acts_of(action, shown)
+        self._state.saying = None
         for character, action in zip(characters, each, strict=True):
             chosen = self._take(character, made[id(action)])
             self._state.actions.orders[character] = ActOrder(chosen, upper)
@@ -460,11 +503,18 @@ class SteerSession:
             return what
         if isinstance(what, Motion):
             return self.model.act_of(what)
-        if self._words is None:
-            raise ControlError("an act in words needs a model that makes it: start(words=motet.load('generate'))")
-        act, shown_as = self._words.shown(what, self.strict)
+        act, shown_as = self.model.act_said(what) or self._made_act(what)
         shown.append(shown_as)
         return act
+
+    def _made_act(self, sentence: str) -> tuple[Act, Shown]:
+        """The act that the session's model of words makes of a sentence that is not known by name."""
+        if self._words is None:
+            reading = self.model.read_said(sentence)
+            order = f"{sentence!r} is no single act: say it, by session.say"
+            reason = order if reading.steps else reading.caption.removeprefix("? ")
+            raise TextError(f"{reason} Other sentences need start(words=motet.load('generate'))")
+        return self._words.shown(sentence, self.strict)
 
     @property
     def acting(self) -> list[tuple[str, float] | None]:

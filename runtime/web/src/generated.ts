@@ -444,6 +444,19 @@ export const reachSettings = {
   half_life: { default: 0.12, low: 0.01, high: 10, whole: false },
 } as const;
 
+// motet.steering.repertoire
+export const REPERTOIRE = {
+  KEPT: 256,
+  SEAM: 9,
+} as const;
+
+// motet.steering.saying
+export const SAYING = {
+  GOES: 3,
+  NEARER: 2.5,
+  TURNS: 1.5,
+} as const;
+
 // motet.steering.settings.SteeringSettings
 export const steeringSettings = {
   velocity: { default: 0.22, low: 0.01, high: 10, whole: false },
@@ -478,6 +491,19 @@ export const steeringSettings = {
   aside: { default: 1.0471975511965976, low: 0, high: 3.15, whole: false },
   back: { default: 2.0943951023931953, low: 0, high: 3.15, whole: false },
   ahead: { default: 0.5235987755982988, low: 0, high: 3.15, whole: false },
+} as const;
+
+// motet.steering.spoken
+export const SPOKEN = {
+  CURVE: 50,
+  FAST: 1.4,
+  GOING: ["forward", "backwards", "back", "circle", "step", "sideways"],
+  JOG: 0.8,
+  MOST: 10,
+  OFFERED: 3,
+  SHORT: 4,
+  SLOW: 0.65,
+  STEP: 0.6,
 } as const;
 
 // motet.steering.targets

@@ -2,7 +2,6 @@
 import { DIRECTIONS } from "./hands.js";
 import { dropped } from "./drop.js";
 import type { Page } from "./page.js";
-import { goTo } from "./pilots.js";
 import { download } from "./record.js";
 
 const element = <T extends HTMLElement = HTMLElement>(id: string) => document.getElementById(id) as T;
@@ -11,6 +10,12 @@ const CROWDS = [0, 1, 2, 3, 4, 7, 11, 19, 29, 49];
 /** Pixels and milliseconds within which a press is a click and no drag. */
 const STILL = 6;
 const SHORT = 400;
+
+/** What can be typed beside the names of acts. */
+export const ORDERS = [
+  ...["walk", "run", "skip", "zombie", "stop", "come here", "turn left", "turn right", "turn around"],
+  ...["walk slowly", "walk backwards", "walk in a circle", "step left", "step right", "faster", "slower"],
+];
 
 /** What a file is handed over as. */
 const KINDS: Record<string, string> = {
@@ -108,7 +113,7 @@ function addClicks(page: Page, canvas: HTMLElement): void {
     const point = page.scene.groundAt(clientX - box.left, clientY - box.top);
     const still =
       Math.hypot(clientX - pressed.x, clientY - pressed.y) < STILL && timeStamp - pressed.at < SHORT;
-    if (still && point) page.pilot = goTo(point);
+    if (still && point) page.goTo(point);
   });
 }
 
@@ -119,11 +124,7 @@ function addText(page: Page): void {
     if (text.value.trim()) reply(page.obey(text.value));
     text.select();
   };
-  element("known").append(
-    ...[...page.net.gaits, "stop", "turn left", "turn right", ...page.repertoire.names].map(
-      (name) => new Option(name),
-    ),
-  );
+  element("known").append(...[...page.repertoire.entries.keys(), ...ORDERS].map((name) => new Option(name)));
   text.onkeydown = ({ key }) => {
     if (key === "Escape") element("canvas").focus();
   };

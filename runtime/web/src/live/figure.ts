@@ -10,7 +10,7 @@ import { worldOf } from "../motion/motion.js";
 import type { Pose as Ground } from "../motion/planar.js";
 import type { Quaternion, Vector } from "../motion/rotations.js";
 import { damped, dampedPath, dampingOf, wrapped } from "../motion/springs.js";
-import { type Packed, unpacked } from "./packing.js";
+import { type Packed, unpacked } from "../bundle/packing.js";
 import { standing, type Steered, tell, tick } from "../steering/steered.js";
 import { between, type Played } from "../steering/step.js";
 

@@ -4,15 +4,16 @@ import { addControls } from "./controls.js";
 import type { Dropped } from "./drop.js";
 import { type Asked, Figure, type Given as GivenNet, inRange, modelOf } from "./figure.js";
 import { Hands } from "./hands.js";
-import { eight, type Pilot } from "./pilots.js";
+import { eight, goTo, type Pilot } from "./pilots.js";
 import { Recorder } from "./record.js";
-import { type GivenActs, Repertoire } from "./repertoire.js";
+import { Saying } from "./saying.js";
 import { Scene } from "./scene.js";
 import type { Stage } from "./stage.js";
 import { stick } from "./stick.js";
 import { type Act, actOf, numbersOf } from "../steering/acts.js";
 import type { Going } from "../steering/paths.js";
-import { onceOf, orderOf, saysAll } from "./words.js";
+import { type GivenActs, Repertoire } from "../steering/repertoire.js";
+import { captionOf, Words } from "../steering/spoken.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */
 export interface Given {
@@ -23,7 +24,6 @@ export interface Given {
   most: number;
 }
 
-const KNOWN = "walk, run, stop, turn left, faster and what people do";
 const RADIANS = Math.PI / 180;
 /** Seconds that a frame counts for, at most, and for which a page is drawn after something was done. */
 const LATEST = 0.1;
@@ -33,8 +33,11 @@ const DONE = ["click", "change", "input", "keydown", "drop"];
 
 export class Page {
   readonly figures: Figure[] = [];
-  /** What can be typed; it comes once the first picture is drawn. */
+  /** What can be typed, and the acts that are done then; they come once the first picture is drawn. */
+  words!: Words;
   repertoire!: Repertoire;
+  /** What was typed, as long as something of it is to come. */
+  saying: Saying | null = null;
   readonly state = {
     gait: 0,
     hurry: false,
@@ -91,23 +94,20 @@ export class Page {
     this.pilot = eight(this.figures[0]!);
   }
 
-  /** Do what a sentence says; what is to be answered. */
+  /** Do what a sentence says; what is to be answered. Nothing is done of one that is not known. */
   obey(text: string): string {
-    const order = orderOf(text, this.net, this.figures[0]!);
-    if (order) {
-      this.pilot = order;
-      return order.speed ? `${this.net.gaits[order.gait]}, ${order.speed.toFixed(1)} m/s` : "standing";
+    const reading = this.words.read(text);
+    if (reading.steps.length) {
+      this.saying = new Saying(reading);
+      this.saying.tick(this);
     }
-    const once = onceOf(text, this.net);
-    if (once) {
-      this.once(once, saysAll(text));
-      return once;
-    }
-    const match = this.repertoire.find(text);
-    if (!match) return `? It knows ${KNOWN}: type ${this.repertoire.names[0]}, or choose from the list.`;
-    this.act(match.act, match.arms, saysAll(text));
-    const without = match.lacking.map((word) => `'${word}'`).join(", ");
-    return match.act.name + (without && `, without ${without} (confidence ${match.confidence.toFixed(2)})`);
+    return captionOf(reading);
+  }
+
+  /** Go to a point on the ground, whatever was typed before. */
+  goTo(point: readonly [number, number]): void {
+    this.saying = null;
+    this.pilot = goTo(point);
   }
 
   /** Take what was dropped; what is to be said of it. */
@@ -125,7 +125,7 @@ export class Page {
   }
 
   /** Begin an act, of all figures or the first; one of the whole body ends what steers it. */
-  private act(act: Act, arms: boolean, all: boolean): void {
+  act(act: Act, arms: boolean, all: boolean): void {
     if (!arms) this.pilot = null;
     this.whole = this.held = !arms;
     for (const figure of all ? this.figures : [this.figures[0]!]) {
@@ -133,10 +133,17 @@ export class Page {
     }
   }
 
+  /** End what figures do. */
+  rest(all: boolean): void {
+    for (const figure of all ? this.figures : [this.figures[0]!]) figure.act(null);
+  }
+
   /** What the first figure is asked: by hand, or else by its pilot, or else to stand. */
   command(): Asked | Going {
     const [x, y] = this.hands.pushed;
     const pushed = x !== 0 || y !== 0;
+    if (pushed) this.saying = null;
+    this.saying?.tick(this);
     this.held &&= pushed;
     if (this.whole && !this.held && (pushed || this.pilot)) {
       this.figures[0]!.act(null);
@@ -228,6 +235,8 @@ export async function open(embedded: Given, stage: Stage): Promise<Page> {
   for (const done of DONE) addEventListener(done, () => (stage.view.dirty = true));
   await drawn(page);
   page.repertoire = await Repertoire.of(embedded.acts, model);
+  const goOn = model.gaits.filter((gait) => speeds[gait]![1]! > 0);
+  page.words = new Words(embedded.acts.words, page.repertoire.entries, goOn);
   addControls(page, embedded.most);
   return page;
 }

@@ -55,21 +55,21 @@ export function goTo(goal: readonly [number, number]): Pilot {
   };
 }
 
-/** An order that stays: a gait, its speed, and the way, which is faced. */
+/** An order that stays: a gait, its speed, the facing, and where it goes from there. Radians to the left. */
 export class Order implements Pilot {
+  /** aside: from the facing to the way that it goes. curve: radians a second. */
   constructor(
-    public gait: number,
-    public speed: number,
-    public way: number,
+    readonly gait: number,
+    readonly speed: number,
+    private facing: number,
+    private readonly aside = 0,
+    private readonly curve = 0,
   ) {}
 
-  ask({ model }: Net): Asked {
-    const speed = this.speed ? inRange(model, this.gait, this.speed) : 0;
-    return {
-      gait: this.gait,
-      x: speed * Math.sin(this.way),
-      z: speed * Math.cos(this.way),
-      facing: this.way,
-    };
+  ask({ model, fps }: Net): Asked {
+    this.facing += this.curve / fps;
+    const speed = this.speed ? inRange(model, this.gait, this.speed, this.aside) : 0;
+    const way = this.facing + this.aside;
+    return { gait: this.gait, x: speed * Math.sin(way), z: speed * Math.cos(way), facing: this.facing };
   }
 }

@@ -1,7 +1,7 @@
-"""Arrays in pages: gzipped, column by column, of each column first all first bytes: so they are pressed best."""
+"""Arrays in JSON: gzipped, column by column, of each column first all first bytes: so they are pressed best."""
 
 import gzip
-from base64 import b64encode
+from base64 import b64decode, b64encode
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +16,22 @@ def packed(tables: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
         "tables": {name: {"kind": array.dtype.str[1:], "shape": array.shape} for name, array in rows.items()},
         "bytes": b64encode(gzip.compress(b"".join(map(_shuffled, rows.values())), mtime=0)).decode(),
     }
+
+
+def unpacked(document: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """The arrays (rows, width) of what :func:`packed` made."""
+    data = gzip.decompress(b64decode(document["bytes"]))
+    arrays = {}
+    start = 0
+    for name, table in document["tables"].items():
+        kind = np.dtype(f"<{table['kind']}")
+        rows, width = table["shape"]
+        stop = start + rows * width * kind.itemsize
+        split = np.frombuffer(data[start:stop], np.uint8).reshape(width, kind.itemsize, rows)
+        columns = np.ascontiguousarray(np.swapaxes(split, 1, 2)).view(kind).reshape(width, rows)
+        arrays[name] = np.ascontiguousarray(columns.T)
+        start = stop
+    return arrays
 
 
 def _shuffled(values: NDArray[Any]) -> bytes:

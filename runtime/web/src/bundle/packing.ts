@@ -1,5 +1,5 @@
-/* Arrays of a page: gzipped, column by column, of each column first all first bytes; as motet/live/packing.py packs them. */
-import { halves } from "../bundle/arrays.js";
+/* Arrays in JSON: gzipped, column by column, of each column first all first bytes; as motet/bundle/packing.py packs them. */
+import { halves } from "./arrays.js";
 
 const KINDS = {
   f4: Float32Array,
