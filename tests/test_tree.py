@@ -94,7 +94,7 @@ CEILINGS = {
     "motet.formats": 36_800,
     "motet.generate": 28_300,
     "motet.keyed": 9_300,
-    "motet.live": 5_700,
+    "motet.live": 5_000,
     "motet.models": 10_200,
     "motet.motion": 16_500,
     "motet.papers": 7_500,
