@@ -7,7 +7,7 @@ from test_retarget import SKELETONS
 
 from motet.draw.body import BODY, LEFT_PART, RIGHT_PART, human_mesh
 from motet.draw.figure import Body, figure_of
-from motet.draw.mesh import loft, normals_of, ring
+from motet.draw.mesh import loft, normals_of, ring, smooth_weights, smoothed
 from motet.draw.skinned import person, skinned
 from motet.figures.humanoid import HUMANOID, T_POSE, to_humanoid
 from motet.formats import read_motion
@@ -87,6 +87,40 @@ def test_a_loft_of_a_square_is_a_box():
 def test_ring_is_on_its_superellipse():
     for power in (2.0, 2.5):
         assert (np.abs(ring(12, power)) ** power).sum(axis=1) == pytest.approx(np.ones(12))
+
+
+def test_rings_between_rings_follow_a_cubic():
+    at = np.arange(7.0)
+    between = smoothed((at**3 - 4 * at**2)[:, None, None] * np.ones((1, 3, 3)))[:, 0, 0]
+    middles = at[1:-2] + 0.5  # all but the first and the last
+    np.testing.assert_allclose(between[::2], at**3 - 4 * at**2)
+    np.testing.assert_allclose(between[3:-2:2], middles**3 - 4 * middles**2)
+
+
+def test_weights_even_out_as_by_a_matrix():
+    rings, joints = np.arange(24).reshape(6, 4), np.repeat([0, 0, 0, 2, 2, 1], 4)
+    step = np.zeros((24, 24))
+    for r, c in np.ndindex(6, 4):
+        near = [(r, (c + 1) % 4), (r, (c - 1) % 4), *((row, c) for row in (r - 1, r + 1) if 0 <= row < 6)]
+        for place in near:
+            step[rings[r, c], rings[place]] = 0.5 / len(near)
+        step[rings[r, c], rings[r, c]] = 0.5
+    wanted = np.linalg.matrix_power(step, 3) @ np.eye(3)[joints]
+    carriers, weights = smooth_weights(joints, [rings], 3)
+    np.testing.assert_allclose(np.einsum("vk,vkj->vj", weights, np.eye(3)[carriers]), wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(("bone", "axis", "least"), [("LowerLeg", 0, 0.9), ("UpperLeg", 0, 0.85), ("LowerArm", 1, 0.9)])
+def test_a_body_keeps_its_volume_where_it_bends(bone, axis, least):
+    mesh, names = human_mesh(), [joint.name for joint in HUMANOID.joints]
+    turns, places = np.tile(np.eye(3), (len(names), 1, 1)), T_POSE.copy()
+    bent = np.roll(np.roll(turned_about_z(90), axis + 1, axis=0), axis + 1, axis=1)
+    for at, joint in enumerate(HUMANOID.joints):
+        if joint.parent >= 0:
+            turns[at] = turns[joint.parent] @ (bent if joint.name == f"left{bone}" else np.eye(3))
+            places[at] = places[joint.parent] + turns[joint.parent] @ (T_POSE[at] - T_POSE[joint.parent])
+    corners = mesh.carried(turns, places - np.einsum("jab,jb->ja", turns, T_POSE))
+    assert least < volume(corners, mesh.triangles) / volume(mesh.places, mesh.triangles) < 1.1
 
 
 def test_a_person_at_rest_is_the_mesh_itself():
