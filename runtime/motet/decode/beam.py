@@ -65,10 +65,11 @@ def beam_search(step: Graph, contexts: Arrays, limits: Limits, beams: int) -> li
     as no ``beams`` others are better; a row is done when all of its have ended.
     """
     rows = len(contexts["context"])
-    first_of_row = np.arange(rows)[:, None] * beams
+    row = np.arange(rows)[:, None]
     scores = np.where(np.arange(beams) == 0, 0.0, -np.inf) * np.ones((rows, 1))
     words = np.full((rows, beams, 1), limits.start, dtype=np.int64)
     state = zero_state(step, rows * beams)
+    places = np.arange(rows * beams)
     for length in range(limits.longest + 1):
         last = words[:, :, -1]
         alive = two_rows(np.flatnonzero((last != limits.end) & np.isfinite(scores)))
@@ -77,17 +78,15 @@ def beam_search(step: Graph, contexts: Arrays, limits: Limits, beams: int) -> li
 
         # the graph: the words that may follow those that have not ended
         inputs: Arrays = {"word": last.ravel()[alive], **taken(contexts, alive // beams)}
-        outputs, following = advance(step, taken(state, alive), inputs)
+        outputs, state = advance(step, taken(state, places[alive]), inputs)
         possible = limits.possible(outputs["log_probabilities"], length)
 
         # the best of each row, each behind its parent's words
         scores, parents, chosen = _best(scores, alive, possible, limits.end)
-        before = np.take_along_axis(words, parents[:, :, None], 1)
-        words = np.concatenate([before, chosen[:, :, None]], axis=2)
+        words = np.concatenate([words[row, parents], chosen[:, :, None]], axis=2)
 
-        # a parent that has ended gets the state of some other: it is never used
-        places = np.searchsorted(alive, parents + first_of_row).ravel() % len(alive)
-        state = taken(following, places)
+        # where the states of the parents are; one that has ended gets that of some other, which is never used
+        places = np.searchsorted(alive, parents + row * beams).ravel() % len(alive)
     sequences = zip(words[:, :, 1:].tolist(), scores.tolist(), strict=True)
     return [_hypotheses(ids, row_scores, limits.end) for ids, row_scores in sequences]
 
@@ -127,14 +126,16 @@ def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Sco
 
 def _likeliest(log_probabilities: NDArray[Any], count: int) -> tuple[Ids, NDArray[Any]]:
     """The ``count`` likeliest words of each row (N, V), which is used up, and their log-probabilities: (N, count)."""
-    rows = np.arange(len(log_probabilities))
-    words = np.empty((len(rows), count), dtype=np.int64)
-    values = np.empty((len(rows), count), dtype=log_probabilities.dtype)
-    for place in range(count):  # a few passes of argmax take a fraction of argpartition's time
-        words[:, place] = log_probabilities.argmax(axis=1)
-        values[:, place] = log_probabilities[rows, words[:, place]]
-        log_probabilities[rows, words[:, place]] = -np.inf
-    return words, values
+    rows, size = log_probabilities.shape
+    words = np.empty((count, rows), dtype=np.int64)
+    values = np.empty((count, rows), dtype=log_probabilities.dtype)
+    flat = log_probabilities.reshape(-1)
+    for number in range(count):  # a few passes of argmax take a fraction of argpartition's time
+        words[number] = log_probabilities.argmax(axis=1)
+        places = words[number] + np.arange(0, rows * size, size)
+        values[number] = flat[places]
+        flat[places] = -np.inf
+    return words.T, values.T
 
 
 def noise_of(limits: Limits, draws: int, seed: int = 0) -> Floats:

@@ -10,8 +10,8 @@ const THEMES = {
  *  whether bodies are lit at their corners alone. */
 const QUALITIES = [
   { ratio: 2, map: 2048, taps: 8, sizes: [160, 40], casters: 100 }, { ratio: 1, map: 1024, taps: 8, sizes: [180, 40], casters: 100 },
-  { ratio: 1, map: 1024, taps: 2, sizes: [320, 60], casters: 16, quick: true }, { ratio: 0.8, map: 1024, taps: 2, sizes: [320, 60], casters: 12, quick: true },
-  { ratio: 0.65, map: 512, taps: 2, sizes: [400, 70], casters: 8, quick: true }, { ratio: 0.5, map: 512, taps: 1, sizes: [400, 70], casters: 6, quick: true },
+  { ratio: 1, map: 1024, taps: 2, sizes: [320, 60], casters: 16, quick: true }, { ratio: 1, map: 512, taps: 1, sizes: [320, 60], casters: 12, quick: true },
+  { ratio: 0.8, map: 512, taps: 1, sizes: [320, 70], casters: 8, quick: true }, { ratio: 0.6, map: 512, taps: 1, sizes: [400, 70], casters: 6, quick: true },
 ];
 
 /** Vertex and fragment shaders. */

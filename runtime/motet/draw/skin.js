@@ -39,12 +39,12 @@ uniform float night;
 vec3 shown(vec3 paint, vec3 at, vec3 normal, vec3 away, float clear) {
   float key = max(dot(normal, sun), 0.) * sunlit(at + normal * .014);
   float low = mix(.72, 1., clamp((at.y + .12 * normal.y) / .3, 0., 1.));
-  vec3 around = mix(vec3(.44, .41, .40), vec3(.62, .65, .72), .5 + .5 * normal.y) * low;
+  vec3 around = mix(vec3(.55, .53, .52), vec3(.68, .70, .75), .5 + .5 * normal.y) * low;
   float edge = 1. - max(dot(normal, away), 0.), rim = edge * edge * edge * (.5 + .5 * normal.y);
   float half_ = max(dot(normal, normalize(sun + away)), 0.), shine = half_ * half_;
   shine *= shine;
   shine *= shine;
-  vec3 light = around * mix(1., .9, night) + vec3(.60, .56, .50) * key;
+  vec3 light = around * mix(1., .9, night) + vec3(.53, .50, .45) * key;
   return mix(fog, paint * light + .09 * shine * shine * key + rim * mix(.10, .16, night), clear);
 }`;
 

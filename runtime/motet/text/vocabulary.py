@@ -112,8 +112,12 @@ class TextRules:
         between its neighbours, and vanishes."""
         joined = re.sub(r"(?<=\d) (?=\d)", "", " ".join(words))
         joined = re.sub(rf"(?<=\d) {re.escape(self.point)} (?=\d)", ".", joined)
-        spelled = {str(value): word for word, value in self.numbers.items() if value <= self.spelled}
-        return " ".join(spelled.get(word, word) for word in joined.split())
+        return " ".join(self._numerals.get(word, word) for word in joined.split())
+
+    @cached_property
+    def _numerals(self) -> dict[str, str]:
+        """The words of small numbers by their digits."""
+        return {str(value): word for word, value in self.numbers.items() if value <= self.spelled}
 
     @cached_property
     def _misspelt(self) -> re.Pattern[str]:
