@@ -35,6 +35,7 @@ from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.predict import liveliness, mocap
 from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
 from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
+from motet_train.evaluate.text_adherence.bare import bare_report
 from motet_train.evaluate.text_adherence.composed import composed_report
 from motet_train.evaluate.text_adherence.numbers import numbers_report
 from motet_train.evaluate.text_adherence.prompts import Trial, outside, prompts, read_trials, trained_on
@@ -229,6 +230,7 @@ def _says_report(model: GenerateModel, trials: Sequence[Trial], search: SearchMo
     if isinstance(model, CodesModel):
         report |= composed_report(model, seeds=range(3))
         report |= numbers_report(model, seeds=range(3))
+        report |= bare_report(model, seeds=range(3))
     report["said_outside"] = {
         "outside": said_to_be_outside(model, outside()),
         "prompts": said_to_be_outside(model, [prompt.text for prompt in prompts()]),

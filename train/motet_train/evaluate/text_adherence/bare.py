@@ -1,0 +1,63 @@
+"""Bare commands, the words that people type first: whether the motion does it, or at least a warning says that it does
+not."""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from motet.errors import TextWarning, collected
+from motet.generate.base import Generated, GenerateModel
+from motet.generate.model import Story
+from motet.text.clauses import stem
+from motet.text.vocabulary import RULES
+from motet_train.data.table import read_toml
+from motet_train.evaluate.tables import Report
+from motet_train.evaluate.text_adherence.prompts import holds
+from motet_train.evaluate.text_adherence.track import track_of
+
+
+@cache
+def table() -> Mapping[str, Any]:
+    """bare.toml: "bare", commands with the rules that a motion must keep; "odd", stems of words for other acts."""
+    return read_toml(__file__, "bare.toml")
+
+
+def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
+    """Shares from 0 to 1 of motions that do what a command says ("right"), and of those that do not and come without a
+    warning ("unwarned"); of the half that may be chosen by, and of the half kept back ("kept_").
+
+    "bare_right" and "bare_unwarned" have them by command.
+    """
+    right: dict[str, float] = {}
+    unwarned: dict[str, float] = {}
+    shares: dict[str, list[float]] = {"right": [], "unwarned": [], "kept_right": [], "kept_unwarned": []}
+    for row in table()["bare"]:
+        text = row["text"]
+        outcomes = [_outcome(model, row, seed) for seed in seeds]
+        right[text] = float(np.mean([does for does, _ in outcomes]))
+        unwarned[text] = float(np.mean([not does and not warned for does, warned in outcomes]))
+        prefix = "kept_" if row.get("kept") else ""
+        shares[f"{prefix}right"].append(right[text])
+        shares[f"{prefix}unwarned"].append(unwarned[text])
+    means = {name: float(np.mean(values)) for name, values in shares.items()}
+    return {"bare": means, "bare_right": right, "bare_unwarned": unwarned}
+
+
+def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[bool, bool]:
+    """Whether the motion of a command does what it says, and whether there was a warning."""
+    with collected(TextWarning) as warnings:
+        (generated,) = model.generate(row["text"], seed=seed)
+    does = holds(track_of(generated.motion), row["rules"]) and not odd_words(generated, row)
+    return does, bool(warnings)
+
+
+def odd_words(generated: Generated, row: Mapping[str, Any]) -> set[str]:
+    """The stems of words for other acts in the sentences of the actions that a motion shows."""
+    shown = [generated.action]
+    if isinstance(generated, Story):
+        shown += [passage.action for passage in generated.passages]
+    stems = set(map(stem, RULES.words(" ".join(shown))))
+    allowed = {*map(stem, RULES.words(row["text"])), *row.get("also", ())}
+    return stems & set(table()["odd"]) - allowed
