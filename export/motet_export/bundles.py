@@ -15,6 +15,7 @@ from motet.bundle.members import array_bytes
 from motet.files import check_place
 from motet.models.base import BundleModel
 from motet.models.load import build, kind_of
+from motet_export.commands import with_commands
 from motet_export.decoded import differences, golden_vectors, whole_runs
 from motet_export.exporter import ExportError, export_graph, halved, quantised, round_weights
 from motet_export.parity import (
@@ -108,11 +109,12 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     return changes
 
 
-def renew_golden(bundle: Bundle, out: str | Path) -> None:
-    """Copy a bundle to ``out`` with golden vectors as today's code makes them; nothing else changes."""
+def renew_golden(bundle: Bundle, out: str | Path, commands: Path | None = None) -> None:
+    """Copy a bundle to ``out`` with golden vectors as today's code makes them; nothing else changes but, if they are
+    given as a table, its commands (:func:`motet_export.commands.with_commands`)."""
     check_place(out)
-    manifest = bundle.manifest
-    model = kind_of(manifest).load(bundle)
+    model = with_commands(bundle, commands) if commands else kind_of(bundle.manifest).load(bundle)
+    manifest = model.manifest
     files = {f"{role}.onnx": bundle.read(graph.file) for role, graph in manifest.graphs.items()}
     _write(out, model, files, manifest.source, examples(manifest, model.graphs, far=True))
 

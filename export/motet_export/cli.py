@@ -25,14 +25,17 @@ from motet_train.runs import MANIFEST, Run
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
 @click.option("--back", is_flag=True, help="RUN is a bundle: write a training run with its weights, to train on from.")
 @click.option("--golden", is_flag=True, help="RUN is a bundle: copy it with golden vectors as today's code makes them.")
-def export(run: Path, out: Path, int8: bool, half: bool, back: bool, golden: bool) -> None:
+@click.option(
+    "--commands", type=Path, help="RUN is a bundle that generates: copy it with the plain acts of commands in a table."
+)
+def export(run: Path, out: Path, int8: bool, half: bool, back: bool, golden: bool, commands: Path | None) -> None:
     """Export the training run RUN to ONNX as a bundle, if ONNX Runtime computes the same as torch.
 
     RUN may be the folder that `motet train all` wrote: then OUT gets a bundle of each run that is a model by itself.
     With --half, RUN may also be a bundle: it is copied with rounded weights.
     """
-    if back or golden or (half and run.suffix == ".zip"):
-        _rewrite(Bundle.open(run), out, back, golden)
+    if back or golden or commands or (half and run.suffix == ".zip"):
+        _rewrite(Bundle.open(run), out, back, golden, commands)
         return
     for path, trained in _runs(run, out).items():
         report = export_run(trained, path, int8, half)
@@ -41,13 +44,13 @@ def export(run: Path, out: Path, int8: bool, half: bool, back: bool, golden: boo
         click.echo(str(path))
 
 
-def _rewrite(bundle: Bundle, out: Path, back: bool, golden: bool) -> None:
-    """Write a bundle as a run, or copy it with new golden vectors, or else with rounded weights."""
+def _rewrite(bundle: Bundle, out: Path, back: bool, golden: bool, commands: Path | None) -> None:
+    """Write a bundle as a run, or copy it with new golden vectors or commands, or else with rounded weights."""
     if back:
         with new_folder(out) as folder:
             restored(bundle).save(folder)
-    elif golden:
-        renew_golden(bundle, out)
+    elif golden or commands:
+        renew_golden(bundle, out, commands)
     else:
         _show("half", halve_bundle(bundle, out))
     click.echo(str(out))

@@ -80,4 +80,5 @@ def memory_tables(motions: list[tuple[int, Array]]) -> tuple[Array, Array, Array
 def source(sharpness: float = 1.0, ending: float = 0.0) -> Source:
     """What writers draw from."""
     remember = partial(Memory.of, *memory_tables(remembered()))
-    return Source(step(), part(sharpness=sharpness, ending=ending), END, NULL_ACTION, remember)
+    parts = part(sharpness=sharpness, ending=ending)
+    return Source(step(), parts, END, NULL_ACTION, remember, np.arange(NULL_ACTION + 1))

@@ -71,6 +71,9 @@ class Source:
     remember: Callable[[], Memory]
     """Makes the memory."""
 
+    written: Ids
+    """The action that the graph step knows each one as; other than itself for those of commands."""
+
     @cached_property
     def memory(self) -> Memory:
         """The memory, made when it is first used; BundleError where a table of it was altered or does not fit."""
@@ -187,7 +190,7 @@ class Writer:
         no_action = np.full(len(actions), self.source.null_action)
         inputs = {
             "codes": self.last,
-            "action": np.concatenate([actions, no_action]).astype(np.int64),
+            "action": np.concatenate([self.source.written[actions], no_action]).astype(np.int64),
             "age": np.concatenate([self.age, self.age]),
         }
         outputs, self.state = advance(self.source.step, self.state, inputs)

@@ -189,6 +189,11 @@ class Memory:
         acts = _over(importance, starts, lasts)
         return Memory(codes, ages, parts, importance, acts, lasts, rows, keys, settings)
 
+    def lend(self, action: int, other: int) -> None:
+        """Let an action that has no steps have those of another one."""
+        if action not in self.rows and other in self.rows:
+            self.rows[action] = self.rows[other]
+
     @cached_property
     def shortest(self) -> dict[int, int]:
         """The number of steps of each action's shortest motion."""

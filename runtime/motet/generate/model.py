@@ -27,6 +27,7 @@ from motet.figures.humanoid import HUMANOID
 from motet.generate.base import Generated, GenerateModel, LoopSettings, LoopValues
 from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
+from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
 from motet.generate.keyed_acts import STANDING, NamedAct, act_named
 from motet.generate.keyed_acts import verbs as keyed_verbs
@@ -38,7 +39,18 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
 from motet.settings import Range, Seed, Settings
-from motet.text.clauses import FUNCTION_WORDS, OWN, Passage, Shown, at_odds, parts_of, sentences_of, stem, verbs_of
+from motet.text.clauses import (
+    FUNCTION_WORDS,
+    OPENING,
+    OWN,
+    Passage,
+    Shown,
+    at_odds,
+    parts_of,
+    sentences_of,
+    stem,
+    verbs_of,
+)
 from motet.text.numeric_phrases import PACES, Quantities, known_turns, quantities_of
 
 DONE = re.compile(r"(?:ing|ed|[^s]s)$")
@@ -52,6 +64,9 @@ TOGETHER = 64
 
 NEVER = -1e9
 """Log-probability of an action that is not drawn."""
+
+FAR_LESS = -100.0
+"""What is added to the log-probabilities of actions where a command is meant."""
 
 Stand = Literal["start", "end", "both"]
 """Where a figure stands briefly."""
@@ -122,9 +137,13 @@ class CodesModel(GenerateModel):
         self.codec = self._read_codec()
         self.sizes |= {"T": self.codec.field.hop, "M": self.codec.moves}
         self._bind()
-        self.source = Source(graphs["step"], graphs["part"], self.codec.moves, self.sizes["A"], self._remember)
+        source = Fields(manifest.source)
+        commands = source.list_of_fields("commands") if "commands" in manifest.source else []
+        self._commands = Commands.of(commands, self.vocabulary.rules, self.sizes["A"])
+        written = self._commands.written
+        self.source = Source(graphs["step"], graphs["part"], self.codec.moves, self.sizes["A"], self._remember, written)
         self._familiar = self.settings(FamiliaritySettings)
-        self._read_actions(Fields(manifest.source).list_of_fields("actions"))
+        self._read_actions(source.list_of_fields("actions"))
 
     def _read_codec(self) -> Codec:
         """The codec that the manifest describes, and its two graphs."""
@@ -145,7 +164,11 @@ class CodesModel(GenerateModel):
         with self.named():
             tables = self.tables
             settings = self.settings(MemorySettings)
-            return Memory.of(tables["memory"], tables["moves"], tables["body"], self.sizes["A"], settings)
+            actions = len(self.source.written) if self._commands.acts else self.sizes["A"]
+            memory = Memory.of(tables["memory"], tables["moves"], tables["body"], actions, settings)
+        for number, command in enumerate(self._commands.acts, start=self._commands.first):
+            memory.lend(number, command.action)
+        return memory
 
     def ready(self) -> Self:
         """See :meth:`motet.models.base.BundleModel.ready`."""
@@ -174,6 +197,33 @@ class CodesModel(GenerateModel):
         alone = [super(CodesModel, self).contexts([sequence], role) for sequence in sequences]
         return np.concatenate([np.empty((0, self.sizes["A"]), dtype=np.float32), *alone])
 
+    def embed(self, sentences: str | Sequence[str]) -> Floats:
+        """See :meth:`GenerateModel.embed`: (A,), or (A + 1 + C,) where the bundle has C commands."""
+        texts = texts_of(sentences)
+        contexts = super().embed(texts)
+        if self._commands.acts:
+            meant = [self._meant(text, context) for text, context in zip(texts, contexts, strict=True)]
+            contexts = np.stack(meant) if meant else contexts
+        return contexts[0] if isinstance(sentences, str) else contexts
+
+    def _meant(self, text: str, context: Floats) -> Floats:
+        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions: that of a command alone, or
+        of the nearest one where it leaves out less than the likeliest action."""
+        act = self._commands.act(text)
+        if act is None:
+            nearest = self._commands.nearest(text)
+            if nearest is not None:
+                lacking = len(self.lacking(text, int(context.argmax())))
+                if len(self.lacking(text, nearest)) < lacking + (not self._understood(text, context).confident):
+                    act = nearest
+        meant = np.full(self._commands.first + len(self._commands.acts), NEVER, dtype=np.float32)
+        if act is None:
+            meant[: len(context)] = context
+        else:
+            meant[: len(context)] = context + np.float32(FAR_LESS)
+            meant[act] = 0.0
+        return meant
+
     def _read_actions(self, entries: Sequence[Fields]) -> None:
         """The known actions: a sentence and the words of each, and the weights of words, more of one that describes few
         actions."""
@@ -182,6 +232,9 @@ class CodesModel(GenerateModel):
         self._sentences = [entry.text("sentence") for entry in entries]
         self._words = [entry.texts("words") for entry in entries]
         actions_with = Counter(chain.from_iterable(self._words))
+        # Then no action, and commands.
+        self._sentences += ["", *(command.sentence for command in self._commands.acts)]
+        self._words += [(), *(command.words for command in self._commands.acts)]
         self._rare = {word: math.log((1 + len(entries)) / count) for word, count in actions_with.items()}
         self._verbs = verbs_of(actions_with) | (keyed_verbs() if self.contract.skeleton == HUMANOID else set())
 
@@ -191,7 +244,8 @@ class CodesModel(GenerateModel):
 
     def _done(self, action: int) -> frozenset[str]:
         """The stems of those of its words that are what is done."""
-        return frozenset(stem(word) for word in self._words[action] if DONE.search(word))
+        is_command = action >= self._commands.first
+        return frozenset(stem(word) for word in self._words[action] if is_command or DONE.search(word))
 
     def _keyed(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or a recorded action has all its words,
@@ -245,7 +299,10 @@ class CodesModel(GenerateModel):
             amounts = dict(quantities_of(part).amounts)
             if amounts and amounts != dict(quantities.amounts):
                 return False
-        return True
+        # Several commands are one only where they are known as one.
+        if self._commands.act(quantities.text) is not None:
+            return True
+        return any(self._commands.act(self.quantities(part).text) is None for part in parts)
 
     def quantities(self, sentence: str) -> Quantities:
         """The numbers in a sentence, and the text that it is read as: itself if the likeliest action has all its words,
@@ -255,7 +312,16 @@ class CodesModel(GenerateModel):
             return Quantities(sentence)
         if self._keyed(sentence):
             return Quantities(STANDING)
+        if self._commands.act(sentence) is not None:
+            return Quantities(sentence)
         quantities = quantities_of(sentence)
+        # A turn without a gait is one on the spot, whoever turns.
+        opening = OPENING.match(quantities.spot)
+        for turn in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
+            if "degrees" in quantities.amounts and self._commands.act(turn) is not None:
+                return replace(quantities, text=turn)
+        if self._commands.act(quantities.text) is not None:
+            return quantities
         if quantities.amounts and quantities.text != sentence:
             texts = known_turns(quantities)
             if quantities.amounts.keys() & {"degrees", "times"}:
@@ -276,13 +342,15 @@ class CodesModel(GenerateModel):
         if action is None:
             action = int(self._context(sentence).argmax())
         have = self._stems(action)
+        if action >= self._commands.first and self._commands.is_instead(sentence):
+            have = frozenset()
         return [word for word, forms in self._content(sentence).items() if have.isdisjoint(forms)]
 
     def _context(self, sentence: str) -> Floats:
         """The context (A,) of a sentence, without a warning of unknown words."""
         ids, _ = self.vocabulary.encode(sentence)
         context: Floats = self.contexts([ids])[0]
-        return context
+        return self._meant(sentence, context) if self._commands.acts else context
 
     def _content(self, sentence: str) -> dict[str, frozenset[str]]:
         """The known words of a sentence, sorted, without function words, and the stems that show each."""
@@ -332,13 +400,17 @@ class CodesModel(GenerateModel):
 
     def _understood(self, sentence: str, context: Floats) -> Understood:
         words = dict.fromkeys(self.vocabulary.rules.words(sentence))
-        unheard = math.log(1 + len(self._sentences))
+        unheard = math.log(1 + self.sizes["A"])
         heard = sum(self._rare.get(word, 0.0) for word in words)
         share = heard / (sum(self._rare.get(word, unheard) for word in words) or 1.0)
+        likeliest_action = int(context.argmax())
+        if likeliest_action >= self._commands.first and not self.lacking(sentence, likeliest_action):
+            share = 1.0
         order = np.argsort(-context, kind="stable")
         nearest: dict[str, None] = {}
         for action in order.tolist():
-            nearest[self._sentences[action]] = None
+            if self._sentences[action]:
+                nearest[self._sentences[action]] = None
             if len(nearest) == 3:
                 break
         likeliest = float(context[order[0]])

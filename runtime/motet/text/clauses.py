@@ -25,6 +25,13 @@ FUNCTION_WORDS = frozenset((
 """Words that say little about an action."""
 # fmt: on
 
+# fmt: off
+POLITE_WORDS = frozenset((
+    "a", "again", "an", "and", "do", "does", "finally", "first", "just", "make", "makes", "my", "next", "now", "please",
+    "take", "takes", "the", "then", "to", "your",
+))
+"""Words that make no difference to a command."""
+# fmt: on
 
 AT_ONCE = re.compile(
     r"\b(?:while|whilst|simultaneously|without|as (?:he|she|they|it)|(?:and )?at the same time(?: as)?)\b",

@@ -142,6 +142,9 @@ class Quantities:
     act: str = ""
     """The measure of the act that is repeated, a value of :data:`ACTS`; "" for one counted by its beginnings."""
 
+    spot: str = ""
+    """The sentence without the numbers, as words alone: a turn without a gait, which ``text`` makes walking."""
+
 
 def numerals(sentence: str) -> str:
     """A sentence in lower case with numbers as digits: "half a turn" is "0.5 turn", "twice" is "2 times"."""
@@ -167,7 +170,8 @@ def quantities_of(sentence: str) -> Quantities:
     if pace := PACES.search(text):
         amounts["pace"] = SLOWER if pace[1] else FASTER
     remaining = _plain(text, amounts) if phrases or "degrees" in amounts else sentence
-    return Quantities(remaining, amounts, len(sides) != 1, _act_in(text))
+    spot = re.sub(r"\s+", " ", text).strip(" ,.")
+    return Quantities(remaining, amounts, len(sides) != 1, _act_in(text), spot)
 
 
 def _act_in(text: str) -> str:

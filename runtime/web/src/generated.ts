@@ -193,6 +193,7 @@ export const memorySettings = {
 
 // motet.generate.model
 export const GENERATE = {
+  FAR_LESS: -100,
   NEVER: -1000000000,
   STANDING: "a person stands still",
   STANDING_SECONDS: 0.8,
@@ -520,6 +521,7 @@ export const WARPING = {
 // motet.text.clauses
 export const CLAUSES = {
   FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first", "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on", "or", "person", "she", "somebody", "someone", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your"],
+  POLITE_WORDS: ["a", "again", "an", "and", "do", "does", "finally", "first", "just", "make", "makes", "my", "next", "now", "please", "take", "takes", "the", "then", "to", "your"],
 } as const;
 
 // motet.text.vocabulary

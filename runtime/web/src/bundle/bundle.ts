@@ -33,6 +33,7 @@ export interface Manifest {
   vocabulary?: string[];
   common?: Record<string, string>;
   actions?: { sentence: string; words: string[] }[];
+  commands?: { sentence: string; action: number; texts: string[]; instead: string[] }[];
   licence: { weights: string | null; data: string | null };
 }
 

@@ -42,7 +42,7 @@ export function checkManifest(manifest: Fields): void {
       check(fits && value !== null, `settings.${feature}.${key}`, "is no number of a setting");
     }
   }
-  const { vocabulary, actions } = manifest;
+  const { vocabulary, actions, commands } = manifest;
   check(vocabulary === undefined || isTexts(vocabulary), "vocabulary", "must hold texts");
   const named = (action: unknown) =>
     isObject(action) && typeof action.sentence === "string" && isTexts(action.words);
@@ -50,6 +50,17 @@ export function checkManifest(manifest: Fields): void {
     actions === undefined || (isList(actions) && actions.every(named)),
     "actions",
     "must hold sentences with their words",
+  );
+  const meant = (command: unknown) =>
+    isObject(command) &&
+    typeof command.sentence === "string" &&
+    isCount(command.action) &&
+    isTexts(command.texts) &&
+    isTexts(command.instead);
+  check(
+    commands === undefined || (isList(commands) && commands.every(meant)),
+    "commands",
+    "must hold sentences with their actions and texts",
   );
 }
 

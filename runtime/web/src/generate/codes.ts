@@ -23,6 +23,8 @@ export interface Source {
   nullAction: number;
   parts: number;
   memory: Memory;
+  /** The action that the graph step knows each one as; other than itself for those of commands. */
+  written: number[];
 }
 
 /** An action for log-probabilities (A), by the first number of a block of noise. */
@@ -159,7 +161,10 @@ export class Writer {
     const { age, done, last, states, recent } = (this.before = this.now);
     const inputs = {
       codes: integers(last.flat(), last.length, this.source.parts),
-      action: integers([...actions, ...actions.map(() => this.source.nullAction)]),
+      action: integers([
+        ...actions.map((action) => this.source.written[action]!),
+        ...actions.map(() => this.source.nullAction),
+      ]),
       age: integers([...age, ...age]),
     };
     const { outputs, states: next } = await this.source.step.step(inputs, states);

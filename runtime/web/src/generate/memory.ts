@@ -26,13 +26,17 @@ export class Memory {
   /** Of each remembered action the steps of its shortest motion. */
   readonly shortest = new Map<number, number>();
 
-  /** table: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. */
+  /**
+   * table: (M, P + 2) codes, action, age. moves: (E, 3). body: (V, L). actions: how many there are. lent: for actions
+   * that may have no steps the one whose steps they get.
+   */
   constructor(
     private readonly table: NumberArray,
     moves: NumberArray,
     body: NumberArray,
     actions: number,
     readonly settings: Settings<typeof memorySettings>,
+    lent: Map<number, number> = new Map(),
   ) {
     const steps = table.shape[0]!;
     const columns = table.shape[1]!;
@@ -42,6 +46,11 @@ export class Memory {
     this.ages = Int32Array.from({ length: steps }, (_, row) => Number(table.data[(row + 1) * columns - 1]));
     for (let row = 0; row < steps; row++) this.remember(row, moves, body, actions);
     this.lasts = lastsOf(this.ages);
+    const kinds = this.rows.size;
+    for (const [action, other] of lent) {
+      const rows = this.rows.get(other);
+      if (rows && !this.rows.has(action)) this.rows.set(action, rows);
+    }
     for (const [action, rows] of this.rows) {
       const steps = rows.map((row) => this.ages[this.lasts[row]!]!);
       this.shortest.set(
@@ -51,7 +60,7 @@ export class Memory {
     }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
     this.parts = this.over(changes.map((change) => this.settings.rest_weight + change));
-    const rare = this.rarity(body.shape[0]!, moves.shape[0]!);
+    const rare = this.rarity(body.shape[0]!, moves.shape[0]!, kinds);
     this.particular = changes.map(
       (change, row) => (this.settings.pose_weight + change) * Math.exp(rare[row]!),
     );
@@ -88,14 +97,14 @@ export class Memory {
    * How rare the body's codes of each step are among actions, in standard deviations: the sum of the logarithms of
    * inverse document frequencies. -Infinity for an end, which counts nothing.
    */
-  private rarity(values: number, end: number): Float64Array {
+  private rarity(values: number, end: number, kinds: number): Float64Array {
     const columns = this.table.shape[1]!;
     const sums = new Float64Array(this.steps);
     const real = [...sums.keys()].filter((row) => this.column(row, 0) !== end);
     for (let column = 1; column < columns - 2; column++) {
       const has = Array.from({ length: values }, () => new Set<number>());
       for (const row of real) has[this.column(row, column)]!.add(this.column(row, columns - 2));
-      for (const row of real) sums[row]! += Math.log(this.rows.size / has[this.column(row, column)]!.size);
+      for (const row of real) sums[row]! += Math.log(kinds / has[this.column(row, column)]!.size);
     }
     const mean = real.reduce((sum, row) => sum + sums[row]!, 0) / real.length;
     const spread = Math.sqrt(real.reduce((sum, row) => sum + (sums[row]! - mean) ** 2, 0) / real.length);

@@ -2,6 +2,7 @@ import { GENERATE, continuationSettings, familiaritySettings, memorySettings } f
 import type { Bundle, Manifest } from "../bundle/bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
 import { FUNCTION_WORDS, partsOf, sentencesOf, stem, verbsOf } from "../text/clauses.js";
+import { Commands } from "./commands.js";
 import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
 import { BundleError, DecodingError, TextError } from "../errors.js";
 import type { Graph } from "../bundle/graph.js";
@@ -114,6 +115,7 @@ export class GenerateModel extends LanguageModel {
     this.manifest.settings.continuation,
   );
   private readonly verbs: ReturnType<typeof verbsOf>;
+  private readonly commands: Commands;
 
   constructor(
     manifest: Manifest,
@@ -122,6 +124,8 @@ export class GenerateModel extends LanguageModel {
     private readonly codec: Codec,
   ) {
     super(manifest);
+    const split = (text: string) => this.vocabulary.split(text);
+    this.commands = new Commands(manifest.commands ?? [], split, manifest.actions?.length ?? 0);
     this.verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
   }
 
@@ -145,9 +149,16 @@ export class GenerateModel extends LanguageModel {
     const lacking: string[] = [];
     for (const sentence of sentencesOf(text)) {
       const parts = partsOf(sentence, this.verbs);
-      lacking.push(...(parts.length > 1 && (await this.lacks(sentence)) ? parts : [sentence]));
+      lacking.push(...(parts.length > 1 && (await this.splits(sentence, parts)) ? parts : [sentence]));
     }
     return lacking.length > 1 ? lacking : [text];
+  }
+
+  /** Whether parts are shown one by one: the likeliest action lacks some, or all are commands and not one together. */
+  private async splits(sentence: string, parts: string[]): Promise<boolean> {
+    if (await this.lacks(sentence)) return true;
+    if (this.commands.act(sentence) !== undefined) return false;
+    return parts.every((part) => this.commands.act(part) !== undefined);
   }
 
   /** Whether the likeliest action lacks something of a sentence. */
@@ -158,13 +169,28 @@ export class GenerateModel extends LanguageModel {
 
   /** The known words of a sentence, but for function words, of which no sentence of an action has any form. */
   private lacking(sentence: string, action: number): string[] {
-    const have = new Set(this.manifest.actions![action]!.words.map(stem));
+    const have = this.has(sentence, action);
     const words = new Set(this.vocabulary.split(sentence).map((word) => this.vocabulary.meant(word)));
     const lacks = (word: string) =>
       word &&
       !FUNCTION_WORDS.has(word) &&
       ![word, this.vocabulary.near(word)].some((form) => have.has(stem(form)));
     return [...words].filter(lacks).sort();
+  }
+
+  /** The stems that show the words of a sentence in an action. */
+  private has(sentence: string, action: number): Set<string> {
+    const { first } = this.commands;
+    if (action < first - 1) return new Set(this.manifest.actions![action]!.words.map(stem));
+    return action < first || this.commands.isInstead(sentence) ? new Set() : this.commands.stems(action);
+  }
+
+  /** The sentence of an action or of a command; "" of no action. */
+  private named(action: number): string {
+    const { acts, first } = this.commands;
+    return action < first - 1
+      ? this.manifest.actions![action]!.sentence
+      : (acts[action - first]?.sentence ?? "");
   }
 
   /** What a sentence is taken for. */
@@ -175,9 +201,8 @@ export class GenerateModel extends LanguageModel {
   }
 
   private shownAs(sentence: string, action: number, context: Float32Array): Shown {
-    const taken = this.manifest.actions![action]!.sentence;
     return {
-      action: taken,
+      action: this.named(action),
       lacking: this.lacking(sentence, action),
       confidence: this.known(sentence, context).confidence,
     };
@@ -269,13 +294,34 @@ export class GenerateModel extends LanguageModel {
     const all = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : unheard), 0);
     const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
     const { confident, doubt } = this.familiarity;
-    const confidence = (heard / (all || 1)) * Math.exp(context[order[0]!]!) ** doubt;
-    const nearest = [...new Set(order.map((action) => actions[action]!.sentence))].slice(0, 3);
+    const likeliest = order[0]!;
+    const isCommand = likeliest >= this.commands.first && !this.lacking(text, likeliest).length;
+    const share = isCommand ? 1 : heard / (all || 1);
+    const confidence = share * Math.exp(context[likeliest]!) ** doubt;
+    const sentences = order.map((action) => this.named(action)).filter(Boolean);
+    const nearest = [...new Set(sentences)].slice(0, 3);
     return { confidence, confident: confidence >= confident, nearest };
   }
 
+  /** The context (A + 1 + C) of a text where the bundle has C commands, else (A). */
   private async context(text: string): Promise<Float32Array> {
-    return (await this.encoder.run(this.words(text))).context!.data;
+    const context: Float32Array = (await this.encoder.run(this.words(text))).context!.data;
+    return this.commands.acts.length ? this.meant(text, context) : context;
+  }
+
+  /** That of a command alone, or of the nearest one where it leaves out less than the likeliest action. */
+  private meant(text: string, context: Float32Array): Float32Array {
+    let act = this.commands.act(text);
+    const nearest = act === undefined ? this.commands.nearest(text) : undefined;
+    if (nearest !== undefined) {
+      const lacking = this.lacking(text, context.indexOf(Math.max(...context))).length;
+      const doubtful = this.known(text, context).confident ? 0 : 1;
+      if (this.lacking(text, nearest).length < lacking + doubtful) act = nearest;
+    }
+    const meant = new Float32Array(this.commands.first + this.commands.acts.length).fill(GENERATE.NEVER);
+    meant.set(act === undefined ? context : context.map((value) => value + GENERATE.FAR_LESS));
+    if (act !== undefined) meant[act] = 0;
+    return meant;
   }
 
   private drawing(settings: Partial<Drawing>): Drawing {
@@ -406,6 +452,9 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
   const actions = manifest.actions?.length ?? 0;
   const end = moves.shape[0]!;
   const parts = Number(part!.spec.inputs.find((input) => input.name === "codes")!.shape[1]);
+  const commands = manifest.commands ?? [];
+  const known = commands.length ? actions + 1 + commands.length : actions;
+  const lent = new Map(commands.map(({ action }, at) => [actions + 1 + at, action]));
   const remembers = settingsOf("memory", memorySettings, manifest.settings.memory);
   const source: Source = {
     step: step!,
@@ -413,7 +462,8 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
     end,
     nullAction: actions,
     parts,
-    memory: new Memory(memory, moves, body, actions, remembers),
+    memory: new Memory(memory, moves, body, known, remembers, lent),
+    written: [...Array(actions + 1).keys(), ...commands.map(({ action }) => action)],
   };
   const codec: Codec = {
     decoder: decoder!,
