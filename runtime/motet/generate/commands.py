@@ -34,7 +34,7 @@ class Command:
     """Commands for acts that nobody recorded, for which it is shown with a warning."""
 
     words: tuple[str, ...]
-    """All words of its texts."""
+    """All words that it does not leave out: those of its texts, and polite ones."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def _command(entry: Fields, rules: TextRules, actions: int) -> Command:
         entry.whole("action", 0, actions - 1),
         frozenset(map(key_of, texts)),
         frozenset(map(key_of, instead)),
-        tuple(chain.from_iterable(texts)),
+        (*sorted(POLITE_WORDS), *chain.from_iterable(texts)),
     )
 
 

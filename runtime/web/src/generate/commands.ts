@@ -78,10 +78,10 @@ export class Commands {
     return nearest;
   }
 
-  /** The stems of all words of an act's commands. */
+  /** The stems of the words that an act does not leave out: those of its commands, and polite ones. */
   stems(action: number): Set<string> {
     const { texts } = this.acts[action - this.first]!;
-    return new Set(texts.flatMap((text) => this.split(text).map(stem)));
+    return new Set([...POLITE_WORDS, ...texts.flatMap((text) => this.split(text))].map(stem));
   }
 }
 
