@@ -65,16 +65,9 @@ def _built(model: CodesModel, entries: Sequence[Mapping[str, Any]]) -> CodesMode
 
 def _joined(model: CodesModel, cuts: Sequence[Cut], number: int) -> Steps:
     """The steps (T, P + 2) of a motion that joins cuts, and of its end, as those of a command."""
-    memory = model.source.memory
-    end = np.zeros((1, memory.codes.shape[1]), dtype=np.int64)
-    end[0, 0] = model.codec.moves
     parts: list[NDArray[np.int64]] = []
     for cut in cuts:
-        rows = memory.rows[cut["action"]][memory.recordings(cut["action"])[cut["take"]].places]
-        rows = rows[memory.codes[rows, 0] < model.codec.moves]
-        if not 0 <= cut["first"] < cut["stop"] <= len(rows):
-            raise ValueError(f"the recording of {dict(cut)} has {len(rows)} steps")
-        codes = memory.codes[rows]
+        codes = _recording(model, cut)
         if cut["first"] and not parts:
             # what begins a motion is coded as its beginning, with nothing before
             hop = model.codec.field.hop
@@ -82,6 +75,19 @@ def _joined(model: CodesModel, cuts: Sequence[Cut], number: int) -> Steps:
             parts.append(model.codec.codes_of(frames))
         else:
             parts.append(codes[cut["first"] : cut["stop"]])
+    end = np.zeros_like(parts[0][:1])
+    end[0, 0] = model.codec.moves
     codes = np.concatenate([*parts, end])
     ages = np.arange(len(codes))
     return np.column_stack([codes, np.full(len(codes), number), ages]).astype(np.int16)
+
+
+def _recording(model: CodesModel, cut: Cut) -> NDArray[np.int64]:
+    """The steps (N, P) of the recording of a cut, without its end."""
+    memory = model.source.memory
+    take = memory.recordings(cut["action"])[cut["take"]]
+    codes: NDArray[np.int64] = memory.codes[memory.rows[cut["action"]][take.places]]
+    codes = codes[codes[:, 0] < model.codec.moves]
+    if not 0 <= cut["first"] < cut["stop"] <= len(codes):
+        raise ValueError(f"the recording of {dict(cut)} has {len(codes)} steps")
+    return codes

@@ -91,7 +91,12 @@ def understood(model: CodesModel) -> list[dict[str, Any]]:
 
 def taken(model: CodesModel) -> dict[str, Any]:
     """The actions that sentences, and their parts, are taken for, with the words that those lack; and the warnings."""
-    texts = ("a person walks forward", "he plays slowly while kicking a ball", "she jumps over a wall and then waves")
+    texts = [
+        "a person walks forward",
+        "he plays slowly while kicking a ball",
+        "she jumps over a wall and then waves",
+        "walk to the chair, sit down, stand up again",
+    ]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", TextWarning)
         found = {text: model.generate(text, 2, seed=1, seconds=1, numbers=False) for text in texts}
@@ -194,6 +199,7 @@ def parted(model: CodesModel) -> dict[str, list[str]]:
         "she carries a box and punches, kicks and dances next to the wall",
         "a tall, thin man walks 1.5 metres with the left and the right hand raised",
         "rock and roll",
+        "stand up and walk",
     ]
     return {text: model.parts(text) for text in texts}
 

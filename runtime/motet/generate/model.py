@@ -269,7 +269,11 @@ class CodesModel(GenerateModel):
             return None
         if quantities.amounts.keys() != {"times"}:
             return None
-        return act_named(self.vocabulary.rules.words(quantities.text), quantities.amounts["times"])
+        named = act_named(self.vocabulary.rules.words(quantities.text), quantities.amounts["times"])
+        # One that cannot be repeated gives way to a command's, which can.
+        if named and not named.act.repeat and self._commands.act(quantities.text) is not None:
+            return None
+        return named
 
     def _likeliest_recorded(self, sentence: str) -> str:
         """The sentence of the recorded action that a sentence most likely is."""
@@ -314,12 +318,7 @@ class CodesModel(GenerateModel):
             return Quantities(STANDING)
         if self._commands.act(sentence) is not None:
             return Quantities(sentence)
-        quantities = quantities_of(sentence)
-        # A turn without a gait is one on the spot, whoever turns.
-        opening = OPENING.match(quantities.spot)
-        for turn in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
-            if "degrees" in quantities.amounts and self._commands.act(turn) is not None:
-                return replace(quantities, text=turn)
+        quantities = self._on_the_spot(quantities_of(sentence))
         if self._commands.act(quantities.text) is not None:
             return quantities
         if quantities.amounts and quantities.text != sentence:
@@ -334,6 +333,16 @@ class CodesModel(GenerateModel):
             amounts = dict(quantities.amounts)
             del amounts["pace"]
             quantities = replace(quantities, amounts=amounts)
+        return quantities
+
+    def _on_the_spot(self, quantities: Quantities) -> Quantities:
+        """Quantities whose text is a turn on the spot, where that is a command, whoever turns; else as they are."""
+        if "degrees" not in quantities.amounts:
+            return quantities
+        opening = OPENING.match(quantities.spot)
+        for turn in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
+            if self._commands.act(turn) is not None:
+                return replace(quantities, text=turn)
         return quantities
 
     def lacking(self, sentence: str, action: int | None = None) -> list[str]:
@@ -399,13 +408,6 @@ class CodesModel(GenerateModel):
         return self._understood(text, self.embed(text))
 
     def _understood(self, sentence: str, context: Floats) -> Understood:
-        words = dict.fromkeys(self.vocabulary.rules.words(sentence))
-        unheard = math.log(1 + self.sizes["A"])
-        heard = sum(self._rare.get(word, 0.0) for word in words)
-        share = heard / (sum(self._rare.get(word, unheard) for word in words) or 1.0)
-        likeliest_action = int(context.argmax())
-        if likeliest_action >= self._commands.first and not self.lacking(sentence, likeliest_action):
-            share = 1.0
         order = np.argsort(-context, kind="stable")
         nearest: dict[str, None] = {}
         for action in order.tolist():
@@ -416,8 +418,18 @@ class CodesModel(GenerateModel):
         likeliest = float(context[order[0]])
         if likeliest > 0.01:  # more than rounding
             raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
-        confidence = share * math.exp(likeliest) ** self._familiar.doubt
+        confidence = self._share_known(sentence, int(order[0])) * math.exp(likeliest) ** self._familiar.doubt
         return Understood(confidence, tuple(nearest), confidence >= self._familiar.confident)
+
+    def _share_known(self, sentence: str, action: int) -> float:
+        """The share of a sentence in words of actions, rare words weighing more; 1 where its action is a command that
+        leaves out nothing."""
+        if action >= self._commands.first and not self.lacking(sentence, action):
+            return 1.0
+        words = dict.fromkeys(self.vocabulary.rules.words(sentence))
+        unheard = math.log(1 + self.sizes["A"])
+        known = sum(self._rare.get(word, 0.0) for word in words)
+        return known / (sum(self._rare.get(word, unheard) for word in words) or 1.0)
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """See :meth:`GenerateModel.note`."""

@@ -32,17 +32,22 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
     """
     right: dict[str, float] = {}
     unwarned: dict[str, float] = {}
-    shares: dict[str, list[float]] = {"right": [], "unwarned": [], "kept_right": [], "kept_unwarned": []}
     for row in table()["bare"]:
-        text = row["text"]
         outcomes = [_outcome(model, row, seed) for seed in seeds]
-        right[text] = float(np.mean([does for does, _ in outcomes]))
-        unwarned[text] = float(np.mean([not does and not warned for does, warned in outcomes]))
-        prefix = "kept_" if row.get("kept") else ""
-        shares[f"{prefix}right"].append(right[text])
-        shares[f"{prefix}unwarned"].append(unwarned[text])
-    means = {name: float(np.mean(values)) for name, values in shares.items()}
+        right[row["text"]] = float(np.mean([does for does, _ in outcomes]))
+        unwarned[row["text"]] = float(np.mean([not does and not warned for does, warned in outcomes]))
+    means = {
+        "right": _mean(right, False),
+        "unwarned": _mean(unwarned, False),
+        "kept_right": _mean(right, True),
+        "kept_unwarned": _mean(unwarned, True),
+    }
     return {"bare": means, "bare_right": right, "bare_unwarned": unwarned}
+
+
+def _mean(shares: Mapping[str, float], kept: bool) -> float:
+    """The mean over the half of the commands that is kept back, or over the other."""
+    return float(np.mean([shares[row["text"]] for row in table()["bare"] if row.get("kept", False) == kept]))
 
 
 def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[bool, bool]:
