@@ -30,10 +30,10 @@ def standing() -> Motion:
 
 @pytest.fixture(scope="module")
 def t_pose() -> Motion:
-    """Two seconds of the figure at rest, on its place."""
+    """Four seconds of the figure at rest, on its place."""
     channels = motet.load("control").run("stop 0.1s")
-    still = replace(channels, values=np.repeat(0 * channels.values[:1], 60, axis=0), fps=30.0)
-    root = np.repeat(HUMANOID.offsets[:1], 60, axis=0)
+    still = replace(channels, values=np.repeat(0 * channels.values[:1], 120, axis=0), fps=30.0)
+    root = np.repeat(HUMANOID.offsets[:1], 120, axis=0)
     return posed(still, {}, {"hips": root})
 
 
@@ -200,4 +200,7 @@ def test_the_command_writes_a_clip_for_each_act(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in tmp_path.iterdir()) == ["nod.bvh", "wave.bvh"]
     assert motet.check(tmp_path / "wave.bvh").sure
-    assert "no act 'fly'" in CliRunner().invoke(main, ["key", "--act", "fly", "-o", str(tmp_path / "x.bvh")]).output
+    assert (
+        "no act 'levitate'"
+        in CliRunner().invoke(main, ["key", "--act", "levitate", "-o", str(tmp_path / "x.bvh")]).output
+    )

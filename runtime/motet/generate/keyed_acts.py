@@ -25,15 +25,15 @@ SIDES = frozenset(("left", "right"))
 
 @dataclass(frozen=True)
 class NamedAct:
-    """An act as a sentence names it: on its side, and as often as it says. says: the act's sentence."""
+    """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act."""
 
     act: KeyedAct
-    says: str
+    sentence: str
 
     @property
     def stems(self) -> frozenset[str]:
         """The stems of the words of its sentence that name an act."""
-        return stems_of(self.says.split())
+        return stems_of(self.sentence.split())
 
     def seconds(self, seed: int) -> float:
         """How long it lasts."""

@@ -403,7 +403,7 @@ class CodesModel(GenerateModel):
         shows.
         """
         if numbers and (act := self._keyed(sentence)):
-            return Understood(1.0, (act.says,), True)
+            return Understood(1.0, (act.act.says[0],), True)
         text = self.quantities(sentence).text if numbers else sentence
         return self._understood(text, self.embed(text))
 
@@ -466,7 +466,7 @@ class CodesModel(GenerateModel):
     def _shown(self, request: Request, action: int) -> Shown:
         """How a request is shown; a TextWarning names the words that are left out."""
         if request.keyed is not None:
-            return Shown(request.keyed.says, (), 1.0)
+            return Shown(request.keyed.act.says[0], (), 1.0)
         sentence = request.quantities.text
         return self._warned(sentence, self._shown_as(sentence, action))
 
@@ -479,7 +479,7 @@ class CodesModel(GenerateModel):
         """How a sentence is shown by its likeliest action; motions that are drawn may show another likely one.
         Errors like :meth:`ids`, without warnings."""
         if act := self._keyed(sentence):
-            return Shown(act.says, (), 1.0)
+            return Shown(act.act.says[0], (), 1.0)
         return self._shown_as(self.quantities(sentence).text)
 
     def _shown_as(self, sentence: str, action: int | None = None) -> Shown:

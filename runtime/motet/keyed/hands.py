@@ -16,6 +16,7 @@ from motet.keyed.trunk import Figure
 from motet.motion.rotations import (
     Array,
     axis_to_rotmat,
+    continuous_rotvec,
     inverse,
     product,
     rotated,
@@ -220,4 +221,6 @@ def _within_wrist(lower: Array, hand: Array) -> tuple[Array, Array]:
 def _between(first: Array, second: Array, share: Array) -> Array:
     """Rotations (T, 3, 3) that go from the first to the second the shortest way."""
     turn = rotmat_to_rotvec(product(inverse(first), second))
+    # near half a turn the shortest way is now about one side, now about the other
+    turn = continuous_rotvec(turn[:, None])[:, 0]
     return product(first, rotvec_to_rotmat(share[:, None] * turn))

@@ -2,14 +2,15 @@
 
     python -m motet_train.recipes.repertoire
 
-Acts are recordings as ``generate`` shows them, parts of which are chosen and joined, or are keyed by hand in
-``acts_keyed.toml``.
+Acts are recordings as ``generate`` shows them, parts of which are chosen and joined, or acts by key poses
+(:mod:`motet.keyed`).
 """
 
 import json
 import tomllib
 from collections.abc import Mapping
-from importlib.resources import as_file, files
+from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -48,15 +49,13 @@ class Maker:
         self.generate = generate
         self.control = control
         self.standing: Motion = control.run(f"stop {STANDING:g}s")
-        with as_file(files("motet_train.data") / "acts_keyed.toml") as file:
-            self.keyed = motet.keyed.read(file)
         self._shown: dict[str, Array] = {}
 
     def numbers(self, act: Mapping[str, Any]) -> Array:
         """The frames (T, W) of an act of the table."""
         name = act["name"]
         if "keyed" in act:
-            motion = self.keyed[name].motion(self.standing)
+            motion = as_written(motet.keyed.ours()[name]).motion(self.standing)
             return self.control.act_of(motion, name).numbers.astype(np.float64)
         parts = [self._part(*take) for take in act["takes"]]
         tempos = act.get("tempos", [1.0] * len(parts))
@@ -74,6 +73,11 @@ class Maker:
         if len(part) < 2:
             raise DataError(f"acts.toml: {sentence!r} has nothing from {start:g} to {stop:g} s")
         return part if start < stop else part[::-1]
+
+
+def as_written(act: motet.keyed.KeyedAct) -> motet.keyed.KeyedAct:
+    """An act at the speed, of the size and on the side that its keys say."""
+    return replace(act, speed=(1.0, 1.0), amplitude=(1.0, 1.0), mirrored=False)
 
 
 def continuous(numbers: Array) -> Array:
