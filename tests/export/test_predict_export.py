@@ -1,5 +1,6 @@
 """A predictor as an ONNX bundle: what torch computes, for one figure and for many."""
 
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from motet.bundle.manifest import Manifest
 from motet.models.load import load
 from motet.predict.model import PredictModel
 from motet_export.bundles import export_run
-from motet_train.models.predictor import Predictor, PredictorConfig
+from motet_train.models.figure_predictor import FigurePredictor, FigurePredictorConfig
+from motet_train.models.kinematics import VectorFigure
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
@@ -23,24 +25,23 @@ CHANNELS = 9
 @pytest.fixture(scope="module")
 def run() -> Run:
     torch.manual_seed(0)
-    config = PredictorConfig(
+    config = FigurePredictorConfig(
         CHANNELS,
-        tuple(range(8)),
-        0,
-        (3, 4, 5, 0, 1, 2, 6, 7, 8),
-        (1.0, -1.0, -1.0) * 3,
+        VectorFigure((-1, 0, 1), ((0, 1, 0), (0, 0.3, 0), (0.1, 0.2, 0)), (0, 1), (6, 7, 8), tuple(range(6))),
+        tuple(range(CHANNELS)),
+        (1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, -1.0),
         frames=6,
-        polynomials=4,
         hidden=12,
         doubts=True,
     )
-    net = Predictor(config)
+    net = FigurePredictor(config)
     with torch.no_grad():
         for parameter in net.parameters():
-            parameter.add_(0.1 * torch.randn_like(parameter))
+            parameter.add_(0.05 * torch.randn_like(parameter))
+    net.reach.fill_(0.02)  # what is fed back stays small
     assert net.doubt is not None
     net.doubt.weight.uniform_(-0.5, 0.5)
-    return Run({**predict_manifest("trajectory", 3, 6), "config": vars(config)}, net)
+    return Run({**predict_manifest("figure-trajectory", 3, 6), "config": asdict(config)}, net)
 
 
 def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> None:
@@ -66,7 +67,7 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
 @torch.no_grad()
 def net_errors(run: Run, seeds: NDArray[np.float64]) -> NDArray[np.float32]:
     """What torch expects, in metres."""
-    assert isinstance(run.model, Predictor)
+    assert isinstance(run.model, FigurePredictor)
     frames = torch.from_numpy(seeds.astype(np.float32))
     found: NDArray[np.float32] = run.model.expected_error(frames, *run.model.with_disagreement(frames)).numpy()
     return found

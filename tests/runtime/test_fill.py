@@ -3,6 +3,7 @@
 import logging
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from fake_models import manifest
 from test_mmm_figure import mmm
 
 import motet
-from motet.errors import BundleError, MotionError
+from motet.errors import ArgumentError, BundleError, MotionError
 from motet.motion import MIXAMO, Motion, from_humanoid, positions, to_humanoid
 from motet.motion.kinematics import local_rotations, local_translations, posed
 from motet.motion.rotations import axis_to_rotmat
@@ -216,6 +217,18 @@ def test_motions_too_short_to_be_joined(model: FillModel) -> None:
         model.join(glider(3), glider())
     with pytest.raises(MotionError, match=r"after it, but there are 0\.1 s"):
         model.join(glider(), glider(3))
+
+
+def test_what_is_no_motion_is_refused(model: FillModel, walk: Motion) -> None:
+    number: Any = 3
+    path: Any = "walk.bvh"
+    for call in (
+        lambda: model.join(walk, number),
+        lambda: model.looped(path),
+        lambda: model.fill([number], [[(1.0, 2.0)]]),
+    ):
+        with pytest.raises(ArgumentError, match="expected a motion"):
+            call()
 
 
 def test_a_loop_leads_to_its_own_start(model: FillModel, walk: Motion) -> None:

@@ -11,11 +11,16 @@ from scipy.spatial.transform import Rotation
 from motet.errors import FormatError
 from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import read_motion
-from motet.motion.kinematics import positions, skeleton_of
+from motet.motion.kinematics import heading, positions
 from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
-from motet.motion.rotations import continuous_rotvec, rotmat_to_euler, rotmat_to_rotvec, rotvec_to_rotmat
-from motet.motion.skeleton import END_SUFFIX
+from motet.motion.rotations import (
+    continuous_rotvec,
+    euler_to_rotmat,
+    rotmat_to_euler,
+    rotmat_to_rotvec,
+    rotvec_to_rotmat,
+)
 from motet.representation.contract import MotionContract, named
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
@@ -23,7 +28,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
 from motet_train.data.store import Store, prepare, split
-from motet_train.models.kinematics import VectorPlaces
+from motet_train.models.kinematics import VectorPlaces, vector_figure_of
 from motet_train.papers.li2018.expmap import (
     CMU_LAYOUT,
     H36M_LAYOUT,
@@ -326,10 +331,20 @@ def test_places_are_those_of_the_runtime(tmp_path: Path) -> None:
     expected = positions(named(store.representation).motion(motion))
     frames = torch.from_numpy(motion.values.astype(np.float32))[None].clone()
     frames[:, 0, :3] = 0  # the first frame's steps lead there from a frame that is not known
-    skeleton = skeleton_of(motion)
-    joints = [i for i, name in enumerate(skeleton.names) if not name.endswith(END_SUFFIX)]
-    found = VectorPlaces(store.contract([0]))(frames)[0]
-    np.testing.assert_allclose(found, expected[:, joints], atol=2e-5)
+    places = VectorPlaces(vector_figure_of(store.contract([0])))
+    np.testing.assert_allclose(places(frames)[0], expected, atol=2e-5)
+
+
+def test_places_from_the_last_frame_are_those_of_the_runtime_turned_there(tmp_path: Path) -> None:
+    store = of_people(tmp_path, read_motion(CMU_FOLDER / "02_06.amc")[:400])
+    motion = store.motion(0)[:90]
+    world = positions(named(store.representation).motion(motion))
+    angle = heading(named(store.representation).motion(motion)[-1])[0]
+    turn = euler_to_rotmat(np.array([[-angle, 0, 0]]), "yxz")[0]
+    expected = (world - world[-1, 0] * (1, 0, 1)) @ turn.T
+    places = VectorPlaces(vector_figure_of(store.contract([0])))
+    frames = torch.from_numpy(motion.values.astype(np.float32))[None]
+    np.testing.assert_allclose(places.from_last(frames)[0], expected, atol=2e-5)
 
 
 def test_windows_along_motions_are_all_there_are(tmp_path: Path) -> None:

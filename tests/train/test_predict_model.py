@@ -16,7 +16,15 @@ from motet.formats import read_motion, write_motion
 from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
-from motet_train.models.predictor import LEAST, ErrorHead, Predictor, PredictorConfig, error_signs
+from motet_train.models.figure_predictor import (
+    LEAST,
+    ErrorHead,
+    FigurePredictor,
+    FigurePredictorConfig,
+    error_signs,
+)
+from motet_train.models.kinematics import VectorFigure
+from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.papers.li2018.expmap import CMU_ACTIONS, expmap_material, read_expmap
 from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
 from motet_train.recipes.predict import DEFAULT, train_predict
@@ -126,14 +134,17 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
     for n in range(10):
         write_motion(data / file.format(n), walk[10 * n : 10 * n + 160])
     given = ("--data", data, *unit)
-    trained = run("train", "predict", *given, *options, "-o", out, "--steps", 3, "--data-licence", "free")
+    refused = run("train", "predict", *given, *options, "-o", out)
+    assert (refused.exit_code, "train with --preset files" in refused.stderr) == (2, True), refused.output
+    settings = ("--preset", "files", "--steps", 3, "--data-licence", "free")
+    trained = run("train", "predict", *given, *options, "-o", out, *settings)
     assert trained.exit_code == 0, trained.output
     manifest = Run.load(out).manifest
     assert (manifest["licence"]["data"], len(manifest["training"]["data"]["test"])) == ("free", 1)
     recipe = manifest["training"]["recipe"]
     assert (recipe["warp"], recipe["reverse"], recipe["mirror"]) == (0.15, 0.0, 0.5)
     net = Run.load(out).model
-    assert isinstance(net, Predictor)
+    assert isinstance(net, FigurePredictor)
     assert net.doubt is not None
     assert (net.doubt.bias != 0).all()
     model = PredictModel(Manifest.from_json(manifest), Run.load(out).torch_graphs())
@@ -174,7 +185,7 @@ def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
     [
         (["train", "predict", "--data", "{data}", "--out", "{data}"], "it exists"),
         (["train", "predict", "--data", "{data}/none", "--out", "{out}"], "no such corpus"),
-        (["train", "predict", "--data", "{empty}", "--out", "{out}"], "no motion files"),
+        (["train", "predict", "--preset", "files", "--data", "{empty}", "--out", "{out}"], "no motion files"),
         (["evaluate", "{run}"], "need --data"),
         (["evaluate", "{run}", "tdbn", "--data", "{data}"], "separately"),
         (["evaluate", "{run}", "--data", "{empty}"], "not a prepared store"),
@@ -203,13 +214,56 @@ def test_doubt_finds_the_law_that_errors_follow() -> None:
 
 
 def test_signs_grow_with_what_they_are_signs_of() -> None:
-    seed, steps = torch.randn(5, 10, 4), torch.randn(5, 3, 4)
+    past = torch.randn(5, 9, 4)
+    steps = torch.randn(5, 3, 4)
     agreed = torch.zeros(5, 3)
-    alike, faster, apart = (
-        error_signs(seed, steps, agreed),
-        error_signs(2 * seed, steps, agreed),
-        error_signs(seed, steps, agreed + 1),
-    )
+    alike = error_signs(past, steps, agreed)
+    faster = error_signs(2 * past, steps, agreed)
+    apart = error_signs(past, steps, agreed + 1)
     assert (faster > alike).sum(dim=(0, 1)).tolist() == [15, 15, 15, 0, 0, 0]
     assert (apart > alike).sum(dim=(0, 1)).tolist() == [0, 0, 0, 0, 15, 0]
     torch.testing.assert_close(apart[..., 4], torch.full((5, 3), float(np.log(1 + LEAST))))
+
+
+SIDES = FigurePredictorConfig(
+    12,
+    VectorFigure((-1, 0, 0), ((0, 1, 0), (0.2, 0, 0), (-0.2, 0, 0)), (0, 1, 2), tuple(range(6, 12)), tuple(range(6))),
+    (0, 1, 2, 3, 4, 5, 9, 10, 11, 6, 7, 8),
+    (1.0, -1.0, -1.0, 1.0, 1.0, -1.0) + (1.0, -1.0, -1.0) * 2,
+    hidden=8,
+    blocks=1,
+)
+"""A root with a joint on either side."""
+
+
+def stirred_figure() -> FigurePredictor:
+    """A net of a small figure whose weights are not those it starts with."""
+    torch.manual_seed(0)
+    net = FigurePredictor(SIDES)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter.add_(0.05 * torch.randn_like(parameter))
+    return net.eval()
+
+
+def test_before_training_a_figure_stands_still() -> None:
+    frames = torch.randn(3, 10, 12)
+    after = FigurePredictor(SIDES).eval()(frames)
+    assert after[..., :3].abs().max() == 0
+    torch.testing.assert_close(after[..., 3:], frames[:, -1:, 3:].expand(-1, 25, -1))
+
+
+def test_a_figures_mirror_image_goes_on_as_its_mirror_image() -> None:
+    net = stirred_figure()
+    frames = torch.randn(4, 10, 12)
+    torch.testing.assert_close(net(net.mirror(frames)), net.mirror(net(frames)))
+
+
+def test_a_figures_steps_are_what_its_frames_add_up_to() -> None:
+    net = stirred_figure()
+    last = torch.randn(4, 1, 12)
+    truth = torch.randn(4, 25, 12)
+    steps = net.steps_to(truth, last)
+    torch.testing.assert_close(net.frames_after(last, steps), truth, atol=1e-4, rtol=1e-4)
+    # where the root is after all of them, seen from the last frame
+    torch.testing.assert_close(steps[:, -1, :2], net.places(truth)[:, -1, 0][:, [2, 0]], atol=1e-5, rtol=1e-5)

@@ -223,7 +223,20 @@ def test_a_unit_that_files_do_not_say_is_asked_for_and_taken(tmp_path: Path) -> 
     for command in ((*own, "--unit-in", "inch"), ("prepare", folder, "--out", tmp_path / "humanoid")):
         prepared = motet(*command)
         assert (prepared.exit_code, "0 skipped" in prepared.output) == (0, True), prepared.output
-    command = ("train", "predict", "--figure", "own", "--data", folder, "--steps", 1, "--out", tmp_path / "run")
+    command = (
+        "train",
+        "predict",
+        "--preset",
+        "files",
+        "--figure",
+        "own",
+        "--data",
+        folder,
+        "--steps",
+        1,
+        "--out",
+        tmp_path / "run",
+    )
     assert motet(*command).exit_code == 2
     trained = motet(*command, "--unit-in", "inch")
     assert trained.exit_code == 0, trained.output

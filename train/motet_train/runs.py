@@ -23,6 +23,7 @@ from motet.models.load import build
 from motet_train import distributed
 from motet_train.models.action_net import ActionNet
 from motet_train.models.codec import MotionCodec
+from motet_train.models.figure_predictor import FigurePredictor
 from motet_train.models.filler import Filler
 from motet_train.models.joint_embedding import JointEmbedding
 from motet_train.models.known_motions import KnownMotions
@@ -51,6 +52,7 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
     "known-motions": KnownMotions.from_config,
     "gap-filler": Filler.from_config,
     "trajectory": Predictor.from_config,
+    "figure-trajectory": FigurePredictor.from_config,
     **{name: partial(li2018.from_config, name) for name in li2018.SYSTEMS},
 }
 """Name of a model -> its constructor from the configuration in the manifest."""

@@ -127,7 +127,9 @@ def train_predictor(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     Text files of the protocol train it for the measures of `motet evaluate`; motion files train it to continue files of
     any human figure.
     """
-    if not is_expmap(data):
+    has_bones = not is_expmap(data)
+    predict.refuse_unfit(job.recipe, has_bones)
+    if has_bones:
         material = store_material(prepared(data, job, **corpus), data.name, by or "subject")
         return predict.train_predict(material, job)
     if by is not None:

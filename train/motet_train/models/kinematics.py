@@ -129,48 +129,105 @@ def axes_to_rotmat(axes: Tensor) -> Tensor:
     return torch.stack([x, y, x_onward * y_back - x_back * y_onward], dim=1)
 
 
-class VectorPlaces(nn.Module):
-    """Places of the joints of a contract in ``root_vectors``, in the world.
+@dataclass(frozen=True)
+class VectorFigure:
+    """The figure of J joints that D channels in ``root_vectors`` move.
 
-    The origin is on the ground below the root in the frame before the first.
+    parents: index of each joint's parent, -1 for the root. offsets: (x, y, z) from the parent in metres. bones: the
+    joints that have exponential maps or children, the root first. vectors: the channels of the maps of all bones but
+    the root, three each; D where there is none and the bone turns with its parent. root: the channels of the root
+    block. fps: frames per second.
     """
 
-    offsets: Tensor
+    parents: tuple[int, ...] = ()
+    offsets: tuple[tuple[float, ...], ...] = ()
+    bones: tuple[int, ...] = ()
+    vectors: tuple[int, ...] = ()
+    root: tuple[int, ...] = ()
+    fps: float = 30.0
 
-    def __init__(self, contract: MotionContract) -> None:
+
+def vector_figure_of(contract: MotionContract) -> VectorFigure:
+    """The figure that frames of ``root_vectors`` move, with the tips of its bones."""
+    assert contract.skeleton is not None
+    joints = contract.skeleton.scaled(1.0).joints
+    parents = tuple(joint.parent for joint in joints)
+    bones = [0]
+    vectors: list[int] = []
+    for number, joint in enumerate(joints[1:], start=1):
+        columns = _columns(contract, [f"{joint.name}.{kind}" for kind in VECTOR_KINDS])
+        if number in parents or columns[0] < len(contract.channels):
+            bones.append(number)
+            vectors += columns
+    return VectorFigure(
+        parents,
+        tuple(joint.offset for joint in joints),
+        tuple(bones),
+        tuple(vectors),
+        tuple(_columns(contract, ROOT_BLOCK)),
+        contract.fps,
+    )
+
+
+class VectorPlaces(nn.Module):
+    """Places of the joints of a figure in ``root_vectors``."""
+
+    offsets: Tensor
+    ground: Tensor
+
+    def __init__(self, figure: VectorFigure) -> None:
         super().__init__()
-        assert contract.skeleton is not None
-        joints = _without_tips(contract.skeleton)
-        self.parents = _parents_among(joints, contract.skeleton)
-        constants(self, offsets=torch.tensor([joint.offset for joint in joints]))
-        self.root = _columns(contract, ROOT_BLOCK)
-        # joints without a vector turn with their parents: they see a column of zeros
-        self.vectors: list[int] = []
-        for joint in joints[1:]:
-            self.vectors += _columns(contract, [f"{joint.name}.{kind}" for kind in VECTOR_KINDS])
-        self.fps = contract.fps
+        self.figure = figure
+        constants(self, offsets=torch.tensor(figure.offsets), ground=torch.tensor([1.0, 0.0, 1.0]))
+        self.root = list(figure.root)
+        self.vectors = list(figure.vectors)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, T, D) in the contract's units to places (B, T, J, 3) in metres."""
-        # the path of the root; gradients add up in another order, to other last bits, if it is computed later
-        root = frames[..., self.root]
-        facing = root[..., 2].cumsum(1) / self.fps
-        path = self._path(root, facing)
+        """Frames (B, T, D) in the contract's units to places (B, T, J, 3) in metres, in the world.
 
-        # the joints around it, by its rotation and those of all others
+        The origin is on the ground below the root in the frame before the first, and the figure faces z there.
+        """
+        root = frames[..., self.root]
+        facing = self._facing(root)
+        return self._joints(frames, facing) + self._path(root, facing)[..., None, :]
+
+    def from_last(self, frames: Tensor) -> Tensor:
+        """As :meth:`forward`, but the origin and the facing are those of the last frame."""
+        root = frames[..., self.root]
+        facing = self._facing(root)
+        facing = facing - facing[:, -1:]
+        path = self._path(root, facing)
+        path = path - self.ground * path[:, -1:]
+        return self._joints(frames, facing) + path[..., None, :]
+
+    def path(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """The root's facing (B, T) and place (B, T, 3), from where :meth:`forward` sees it."""
+        root = frames[..., self.root]
+        facing = self._facing(root)
+        return facing, self._path(root, facing)
+
+    def _facing(self, root: Tensor) -> Tensor:
+        return root[..., 2].cumsum(1) / self.figure.fps
+
+    def _joints(self, frames: Tensor, facing: Tensor) -> Tensor:
+        """Places (B, T, J, 3) around the root, by its rotation and those of all other bones."""
+        root = frames[..., self.root]
         turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
-        vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(self.parents) - 1, 3)
+        # bones without a map turn with their parents: they see a column of zeros
+        bones = self.figure.bones
+        vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(bones) - 1, 3)
         local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
-        joints = forward_kinematics(self.parents, self.offsets, local, range(len(self.parents)))
-        return joints.reshape(*frames.shape[:-1], -1, 3) + path[..., None, :]
+        joints = forward_kinematics(self.figure.parents, self.offsets, local, bones)
+        return joints.reshape(*frames.shape[:-1], -1, 3)
 
     def _path(self, root: Tensor, facing: Tensor) -> Tensor:
         """Places (B, T, 3) of the root by its channels (B, T, 6): it goes where it faced in the frame before."""
-        before = facing - root[..., 2] / self.fps
+        fps = self.figure.fps
+        before = facing - root[..., 2] / fps
         sin = before.sin()
         cos = before.cos()
-        x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / self.fps
-        z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / self.fps
+        x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / fps
+        z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / fps
         return torch.stack([x, root[..., 3], z], dim=-1)
 
 
@@ -190,7 +247,8 @@ def _turn(angle: Tensor, axis: int) -> Tensor:
 
 def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
     """Rotation vectors (3, ...) to matrices (3, 3, ...) by Rodrigues' formula, with gradients at 0."""
-    squared = vectors.square().sum(0) + 1e-12
+    # a limit, not a sum: the exporter drops what is as small as that
+    squared = vectors.square().sum(0).clamp_min(1e-12)
     angle = squared.sqrt()
     x, y, z = vectors
     zero = torch.zeros_like(x)

@@ -1,14 +1,16 @@
-"""Training of the small predictor: from sequences to a run."""
+"""Training of the predictors: from sequences to a run."""
 
 from dataclasses import asdict, replace
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import GradientLearner, Term, Terms
-from motet_train.models.kinematics import VectorPlaces, smooth_length
+from motet_train.models.figure_predictor import VELOCITIES, FigurePredictor, FigurePredictorConfig
+from motet_train.models.kinematics import smooth_length, vector_figure_of
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import ADAMW, AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
@@ -22,59 +24,60 @@ DEFAULT = Recipe(
     "trajectory",
     "free_run",
     PredictorConfig(0, ()),
-    ("channels", "kept", "held", "mirrored", "signs", "doubts"),
+    ("channels", "kept", "held", "mirrored", "signs"),
     PREDICTOR_TRAINING,
     AUGMENTED,
 )
+"""For the protocol's text files, which have no bones."""
 
-FILES = replace(DEFAULT, config=replace(DEFAULT.config, hidden=96), training=replace(PREDICTOR_TRAINING, steps=12_000))
-"""For motion files of more people; nets of two and four times the width are worse on held-out people."""
+FILES = Recipe(
+    "predict",
+    "figure-trajectory",
+    "free_run",
+    FigurePredictorConfig(0),
+    ("channels", "figure", "mirrored", "signs", "doubts"),
+    replace(
+        PREDICTOR_TRAINING, steps=3000, every=1000, batch=128, learning_rate=1.5e-3, average=0.995, precision="bfloat16"
+    ),
+    AUGMENTED,
+)
+"""For motion files of a figure."""
 
 RECIPES = {"default": DEFAULT, "files": FILES}
+
+MEASURED_WINDOWS = 4096
+"""Training windows whose mean and scale are those of a figure's predictor."""
+
+LEAST_SCALE = 1e-4
+"""Added to scales, in metres and radians, so that what hardly varies is not made large."""
 
 
 def train_predict(material: Material, job: Job) -> Run:
     """Train a predictor, see :meth:`motet_train.recipes.recipe.Job.run`; DataError for unfit sequences.
 
-    From motion files it learns the positions of joints, and from the sequences held out for validation its expected
-    errors; from text files, which have no bones, it learns their channels.
+    From motion files it learns the places of joints, and from the sequences held out for validation its expected
+    errors; from text files, which have no bones, it learns their channels. DataError for a recipe of the other kind.
     """
     visits = possible(job.recipe.visits, material)
     job = replace(job, recipe=replace(job.recipe, visits=visits))
     torch.manual_seed(job.about.seed)
-    net = _untrained(material, job.recipe)
-    defaults = {"horizon": net.config.frames}
-    about = {"data": material.about}
-    manifest = job.manifest(material.contract, asdict(net.config), defaults, material.licence, about)
-    learner = _learner(net.to(job.device), job, material)
+    has_bones = material.contract.skeleton is not None
+    refuse_unfit(job.recipe, has_bones)
+    learner = _figure_learner(material, job) if has_bones else _channel_learner(material, job)
+    config = learner.net.config
+    manifest = job.manifest(
+        material.contract, asdict(config), {"horizon": config.frames}, material.licence, {"data": material.about}
+    )
     return job.run(learner.kept, learner, manifest)
 
 
-def _learner(net: Predictor, job: Job, material: Material) -> GradientLearner[Predictor]:
-    """Learns the frames of windows after their seed, and from held-out ones its expected errors."""
-    # windows of input and output; text files, which have no bones, are taken as they are
-    config = net.config
-    has_bones = material.contract.skeleton is not None
-    seed = config.seed_frames if has_bones else None
-    windows = Windows(material, config.seed_frames + config.frames, **asdict(job.recipe.visits), seed=seed)
-    held_out = windows.along(material.validation, 25).to(job.device) if config.doubts else None
-
-    weights = _frame_weights(config.frames).to(job.device)
-    places = VectorPlaces(material.contract).to(job.device) if has_bones else None
-    learner = GradientLearner(
-        net,
-        job.training,
-        lambda drawn: _loss(net, drawn, weights, places),
-        lambda rng: (windows.draw(job.training.batch, rng),),
-        lambda: {} if places is None or held_out is None else _error_head_fitted(learner.kept, places, held_out),
-    )
-    return learner
-
-
-def _frame_weights(frames: int) -> Tensor:
-    """The weights (N,) of predicted frames: about the inverse of their expected error, mean 1."""
-    weights = 1 / (0.3 + 0.12 * torch.arange(1.0, frames + 1) ** 0.8)
-    return weights / weights.mean()
+def refuse_unfit(recipe: Recipe, has_bones: bool) -> None:
+    """DataError where a recipe is not for data of its kind, motion files that have bones, or text files without."""
+    learns_figure = isinstance(recipe.config, FigurePredictorConfig)
+    if has_bones and not learns_figure:
+        raise DataError("motion files have bones, which this preset does not learn: train with --preset files")
+    if learns_figure and not has_bones:
+        raise DataError("text files have no bones: leave out --preset files, or give motion files")
 
 
 def possible(visits: Visits, material: Material) -> Visits:
@@ -83,7 +86,27 @@ def possible(visits: Visits, material: Material) -> Visits:
     return visits if material.mirrored else replace(visits, mirror=0.0)
 
 
-def _untrained(material: Material, recipe: Recipe) -> Predictor:
+def _channel_learner(material: Material, job: Job) -> GradientLearner[Predictor]:
+    """Learns the channels of windows after their seed."""
+    net = _untrained_channels(material, job.recipe).to(job.device)
+    config = net.config
+    windows = Windows(material, config.seed_frames + config.frames, **asdict(job.recipe.visits))
+    weights = _frame_weights(config.frames).to(job.device)
+    return GradientLearner(
+        net,
+        job.training,
+        lambda drawn: _channel_loss(net, drawn, weights),
+        lambda rng: (windows.draw(job.training.batch, rng),),
+    )
+
+
+def _frame_weights(frames: int) -> Tensor:
+    """The weights (N,) of predicted frames: about the inverse of their expected error, mean 1."""
+    weights = 1 / (0.3 + 0.12 * torch.arange(1.0, frames + 1) ** 0.8)
+    return weights / weights.mean()
+
+
+def _untrained_channels(material: Material, recipe: Recipe) -> Predictor:
     held = material.held
     kept = list(material.kept)
     net = Predictor(
@@ -91,7 +114,6 @@ def _untrained(material: Material, recipe: Recipe) -> Predictor:
             channels=len(material.contract.channels),
             kept=material.kept,
             held=held,
-            doubts=material.contract.skeleton is not None and bool(material.mirrored) and len(material.validation) > 0,
             mirrored=material.mirrored,
             signs=material.signs,
         )
@@ -104,29 +126,74 @@ def _untrained(material: Material, recipe: Recipe) -> Predictor:
     return net
 
 
-def _loss(net: Predictor, windows: Tensor, weights: Tensor, places: VectorPlaces | None) -> Terms:
-    """The weighted mean distance between predicted and true frames: of channels, and of joints if they have positions,
-    a metre of which counts like 100 units of channels."""
+def _channel_loss(net: Predictor, windows: Tensor, weights: Tensor) -> Terms:
+    """The weighted mean distance between predicted and true channels."""
     seed = windows[:, : net.config.seed_frames]
     truth = windows[:, net.config.seed_frames :]
-    predicted = net.plain(seed)
     moved = list(net.config.kept[net.config.held :])
-    errors = smooth_length((predicted - truth)[..., moved], 1e-6)
-    if places is not None:  # the channels still count, or turns about bones' own axes would not
-        errors = 10.0 * smooth_length(places(predicted) - places(truth), 1e-6).mean(-1) + 0.1 * errors
+    errors = smooth_length((net.plain(seed) - truth)[..., moved], 1e-6)
     return (Term((errors * weights).mean(), len(windows)),)
 
 
+def _figure_learner(material: Material, job: Job) -> GradientLearner[FigurePredictor]:
+    """Learns where joints are in windows after their seed, and from held-out windows its expected errors."""
+    contract = material.contract
+    net = FigurePredictor(
+        job.recipe.sized(
+            channels=len(contract.channels),
+            figure=vector_figure_of(contract),
+            doubts=bool(material.mirrored) and len(material.validation) > 0,
+            mirrored=material.mirrored,
+            signs=material.signs,
+        )
+    )
+    config = net.config
+    seed = config.seed_frames
+    windows = Windows(material, seed + config.frames, **asdict(job.recipe.visits), seed=seed)
+    _measured(net, windows)
+    held_out = windows.along(material.validation, 25).to(job.device) if config.doubts else None
+    learner = GradientLearner(
+        net.to(job.device),
+        job.training,
+        lambda drawn: _figure_loss(net, drawn),
+        lambda rng: (windows.draw(job.training.batch, rng),),
+        lambda: {} if held_out is None else _error_head_fitted(learner.kept, held_out),
+    )
+    return learner
+
+
 @torch.no_grad()
-def _error_head_fitted(net: Predictor, places: VectorPlaces, held_out: Tensor) -> dict[str, float]:
+def _measured(net: FigurePredictor, windows: Windows) -> None:
+    """Set what a net takes for usual by training windows: mean and scale of what it sees, and sizes of true steps."""
+    drawn = windows.draw(MEASURED_WINDOWS, np.random.default_rng(0))
+    seed = drawn[:, : net.config.seed_frames]
+    seen = net.seen(seed)
+    net.measure_by(seen.mean(0).double().numpy(), (seen.std(0) + LEAST_SCALE).double().numpy())
+    steps = net.steps_to(drawn[:, net.config.seed_frames :], seed[:, -1:])
+    net.reach.copy_(steps.square().mean(0).sqrt() + LEAST_SCALE)
+
+
+def _figure_loss(net: FigurePredictor, windows: Tensor) -> Terms:
+    """The mean distance of joints from their true places, how it changes from frame to frame, and a little of the
+    channels' distance, or turns about bones' own axes would not count."""
+    seed = windows[:, : net.config.seed_frames]
+    truth = windows[:, net.config.seed_frames :]
+    predicted = net.plain(seed)
+    apart = net.places(predicted) - net.places(truth)
+    losses = smooth_length(apart, 1e-8).mean((1, 2)) + smooth_length(apart.diff(dim=1), 1e-8).mean((1, 2))
+    turned = smooth_length((predicted - truth)[..., VELOCITIES:], 1e-6).mean(1)
+    return (Term(losses + 0.01 * turned, len(windows)),)
+
+
+@torch.no_grad()
+def _error_head_fitted(net: FigurePredictor, held_out: Tensor) -> dict[str, float]:
     """Fit a net's expected errors to windows that it was not trained on; their mean joint error in centimetres."""
     net.eval()
-    # the net's errors on windows that it was not trained on
     windows = torch.cat([held_out, net.mirror(held_out)])
     seed = windows[:, : net.config.seed_frames]
     truth = windows[:, net.config.seed_frames :]
     predicted, disagreement = net.with_disagreement(seed)
-    errors = (places(predicted) - places(truth)).norm(dim=-1).mean(-1)
+    errors = (net.places(predicted) - net.places(truth)).norm(dim=-1).mean(-1)
     assert net.doubt is not None
     net.doubt.fit(net.error_signs(seed, predicted, disagreement), errors)
     return {"validation": round(100 * float(errors.mean()), 4)}

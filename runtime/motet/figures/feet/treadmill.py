@@ -37,7 +37,7 @@ from motet.motion.kinematics import (
     skeleton_of,
     with_channels,
 )
-from motet.motion.motion import Motion
+from motet.motion.motion import Motion, motions_of
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 
@@ -77,7 +77,11 @@ STANDARD = TreadmillSettings()
 
 
 def travelling(motion: Motion) -> Motion:
-    """The motion, or if it is a clip in place the motion :func:`with_travel` with a TravelWarning."""
+    """The motion, or if it is a clip in place the motion :func:`with_travel` with a TravelWarning.
+
+    ArgumentError for anything but a motion.
+    """
+    motions_of([motion])
     if not is_in_place(motion):
         return motion
     warn(IMPLIED, TravelWarning)
