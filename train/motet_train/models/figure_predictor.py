@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
 from motet_train.models.kinematics import VectorFigure, VectorPlaces
@@ -170,17 +171,31 @@ class FigurePredictor(MirroredPredictor):
         parts += [frames[:, -1], frames[:, -RECENT:, VELOCITIES:].diff(dim=1).flatten(1)]
         return torch.cat(parts, dim=1)
 
-    def steps(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to steps (B, N, C) from the last one: of channels, and of the root forward and to the left
-        in metres and its turn in radians in place of their velocities; without the mirror image."""
+    def changes(self, frames: Tensor) -> Tensor:
+        """Frames (B, L, C) to changes (B, N, C), by themselves, without the mirror image: of the root forward, to the
+        left and in its turn since the frame before, in metres and radians, and of all other channels since the last
+        frame."""
         seen = normalised(self.seen(frames), self.mean, self.scale)
-        hidden = self.norm(self.blocks(self.inward(self.unseen(seen))))
-        together = self.outward(gelu(hidden)).unflatten(1, self.reach.shape)
+        hidden = gelu(self.norm(self.blocks(self.inward(self.unseen(seen)))))
+        together = functional.linear(hidden, self._of_changes(self.outward.weight), self._of_changes(self.outward.bias))
 
         # each channel by its own past
         usual = self._past(possible(frames)).clamp(-STEEPEST, STEEPEST)
-        steps: Tensor = (together + torch.einsum("blc,lcn->bnc", usual, self.alone)) * self.reach
-        return steps
+        alone = self._of_changes(self.alone.permute(2, 1, 0).flatten(0, 1))
+        by_itself = torch.einsum("blc,ncl->bnc", usual, torch.unflatten(alone, 0, self.reach.shape))
+        changes: Tensor = torch.unflatten(together, 1, self.reach.shape) + by_itself
+        return changes
+
+    def _of_changes(self, weight: Tensor) -> Tensor:
+        """Weights (N C, ...) of steps from the last frame, in units of ``reach``, as those of changes.
+
+        The difference is made here: between steps of a metre it would magnify their last bits.
+        """
+        by_step = torch.unflatten(weight, 0, self.reach.shape)
+        by_step = by_step * self.reach.reshape(*self.reach.shape, *[1] * (by_step.dim() - 2))
+        root = by_step[:, :VELOCITIES]
+        root = torch.cat([root[:1], root.diff(dim=0)])
+        return torch.cat([root, by_step[:, VELOCITIES:]], dim=1).flatten(0, 1)
 
     def _past(self, frames: Tensor) -> Tensor:
         """The steps (B, L - 1, C) between frames (B, L, C), in units of the first predicted frame's usual steps."""
@@ -188,34 +203,35 @@ class FigurePredictor(MirroredPredictor):
         return torch.cat([velocities, frames[..., VELOCITIES:].diff(dim=1)], dim=-1) / self.reach[0]
 
     def steps_to(self, truth: Tensor, last: Tensor) -> Tensor:
-        """The steps (B, N, C) from the last frames (B, 1, C) that lead to frames (B, N, C)."""
+        """The steps (B, N, C) from the last frames (B, 1, C) to frames (B, N, C): where the root is forward and to the
+        left, in metres, and how far it has turned, in radians, in place of its velocities; and changes of the rest."""
         facing, path = self.places.path(truth)
         root = torch.stack([path[..., 2], path[..., 0], facing], dim=-1)
         return torch.cat([root, (truth - last)[..., VELOCITIES:]], dim=-1)
 
-    def frames_after(self, last: Tensor, steps: Tensor) -> Tensor:
-        """The frames (B, N, C) to which steps (B, N, C) lead from the last frames (B, 1, C)."""
+    def frames_after(self, last: Tensor, changes: Tensor) -> Tensor:
+        """The frames (B, N, C) to which changes (B, N, C) lead from the last frames (B, 1, C)."""
         # the root moves as it faced in the frame before
-        since = steps[..., :VELOCITIES].diff(dim=1, prepend=torch.zeros_like(steps[:, :1, :VELOCITIES]))
-        before = steps[..., 2] - since[..., 2]
+        z, x, turn = changes[..., :VELOCITIES].unbind(-1)
+        before = turn.cumsum(1) - turn
         sin = before.sin()
         cos = before.cos()
-        forward = since[..., 1] * sin + since[..., 0] * cos
-        left = since[..., 1] * cos - since[..., 0] * sin
-        velocities = torch.stack([forward, left, since[..., 2]], dim=-1) * self.config.figure.fps
-        return torch.cat([velocities, (last + steps)[..., VELOCITIES:]], dim=-1)
+        velocities = torch.stack([x * sin + z * cos, x * cos - z * sin, turn], dim=-1) * self.config.figure.fps
+        return torch.cat([velocities, (last + changes)[..., VELOCITIES:]], dim=-1)
 
     def plain(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the next (B, N, C), by themselves: what is trained."""
-        return self.frames_after(frames[:, -1:], self.steps(frames))
+        return self.frames_after(frames[:, -1:], self.changes(frames))
 
     def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them."""
-        steps, mirrored = self.on_both_sides(self.steps, frames)
-        return self.frames_after(frames[:, -1:], (steps + mirrored) / 2), size((steps - mirrored) / 2 / self.reach)
+        changes, mirrored = self.on_both_sides(self.changes, frames)
+        apart = changes - mirrored
+        apart = torch.cat([apart[..., :VELOCITIES].cumsum(1), apart[..., VELOCITIES:]], dim=-1)
+        return self.frames_after(frames[:, -1:], (changes + mirrored) / 2), size(apart / 2 / self.reach)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the next (B, N, C): by the mean of the steps for them and for their mirror image."""
+        """Frames (B, L, C) to the next (B, N, C): by the mean of the changes for them and for their mirror image."""
         return self.with_disagreement(frames)[0] if self.config.mirrored else self.plain(frames)
 
     def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
