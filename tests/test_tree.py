@@ -90,7 +90,7 @@ CEILINGS = {
     "motet.corpus": 9_300,
     "motet.decode": 4_400,
     "motet.draw": 12_300,
-    "motet.figures": 32_000,
+    "motet.figures": 32_100,
     "motet.formats": 36_800,
     "motet.generate": 29_900,
     "motet.keyed": 9_300,
@@ -109,9 +109,9 @@ CEILINGS = {
     "motet_train.cli": 8_500,
     "motet_train.data": 22_000,
     "motet_train.evaluate": 46_900,
-    "motet_train.models": 21_200,
+    "motet_train.models": 23_000,
     "motet_train.papers": 41_600,
-    "motet_train.recipes": 16_900,
+    "motet_train.recipes": 17_400,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

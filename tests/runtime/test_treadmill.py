@@ -116,6 +116,13 @@ def test_steps_on_the_spot_are_no_clip_in_place() -> None:
     assert is_in_place(stepping(20))
 
 
+def test_a_moment_is_no_clip_in_place() -> None:
+    """Ten frames are what a predictor sees: a blow may look like a stride for so long, and half a stride too."""
+    for start in range(0, 60, 5):
+        assert not is_in_place(stepping(20)[start : start + 10])
+    assert is_in_place(stepping(20)[:15])
+
+
 def lying(motion: Motion) -> Motion:
     """The motion on its back, as one that rides a bicycle in the air."""
     down = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])

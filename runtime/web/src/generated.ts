@@ -68,6 +68,7 @@ export const treadmillSettings = {
   stride: 0.15,
   hips: 0.3,
   span: 1,
+  least: 0.5,
   calm: 0.015,
   fps: 30,
 } as const;

@@ -57,6 +57,12 @@ class FigurePredictorConfig:
     unseen: float = 0.1
     doubts: bool = False
 
+    @property
+    def seen(self) -> int:
+        """D: places of joints, channels of the last frame, and how these changed last."""
+        places = 3 * len(self.figure.parents) * self.seed_frames
+        return places + self.channels + (RECENT - 1) * (self.channels - VELOCITIES)
+
 
 def possible(frames: Tensor) -> Tensor:
     """Frames (..., C) with each number within what a motion can have."""
@@ -146,15 +152,13 @@ class FigurePredictor(MirroredPredictor):
     doubt: ErrorHead | None
 
     def __init__(self, config: FigurePredictorConfig) -> None:
-        seen = 3 * len(config.figure.parents) * config.seed_frames
-        seen += config.channels + (RECENT - 1) * (config.channels - VELOCITIES)
-        super().__init__(config.channels, seen, config.mirrored, config.signs)
+        super().__init__(config.channels, config.seen, config.mirrored, config.signs)
         self.config = config
         self.places = VectorPlaces(config.figure)
         self.register_buffer("reach", torch.ones(config.frames, config.channels))
         # the MLP, and the linear map of each channel alone
         self.unseen = nn.Dropout(config.unseen)
-        self.inward = nn.Linear(seen, config.hidden)
+        self.inward = nn.Linear(config.seen, config.hidden)
         self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
         self.norm = nn.LayerNorm(config.hidden)
         self.outward = zero_linear(config.hidden, config.frames * config.channels)

@@ -66,6 +66,9 @@ class TreadmillSettings:
     span: float = 1.0
     """Seconds over which velocities are averaged, since feet that twist or shuffle go nowhere."""
 
+    least: float = 0.5
+    """Seconds of motion at least: in less, one blow or step looks like a stride."""
+
     calm: float = TREMBLE
     """Seconds, the standard deviation of the window that feet are smoothed by."""
 
@@ -97,7 +100,7 @@ def is_in_place(motion: Motion, settings: TreadmillSettings = STANDARD) -> bool:
     # cheap tests first: most recordings go too far to be in place
     motion = motion.resample(min(motion.fps, settings.fps))
     try:
-        if len(motion) < 3 or not _may_be(motion, skeleton, settings):
+        if len(motion) < max(3, settings.least * motion.fps) or not _may_be(motion, skeleton, settings):
             return False
         on_humanoid = _on_humanoid(motion)[0]
     except MotionError:

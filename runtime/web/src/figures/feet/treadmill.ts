@@ -21,7 +21,8 @@ export function travelling(motion: Motion): Motion {
 export function isInPlace(motion: Motion): boolean {
   if (!motion.travels) return false;
   const looked = resampled(motion, Math.min(motion.fps, treadmillSettings.fps));
-  if (looked.rotations.length < 3 || goes(looked)) return false;
+  const least = Math.max(3, treadmillSettings.least * looked.fps);
+  if (looked.rotations.length < least || goes(looked)) return false;
   try {
     return strides(seen(looked).motion);
   } catch (error) {
