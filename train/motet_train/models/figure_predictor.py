@@ -71,7 +71,7 @@ def possible(frames: Tensor) -> Tensor:
 
 def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     """Logarithms (B, N, S) of what an error is judged by: how fast and how unevenly the figure moves, how far the net
-    takes it, and how much the net's answer differs from that to the mirrored question.
+    takes it and on what way, and how much its answers so far differ from those to the mirrored question.
 
     All in units of the first predicted frame's usual steps. past: (B, L - 1, C), the steps between seed frames. steps:
     (B, N, C) predicted, from the last frame. disagreement: (B, N), how far the steps are from those predicted for the
@@ -79,7 +79,8 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     """
     # how the figure moves before, and how it is predicted to
     shared = [size(past[:, -1]), size(past).mean(1), size(past.diff(dim=1)[:, -2:]).mean(1)]
-    by_frame = [size(steps), disagreement, size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1])))]
+    way = size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1]))).cumsum(1)
+    by_frame = [size(steps), disagreement.cumsum(1), way]
     at_all_frames = [sign[:, None].expand(disagreement.shape) for sign in shared]
     return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1) + LEAST)
 
