@@ -111,7 +111,7 @@ CEILINGS = {
     "motet_train.evaluate": 46_900,
     "motet_train.models": 23_000,
     "motet_train.papers": 41_600,
-    "motet_train.recipes": 17_400,
+    "motet_train.recipes": 17_300,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""
