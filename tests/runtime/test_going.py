@@ -130,6 +130,42 @@ def test_figures_that_meet_go_around_each_other(model: SteerModel) -> None:
     assert nearest[0.8] > 0.5
 
 
+def test_a_crowd_crosses_a_circle_apart_and_goes_on_from_a_snapshot_as_before(model: SteerModel) -> None:
+    angles = np.arange(12) * np.pi / 6
+    places = 3 * np.stack([np.sin(angles), np.cos(angles)], axis=1)
+    session = model.start(characters=12, places=np.column_stack([places, np.degrees(angles) + 180]))
+    session.keep_apart(0.5)
+    session.go_to(-places)
+    ground = [session.tick().ground[:, :2] for _ in range(75)]
+    snapshot = session.snapshot()
+    ground += [session.tick().ground[:, :2] for _ in range(225)]
+    apart = np.linalg.norm(np.array(ground)[:, :, None] - np.array(ground)[:, None], axis=3) + 9 * np.eye(12)
+    assert session.arrived.all()
+    assert apart.min() > 0.38
+    session.restore(snapshot)
+    again = [session.tick().ground[:, :2] for _ in range(30)]
+    np.testing.assert_array_equal(again, ground[75:105])
+
+
+def test_a_figure_alone_goes_as_if_it_kept_from_nobody(model: SteerModel) -> None:
+    alone = [model.start(), model.start()]
+    alone[1].keep_apart(0.8)
+    for session in alone:
+        session.go_to((3, 4))
+    for _ in range(60):
+        np.testing.assert_array_equal(alone[0].tick().ground, alone[1].tick().ground)
+
+
+@pytest.mark.parametrize("direction", [-135, -45, 90])
+def test_a_slow_side_step_goes_where_it_is_asked(model: SteerModel, direction: float) -> None:
+    session = model.start()
+    session.control(speed=0.2, direction=direction, facing=0)
+    ground = [session.tick().ground[0, :2] for _ in range(150)]
+    x, z = ground[-1] - ground[60]
+    assert np.hypot(x, z) / 3 == pytest.approx(0.2, abs=0.01)
+    assert np.degrees(np.arctan2(x, z)) == pytest.approx(direction, abs=1)
+
+
 def test_events_are_those_of_contacts_with_hysteresis(model: SteerModel) -> None:
     session = model.start("run")
     session.control(speed=2.5, direction=0)

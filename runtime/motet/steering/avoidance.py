@@ -1,8 +1,12 @@
-"""Steered figures that keep apart: each turns aside from those that it would come too near to.
+"""Steered figures that keep apart by reciprocal velocity obstacles (ORCA: van den Berg et al. 2011).
 
-For each pair the moment within the next seconds is computed when they are nearest, if both go on as they do. Where
-that is nearer than the room that they keep, each changes its velocity away from where the other will be then, more the
-nearer and the sooner that is; two that meet head on both turn to their right.
+A place and a velocity are those of where a figure would come to rest, which changes its velocity at once. For each pair
+that could meet within the next seconds there is a smallest change of their relative velocity by which they do not.
+Each makes half of it, or one that passes somebody who stands makes all of it; so each pair leaves a figure half of the
+plane of velocities. It takes the velocity nearest to the one wanted in all these half-planes, or as nearly in them as
+it can. Two that meet head on both pass on the same side.
+
+Letters in shapes: B figures, n pairs, S pairs of a figure at most.
 """
 
 from dataclasses import dataclass
@@ -13,7 +17,10 @@ from numpy.typing import NDArray
 
 from motet.motion.rotations import Array
 from motet.settings import Settings
-from motet.steering.settings import Metres, Seconds, Speed
+from motet.steering.matching import Flags
+from motet.steering.settings import Count, Metres, Seconds, Share, Speed
+
+Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -24,48 +31,147 @@ class AvoidanceSettings(Settings):
 
     soon: Seconds = 2.0
     """How far ahead in time figures look."""
+    parts: Seconds = 0.4
+    """Seconds in which two that are too near to each other part."""
+    closes: Speed = 1.0
+    """How fast a gap closes at most: pairs look no farther ahead than that takes, and ``parts`` seconds."""
     sight: Metres = 5.0
     """Distance along x or z beyond which they see nobody."""
-    strength: Speed = 6.0
-    """Change of velocity of figures in the same place."""
-    waits: Speed = 0.2
+    heeds: Count = 8
+    """How many others they heed, the nearest ones."""
+    sweeps: Count = 8
+    """How often all half-planes are gone through."""
+    yields: Share = 0.3
+    """How far half-planes that exclude each other yield: 0 for not at all."""
+    dodges: Speed = 0.6
+    """How fast slower ones may go to keep apart."""
+    waits: Speed = 0.02
     """If the detour is slower than this, wait instead."""
+    rejoins: Metres = 0.1
+    """How far from its path a figure among others goes straight on to the next corner."""
+    standing: Share = 0.9
+    """Share of the room that is kept from those who stand."""
 
 
-def kept_apart(places: Array, velocities: Array, room: float, settings: AvoidanceSettings) -> Array:
-    """Changes (B, 2) of velocities (B, 2) in m/s of figures at places (B, 2) that keep ``room`` metres."""
-    figure, other = _pairs(places, settings.sight)
-    # when they are nearest, and how near
-    gap = places[figure] - places[other]
+def kept_apart(
+    places: Array, velocities: Array, wanted: Array, moves: Flags, room: float, settings: AvoidanceSettings
+) -> Array:
+    """Velocities (B, 2) in m/s, near to the ``wanted`` ones (B, 2), of figures at places (B, 2) with velocities (B, 2)
+    that keep ``room`` metres, no faster than wanted or ``dodges``. moves: which figures go (B,), around others."""
+    figure, other = _pairs(places, moves, settings.sight)
+    gap = places[other] - places[figure]
     closing = velocities[figure] - velocities[other]
-    seconds = _seconds_to_nearest(gap, closing).clip(0, settings.soon)
-    nearest = gap + seconds[:, None] * closing
-    # away from there; head on there is no way away from the other: to the right of the way there
-    right = np.stack([gap[:, 1], -gap[:, 0]], axis=1)
-    away = _unit(nearest + 0.1 * room * _unit(right))
-    nearness = (1 - np.hypot(*nearest.T) / room).clip(0, 1)
-    strength = settings.strength * nearness * (1 - seconds / settings.soon)
-    changes = np.zeros_like(places)
-    np.add.at(changes, figure, away * strength[:, None])
-    return changes
+    # only those that come near
+    meets = _nearest(gap, closing, settings.soon) < 2 * room
+    figure = figure[meets]
+    other = other[meets]
+    gap = gap[meets]
+    rooms = room * np.where(moves[other], 1.0, settings.standing)
+    change, way = _changes(gap, closing[meets], rooms, settings)
+    # the half-plane of each pair: velocities that go at least so fast that way
+    share = np.where(moves[other], 0.5, 1.0)
+    least = (velocities[figure] * way).sum(axis=1) + share * change
+    # half-planes that exclude each other yield, the more the farther off the other is
+    distance = np.hypot(*gap.T)
+    yields = settings.yields * (distance / room - 1).clip(0.1, None)
+    planes = np.column_stack([way, least, yields])
+    most = np.maximum(np.hypot(*wanted.T), settings.dodges)
+    by_figure = _by_figure(figure, distance, planes, len(places), settings.heeds)
+    allowed = _nearest_allowed(wanted, by_figure, most, settings.sweeps)
+    heeds = np.isin(np.arange(len(places)), figure)
+    return np.where(heeds[:, None], allowed, wanted)
 
 
-def _pairs(places: Array, sight: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """All pairs (n,), (n,) of figures at places (B, 2) that see each other."""
+def _pairs(places: Array, moves: Flags, sight: float) -> tuple[Numbers, Numbers]:
+    """All pairs (n,), (n,) of a figure that moves and another one that it sees, at places (B, 2)."""
     x, z = places.T
     near_x = np.abs(x[:, None] - x) < sight
     near_z = np.abs(z[:, None] - z) < sight
-    sees = near_x & near_z
+    sees = near_x & near_z & moves[:, None]
     np.fill_diagonal(sees, val=False)
     figure, other = np.nonzero(sees)
     return figure, other
 
 
-def _seconds_to_nearest(gap: Array, closing: Array) -> Array:
-    """When pairs (n,) are nearest, with gaps (n, 2) that change by velocities (n, 2)."""
+def _nearest(gap: Array, closing: Array, soon: float) -> Array:
+    """How near pairs (n,) come within some seconds, with gaps (n, 2) that close by velocities (n, 2)."""
     squared_speed = np.maximum((closing * closing).sum(axis=1), 1e-6)
-    seconds: Array = -(gap * closing).sum(axis=1) / squared_speed
-    return seconds
+    seconds = ((gap * closing).sum(axis=1) / squared_speed).clip(0, soon)
+    nearest: Array = np.hypot(*(gap - seconds[:, None] * closing).T)
+    return nearest
+
+
+def _changes(gap: Array, closing: Array, room: Array, settings: AvoidanceSettings) -> tuple[Array, Array]:
+    """The smallest changes (n,) of the velocities ``closing`` (n, 2), which may be negative, and their directions
+    (n, 2), by which pairs with gaps (n, 2) keep rooms (n,) soon; those that are too near part."""
+    apart = np.hypot(*gap.T)
+    seconds = (settings.parts + np.maximum(apart - room, 0) / settings.closes).clip(None, settings.soon)
+    # velocities that meet are in a cone that a circle cuts off: out of it past the circle
+    from_circle = closing - gap / seconds[:, None]
+    off = np.hypot(*from_circle.T)
+    circle_way = _unit(from_circle)
+    circle_change = room / seconds - off
+    # or over the nearer leg of the cone
+    leg = np.sqrt(np.maximum(apart**2 - room**2, 0.0))
+    side = np.where(_cross(gap, from_circle) > 0, 1.0, -1.0)
+    across = np.stack([-gap[:, 1], gap[:, 0]], axis=1)
+    leg_way = _unit((leg * side)[:, None] * across - room[:, None] * gap)
+    leg_change = -(closing * leg_way).sum(axis=1)
+    # past the circle where that is nearer
+    towards = (from_circle * gap).sum(axis=1)
+    past_circle = (towards < 0) & (towards**2 > room**2 * off**2)
+    change = np.where(past_circle, circle_change, leg_change)
+    way = np.where(past_circle[:, None], circle_way, leg_way)
+    # those that are too near part
+    too_near = apart < room
+    away = _unit(-gap)
+    change = np.where(too_near, (room - apart) / settings.parts - (closing * away).sum(axis=1), change)
+    return change, np.where(too_near[:, None], away, way)
+
+
+def _by_figure(figure: Numbers, distance: Array, planes: Array, figures: int, most: int) -> Array:
+    """The half-planes (S, 4, figures) of the nearest pairs of each figure, 0 for none: their ways, the least velocities
+    that way, and how far they yield."""
+    order = np.lexsort((distance, figure))
+    figure = figure[order]
+    slot = np.arange(len(figure)) - np.searchsorted(figure, figure)
+    kept = slot < most
+    slots = int(slot[kept].max(initial=-1)) + 1
+    by_figure = np.zeros((slots, 4, figures))
+    by_figure[slot[kept], :, figure[kept]] = planes[order][kept]
+    return by_figure
+
+
+def _nearest_allowed(wanted: Array, planes: Array, most: Array, sweeps: int) -> Array:
+    """Velocities (B, 2) near to the wanted ones within half-planes (S, 4, B), no faster than ``most`` (B,): least
+    squares of the change and of what is missing, by the method of Hildreth and Dykstra, a half-plane at a time."""
+    x, z = wanted.T.copy()
+    pushes = np.zeros((len(planes), len(wanted)))
+    slowed_x = np.zeros_like(x)
+    slowed_z = np.zeros_like(z)
+    for _ in range(sweeps):
+        # the nearest last, which so is kept the best
+        for plane, (way_x, way_z, least, yields) in reversed(list(enumerate(planes))):
+            missing = least - (x * way_x + z * way_z)
+            step = np.maximum((missing - yields * pushes[plane]) / (1 + yields), -pushes[plane])
+            pushes[plane] += step
+            x += step * way_x
+            z += step * way_z
+        # no faster
+        fast_x = x + slowed_x
+        fast_z = z + slowed_z
+        share = np.minimum(1, most / np.maximum(np.hypot(fast_x, fast_z), 1e-9))
+        x = fast_x * share
+        z = fast_z * share
+        slowed_x = fast_x - x
+        slowed_z = fast_z - z
+    return np.stack([x, z], axis=1)
+
+
+def _cross(first: Array, second: Array) -> Array:
+    """The vertical components (n,) of cross products of vectors (n, 2) over the ground."""
+    product: Array = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return product
 
 
 def _unit(vectors: Array) -> Array:

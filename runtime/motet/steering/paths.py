@@ -39,8 +39,8 @@ class ArrivalSettings(Settings):
     """Deceleration of the place where a figure would come to rest, towards the end."""
     catches_up: Seconds = 0.3
     """Time constant by which a figure returns to its path."""
-    waits: Metres = 0.4
-    """How far from its path a figure does not go on along it."""
+    strays: Metres = 0.4
+    """How far from its path a figure goes straight on to the next corner."""
     near: Metres = 0.08
     """Distance from the end within which a figure has arrived."""
     sidestep: Metres = 0.7
@@ -101,7 +101,16 @@ class Paths:
 
     def at(self, gone: Array) -> Array:
         """The points (B, 2) of the paths at distances (B,) from their beginnings, in metres."""
-        # the first point beyond that distance, by bisection
+        after = self._next(gone)
+        # between the point before it and itself
+        start = self.along[after - 1]
+        stop = self.along[after]
+        part = ((gone - start) / np.maximum(stop - start, 1e-9)).clip(0, 1)[:, None]
+        points: Array = self.points[after - 1] + part * (self.points[after] - self.points[after - 1])
+        return points
+
+    def _next(self, gone: Array) -> Rows:
+        """The first points (B,) beyond distances (B,) from the beginnings, or the last ones: by bisection."""
         after = self.first[:-1] + 1
         last = self.first[1:] - 1
         while (after < last).any():
@@ -109,12 +118,20 @@ class Paths:
             beyond = self.along[middle] > gone
             after = np.where(beyond, after, np.minimum(middle + 1, last))
             last = np.where(beyond, middle, last)
-        # and between the point before it and itself
-        start = self.along[after - 1]
-        stop = self.along[after]
-        part = ((gone - start) / np.maximum(stop - start, 1e-9)).clip(0, 1)[:, None]
-        points: Array = self.points[after - 1] + part * (self.points[after] - self.points[after - 1])
-        return points
+        return after
+
+    def rejoined(self, figures: Flags, gone: Array, places: Array) -> tuple["Paths", Array]:
+        """Paths on which some figures (B,), which have gone so far (B,), go on from other places (B, 2) straight to the
+        next point; and how far they have gone then."""
+        after = self._next(gone)
+        points = self.points.copy()
+        points[after[figures] - 1] = places[figures]
+        change = np.hypot(*(points[after] - points[after - 1]).T) - (self.along[after] - self.along[after - 1])
+        # all points after that are nearer or farther
+        counts = np.diff(self.first)
+        is_later = np.arange(len(points)) >= np.repeat(after, counts)
+        along = self.along + is_later * np.repeat(np.where(figures, change, 0.0), counts)
+        return Paths(points, along, self.first), np.where(figures, self.along[after - 1], gone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,14 +186,24 @@ class Going:
         return replace(self, paths=Paths.of(all_paths), **values)
 
     def after(
-        self, playback: Playback, settings: ArrivalSettings, steering: SteeringSettings, seconds: float
+        self,
+        playback: Playback,
+        settings: ArrivalSettings,
+        steering: SteeringSettings,
+        strays_from: float,
+        seconds: float,
     ) -> tuple["Going", Array]:
         """A tick later, and the velocities (B, 2) at which figures on paths are to go, 0 for standing.
 
         The place where a figure would come to rest moves at once as its target does. That place is led along the path,
         so nothing has to be foreseen: the figure itself follows it a third of a second later, and rounds corners.
+        strays_from: metres from the path beyond which they go straight on to the next corner.
         """
         rests = playback.root[:, :2] + rolling_distance(playback, steering)
+        strays = self.goes & (np.hypot(*(self.paths.at(self.gone) - rests).T) > strays_from)
+        if strays.any():
+            paths, gone = self.paths.rejoined(strays, self.gone, rests)
+            return replace(self, paths=paths, gone=gone).after(playback, settings, steering, strays_from, seconds)
         lengths = self.paths.lengths
         # the point of the path where they are to come to rest goes on, slowly in bends and towards the end
         left = np.maximum(lengths - self.gone, 0.0)
@@ -209,7 +236,7 @@ class Going:
         """Metres (B,) that points of paths ``here`` (B, 2) go on: ``step``, or less while figures, which would come to
         rest at ``rests``, are far from there; and as far as figures are ahead already."""
         off = rests - here
-        waits = (1 - np.hypot(*off.T) / settings.waits).clip(0, 1)
+        waits = (1 - np.hypot(*off.T) / settings.strays).clip(0, 1)
         way = _unit(self.paths.at(self.gone + 0.05) - here)
         ahead = (off * way).sum(axis=1).clip(0, 0.1)
         steps: Array = np.maximum(step * waits, ahead)
@@ -269,7 +296,8 @@ class Ways(NamedTuple):
         """
         gait_before = command.gait
         # figures on paths
-        going, velocity = going.after(playback, self.arrival, self.gaits.settings, seconds)
+        strays_from = self.avoidance.rejoins if room else self.arrival.strays
+        going, velocity = going.after(playback, self.arrival, self.gaits.settings, strays_from, seconds)
         if going.goes.any():
             step = going.settled(playback, self.arrival, self.gaits.settings, seconds)
             playback.root = playback.root + np.insert(step, 2, 0.0, axis=1)  # poses share the array
@@ -277,7 +305,7 @@ class Ways(NamedTuple):
         target, _ = self.gaits.target(command)
         # figures that keep apart
         if room:
-            target, _ = self.gaits.target(self._aside(room, playback, command, target))
+            target, _ = self.gaits.target(self._aside(room, playback, command, target, target_before))
         # search at once for targets that change much
         sudden = np.abs(target - target_before).max(axis=1) > self.arrival.sudden
         playback.hasten(sudden | (command.gait != gait_before))
@@ -297,19 +325,26 @@ class Ways(NamedTuple):
             faces_way=command.faces_way & ~goes,
         )
 
-    def _aside(self, room: float, playback: Playback, command: Command, target: Array) -> Command:
+    def _aside(self, room: float, playback: Playback, command: Command, target: Array, target_before: Array) -> Command:
         """The command by which those that move keep apart; they go no faster for it."""
-        change = kept_apart(playback.root[:, :2], playback.spring[:, :2], room, self.avoidance)
         moves = command.speed > 0
-        velocity = target[:, :2] + np.where(moves[:, None], change, 0.0)
-        speed = np.hypot(*velocity.T)
-        speed_before = np.hypot(*target[:, :2].T)
-        goes = speed > self.avoidance.waits
-        direction = np.where(goes, np.arctan2(*velocity.T), command.direction)
-        faces_way = moves & (command.facing == command.direction)
-        facing = np.where(faces_way, direction, target[:, 2])
-        pace = np.where(goes, np.minimum(speed, speed_before), 0.0)
-        return replace(command, speed=pace, direction=direction, facing=facing)
+        rests = playback.root[:, :2] + rolling_distance(playback, self.gaits.settings)
+        wanted = target[:, :2]
+        velocity = kept_apart(rests, target_before[:, :2], wanted, moves, room, self.avoidance)
+        # those that need not change anything go on exactly as they do
+        changes = moves & (velocity != wanted).any(axis=1)
+        pace = np.hypot(*velocity.T)
+        goes = pace > self.avoidance.waits
+        way = np.arctan2(*velocity.T)
+        # they face the way around others, unless it leads aside or back
+        faces_way = changes & goes & (command.facing == command.direction)
+        along = faces_way & (np.abs(wrapped(way - command.direction)) < self.gaits.settings.aside)
+        return replace(
+            command,
+            speed=np.where(changes, np.where(goes, pace, 0.0), command.speed),
+            direction=np.where(changes & goes, way, command.direction),
+            facing=np.where(along, way, np.where(changes, target[:, 2], command.facing)),
+        )
 
 
 def _slowed(gaits: Gaits, gait: Rows, gait_now: Rows, speed: Array) -> Rows:

@@ -57,6 +57,8 @@ class SteerSnapshot:
     """The right hands."""
     going: Going
     happenings: Happenings
+    target: Array
+    """(characters, 3) what they are steered to, on their ways and around others."""
     room: float = 0.0
     """Metres that characters keep apart, 0 for none."""
     poses: tuple[Pose, Pose] | None = None
@@ -97,7 +99,6 @@ class SteerSession:
         self.strict = strict
         self._words = words
         self._warned: set[str] = set()  # gaits whose limits a warning has named
-        self._target = np.zeros((characters, 3))
         self._state = SteerSnapshot(
             playback=playback,
             actions=ActionLayer.none(model.matcher, model.pose_codes, playback),
@@ -109,7 +110,16 @@ class SteerSession:
             right=ReachLayer.none(1, characters),
             going=Going.none(characters),
             happenings=Happenings.none(characters),
+            target=np.zeros((characters, 3)),
         )
+
+    @property
+    def _target(self) -> Array:
+        return self._state.target
+
+    @_target.setter
+    def _target(self, target: Array) -> None:
+        self._state.target = target
 
     @property
     def characters(self) -> int:
@@ -583,7 +593,6 @@ class SteerSession:
     def _become(self, state: SteerSnapshot) -> None:
         """Go on from a state."""
         self._state = state
-        self._target, _ = self.model.abilities.target(state.command)
 
     def add(self, places: ArrayLike, *, gait: str | None = None, phases: ArrayLike | None = None) -> list[int]:
         """Add characters that stand at places: (3,) for one or (n, 3), x and z in metres, facing in degrees. Returns

@@ -223,8 +223,9 @@ def _moved(
     # the step over the ground as recorded, turned as the legs are, and then towards the velocity of the springs
     step_x, step_z = _step(recorded, facing + warp, stride, rate * dt)
     correction = where(moving, _heading_correction(step_x, step_z, spring, settings), 0.0)
-    next_x = x + (step_x + correction * step_z)
-    next_z = z + (step_z - correction * step_x)
+    # a slow walk goes exactly as the springs do, whose ways recordings lack
+    next_x = x + where(slow_walk, spring.x * dt, step_x + correction * step_z)
+    next_z = z + where(slow_walk, spring.z * dt, step_z - correction * step_x)
     # the next playback rate is as fast as the springs; the legs' strides of a slow walk are shorter
     playback_rate = where(moving, _playback_rate(speed_ratio, slow_walk, settings), 1.0)
     stride_goal = where(slow_walk, smaller(stride, 1.0), 1.0)

@@ -340,7 +340,7 @@ export const arrivalSettings = {
   turns_back: { default: 0.35, low: 0, high: 1, whole: false },
   brakes: { default: 6, low: 0.1, high: 100, whole: false },
   catches_up: { default: 0.3, low: 0.01, high: 100, whole: false },
-  waits: { default: 0.4, low: 0, high: 100, whole: false },
+  strays: { default: 0.4, low: 0, high: 100, whole: false },
   near: { default: 0.08, low: 0, high: 100, whole: false },
   sidestep: { default: 0.7, low: 0, high: 100, whole: false },
   glides_from: { default: 0.16, low: 0, high: 100, whole: false },
@@ -355,9 +355,16 @@ export const arrivalSettings = {
 // motet.steering.avoidance.AvoidanceSettings
 export const avoidanceSettings = {
   soon: { default: 2, low: 0.01, high: 100, whole: false },
+  parts: { default: 0.4, low: 0.01, high: 100, whole: false },
+  closes: { default: 1, low: 0, high: 100, whole: false },
   sight: { default: 5, low: 0, high: 100, whole: false },
-  strength: { default: 6, low: 0, high: 100, whole: false },
-  waits: { default: 0.2, low: 0, high: 100, whole: false },
+  heeds: { default: 8, low: 0, high: 10000, whole: true },
+  sweeps: { default: 8, low: 0, high: 10000, whole: true },
+  yields: { default: 0.3, low: 0, high: 1, whole: false },
+  dodges: { default: 0.6, low: 0, high: 100, whole: false },
+  waits: { default: 0.02, low: 0, high: 100, whole: false },
+  rejoins: { default: 0.1, low: 0, high: 100, whole: false },
+  standing: { default: 0.9, low: 0, high: 1, whole: false },
 } as const;
 
 // motet.steering.events

@@ -1,6 +1,6 @@
 /* Figures that go by themselves: they follow the first one, wander about, or go to a point. Metres, seconds, radians. */
 import { type Asked, type Figure, inRange } from "./figure.js";
-import { aside, keptApart } from "../steering/avoidance.js";
+import { keptApart, type Walker } from "../steering/avoidance.js";
 import type { ControlModel } from "../steering/model.js";
 
 /** What figures keep between them, how far they go from the first one, and the room of one in the rows behind it. */
@@ -82,6 +82,12 @@ function followed(net: Net, figures: Figure[], n: number): Asked {
   return towards(net, figures, n, point, stays ? 0 : Math.max(0.7, 1.3 * away));
 }
 
+/** A figure that goes on as it is asked. */
+function walkerOf(figure: Figure): Walker {
+  const { x, z } = figure.wanted;
+  return { place: figure.restingPlace, velocity: [x, z], wanted: [x, z], moves: x !== 0 || z !== 0 };
+}
+
 /** The control that leads to a point at a pace, around others; faster than the first gait has, it runs. */
 export function towards(
   net: Net,
@@ -93,8 +99,10 @@ export function towards(
   const figure = figures[n]!;
   const [x, z] = figure.root;
   const away = Math.hypot(toX - x, toZ - z) || 1;
-  const change = keptApart(figure, figures, ROOM, net.model.avoidance);
-  const [vx, vz] = aside([((toX - x) / away) * pace, ((toZ - z) / away) * pace], change, net.model.avoidance);
+  const walkers = figures.map(walkerOf);
+  const walker = { ...walkers[n]!, wanted: [((toX - x) / away) * pace, ((toZ - z) / away) * pace] };
+  walkers[n] = walker;
+  const [vx, vz] = pace ? keptApart(walker, walkers, ROOM, net.model.avoidance) : [0, 0];
   const wanted = Math.hypot(vx, vz);
   const fast = fastest(net);
   const gait = wanted > (figure.wanted.gait === fast ? 0.8 : 1) * net.speeds[net.gaits[0]!]![2]! ? fast : 0;

@@ -1,57 +1,116 @@
-/* Figures that keep apart: each turns aside from those that it would come too near to, as motet/steering/avoidance.py says. */
+/* Figures that keep apart by reciprocal velocity obstacles, as motet/steering/avoidance.py says. */
 import type { avoidanceSettings } from "../generated.js";
-import type { Pose as Ground } from "../motion/planar.js";
 import type { Settings } from "../settings.js";
 
-/** Where a figure is, and its velocity in m/s; x and z first. */
+/** Where a figure would come to rest, its velocity and the one wanted, in m and m/s along x and z; and whether it goes. */
 export interface Walker {
-  root: Ground;
+  place: readonly [x: number, z: number];
   velocity: readonly number[];
+  wanted: readonly number[];
+  moves: boolean;
 }
 
-/** The change of a figure's velocity, x and z in m/s, by which it keeps `room` metres from others. */
+/** Velocities that go at least so fast a way, how far that yields, and the distance of the other. */
+interface HalfPlane {
+  x: number;
+  z: number;
+  least: number;
+  yields: number;
+  distance: number;
+  push: number;
+}
+
+type Avoidance = Settings<typeof avoidanceSettings>;
+
+/** The velocity, near to the one wanted, by which a figure keeps `room` metres from others; the one wanted if none is near. */
 export function keptApart(
   figure: Walker,
   others: readonly Walker[],
   room: number,
-  settings: Settings<typeof avoidanceSettings>,
+  settings: Avoidance,
 ): [x: number, z: number] {
-  let changeX = 0;
-  let changeZ = 0;
+  const planes: HalfPlane[] = [];
   for (const other of others) {
-    const x = figure.root[0] - other.root[0];
-    const z = figure.root[1] - other.root[1];
+    const x = other.place[0] - figure.place[0];
+    const z = other.place[1] - figure.place[1];
     if (other === figure || Math.abs(x) >= settings.sight || Math.abs(z) >= settings.sight) continue;
     const u = figure.velocity[0]! - other.velocity[0]!;
     const v = figure.velocity[1]! - other.velocity[1]!;
-    const soon = Math.min(Math.max(-(x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), settings.soon);
-    const nearX = x + soon * u;
-    const nearZ = z + soon * v;
-    if (nearX * nearX + nearZ * nearZ >= room * room) continue;
-    const by =
-      settings.strength *
-      Math.min(Math.max(1 - Math.hypot(nearX, nearZ) / room, 0), 1) *
-      (1 - soon / settings.soon);
-    // head on there is no way away from the other: to the right of the way there
-    const [rightX, rightZ] = unit(z, -x);
-    const [awayX, awayZ] = unit(nearX + 0.1 * room * rightX, nearZ + 0.1 * room * rightZ);
-    changeX += awayX * by;
-    changeZ += awayZ * by;
+    const soon = Math.min(Math.max((x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), settings.soon);
+    if (Math.hypot(x - soon * u, z - soon * v) >= 2 * room) continue;
+    const [change, wayX, wayZ] = changed(x, z, u, v, room * (other.moves ? 1 : settings.standing), settings);
+    const distance = Math.hypot(x, z);
+    planes.push({
+      x: wayX,
+      z: wayZ,
+      least: figure.velocity[0]! * wayX + figure.velocity[1]! * wayZ + (other.moves ? 0.5 : 1) * change,
+      yields: settings.yields * Math.max(distance / room - 1, 0.1),
+      distance,
+      push: 0,
+    });
   }
-  return [changeX, changeZ];
+  planes.sort((a, b) => a.distance - b.distance);
+  return nearestAllowed(figure.wanted, planes.slice(0, settings.heeds).reverse(), settings);
 }
 
-/** A velocity that goes around others, no faster than before; none where it would be too slow. */
-export function aside(
-  [x, z]: readonly number[],
-  change: readonly number[],
-  { waits }: Settings<typeof avoidanceSettings>,
+/** The smallest change of a velocity (u, v) towards (x, z), and its direction, by which the two keep `room` soon; those that are
+ *  too near part. */
+function changed(
+  x: number,
+  z: number,
+  u: number,
+  v: number,
+  room: number,
+  settings: Avoidance,
+): [change: number, wayX: number, wayZ: number] {
+  const apart = Math.hypot(x, z);
+  if (apart < room) {
+    const [awayX, awayZ] = unit(-x, -z);
+    return [(room - apart) / settings.parts - (u * awayX + v * awayZ), awayX, awayZ];
+  }
+  const seconds = Math.min(settings.parts + (apart - room) / settings.closes, settings.soon);
+  // velocities that meet are in a cone that a circle cuts off: out of it past the circle
+  const offX = u - x / seconds;
+  const offZ = v - z / seconds;
+  const off = Math.hypot(offX, offZ);
+  const towards = offX * x + offZ * z;
+  if (towards < 0 && towards ** 2 > room ** 2 * off ** 2) return [room / seconds - off, ...unit(offX, offZ)];
+  // or over the nearer leg of the cone
+  const leg = Math.sqrt(Math.max(apart ** 2 - room ** 2, 0)) * (x * offZ - z * offX > 0 ? 1 : -1);
+  const [wayX, wayZ] = unit(-leg * z - room * x, leg * x - room * z);
+  return [-(u * wayX + v * wayZ), wayX, wayZ];
+}
+
+/** The velocity near to the one wanted within half-planes, the nearest last: the method of Hildreth and Dykstra. */
+function nearestAllowed(
+  wanted: readonly number[],
+  planes: HalfPlane[],
+  settings: Avoidance,
 ): [x: number, z: number] {
-  const u = x! + change[0]!;
-  const v = z! + change[1]!;
-  const speed = Math.hypot(u, v);
-  const share = speed > waits ? Math.min(1, Math.hypot(x!, z!) / speed) : 0;
-  return [u * share, v * share];
+  let x = wanted[0]!;
+  let z = wanted[1]!;
+  if (!planes.length) return [x, z];
+  const most = Math.max(Math.hypot(x, z), settings.dodges);
+  let slowedX = 0;
+  let slowedZ = 0;
+  for (let sweep = 0; sweep < settings.sweeps; sweep++) {
+    for (const plane of planes) {
+      const missing = plane.least - (x * plane.x + z * plane.z);
+      const step = Math.max((missing - plane.yields * plane.push) / (1 + plane.yields), -plane.push);
+      plane.push += step;
+      x += step * plane.x;
+      z += step * plane.z;
+    }
+    // no faster
+    const fastX = x + slowedX;
+    const fastZ = z + slowedZ;
+    const share = Math.min(1, most / Math.max(Math.hypot(fastX, fastZ), 1e-9));
+    x = fastX * share;
+    z = fastZ * share;
+    slowedX = fastX - x;
+    slowedZ = fastZ - z;
+  }
+  return [x, z];
 }
 
 function unit(x: number, z: number): [number, number] {

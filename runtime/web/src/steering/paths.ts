@@ -1,8 +1,8 @@
 /* Figures that go along paths, arrive at their ends, and keep apart on the way, as motet/steering/paths.py says: commands tick by
  * tick. Metres, seconds, radians; x and z. */
-import { aside, keptApart } from "./avoidance.js";
+import { keptApart } from "./avoidance.js";
 import type { arrivalSettings } from "../generated.js";
-import type { Command, Gaits } from "./gaits.js";
+import type { Gaits } from "./gaits.js";
 import type { Playback, Target } from "./matching.js";
 import type { Settings } from "../settings.js";
 import { hasten, type Steered, type SteeringModel } from "./steered.js";
@@ -34,15 +34,17 @@ export function sent(points: Point[], order: Pick<Going, "gait" | "speed" | "fac
 }
 
 /** A tick later: the velocity at which the figure is to go, [0, 0] for standing. The place where it would come to rest is led
- *  along the path; the figure follows it. */
+ *  along the path; the figure follows it. straysFrom: metres from the path beyond which it goes straight on to the next corner. */
 export function onward(
   going: Going,
   playback: Playback,
   settings: Settings<typeof arrivalSettings>,
   halfLife: number,
+  straysFrom: number,
   seconds: number,
 ): [x: number, z: number] {
   const rests = restingPlace(playback, halfLife);
+  if (distance(at(going, going.gone), rests) > straysFrom) rejoin(going, rests);
   const whole = going.along.at(-1)!;
   // the point of the path where it is to come to rest goes on, slowly in bends and towards the end
   const left = Math.max(whole - going.gone, 0);
@@ -66,6 +68,18 @@ export function onward(
   return [x * pace, z * pace];
 }
 
+/** Let a figure go on from another place straight to the next point of its path. */
+function rejoin(going: Going, place: Point): void {
+  const after = next(going, going.gone);
+  const start = going.along[after - 1]!;
+  const points = going.points.slice();
+  points[after - 1] = place;
+  const change = distance(points[after]!, place) - (going.along[after]! - start);
+  going.along = going.along.map((metres, at) => (at >= after ? metres + change : metres));
+  going.points = points;
+  going.gone = start;
+}
+
 /** The share of its speed at which a figure goes through the bend around where it is on its path: by how much shorter the
  *  straight line through it is. */
 function slowness(going: Going, settings: Settings<typeof arrivalSettings>): number {
@@ -87,7 +101,7 @@ function step(
   settings: Settings<typeof arrivalSettings>,
 ): number {
   const off = minus(rests, here);
-  const waits = clamp(1 - Math.hypot(...off) / settings.waits, 0, 1);
+  const waits = clamp(1 - Math.hypot(...off) / settings.strays, 0, 1);
   const way = unit(minus(at(going, going.gone + 0.05), here));
   return Math.max(metres * waits, clamp(dot(off, way), 0, 0.1));
 }
@@ -136,15 +150,21 @@ export function settle(
 }
 
 /** The point of a path that is so many metres from its beginning. */
-function at({ points, along }: Going, gone: number): Point {
-  const beyond = along.findIndex((metres) => metres > gone);
-  const after = clamp(beyond < 0 ? along.length : beyond, 1, along.length - 1);
+function at(going: Going, gone: number): Point {
+  const { points, along } = going;
+  const after = next(going, gone);
   const start = along[after - 1]!;
   const stop = along[after]!;
   const part = clamp((gone - start) / Math.max(stop - start, 1e-9), 0, 1);
   const from = points[after - 1]!;
   const to = points[after]!;
   return [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1])];
+}
+
+/** The first point beyond so many metres, or the last one. */
+function next({ along }: Going, gone: number): number {
+  const beyond = along.findIndex((metres) => metres > gone);
+  return clamp(beyond < 0 ? along.length : beyond, 1, along.length - 1);
 }
 
 /** Where a figure comes to rest that is to stand from now on: the springs' integral from where it is. */
@@ -169,10 +189,11 @@ export function lead(model: SteeringModel, figures: Steered[], room: number): vo
   const { abilities } = model;
   const before = figures.map(({ target, command }) => ({ target, gait: command.gait }));
   for (const figure of figures) {
-    if (figure.going) follow(model, figure);
+    if (figure.going) follow(model, figure, room ? model.avoidance.rejoins : model.arrival.strays);
     figure.target = abilities.target(figure.command).target;
   }
-  if (room) keepApart(model, figures, room);
+  const targetsBefore = before.map(({ target }) => target);
+  if (room) keepApart(model, figures, room, targetsBefore);
   figures.forEach(({ playback, target, command }, at) => {
     const sudden = target.some((value, i) => Math.abs(value - before[at]!.target[i]!) > model.arrival.sudden);
     if (sudden || command.gait !== before[at]!.gait) hasten(playback);
@@ -180,10 +201,14 @@ export function lead(model: SteeringModel, figures: Steered[], room: number): vo
 }
 
 /** Command a figure to go on along its path, and move it as it comes to rest at the end. */
-function follow({ abilities, steerer, arrival, fps }: SteeringModel, figure: Steered): void {
+function follow(
+  { abilities, steerer, arrival, fps }: SteeringModel,
+  figure: Steered,
+  straysFrom: number,
+): void {
   const halfLife = steerer.matcher.settings.velocity;
   const { playback, command, going } = figure;
-  const velocity = onward(going!, playback, arrival, halfLife, 1 / fps);
+  const velocity = onward(going!, playback, arrival, halfLife, straysFrom, 1 / fps);
   settle(going!, playback, arrival, halfLife, 1 / fps);
   const speed = Math.hypot(...velocity);
   const gait = speed > 0 ? slowed(abilities, going!.gait, speed) : command.gait;
@@ -206,20 +231,37 @@ function slowed({ speeds }: Gaits, gait: number, speed: number): number {
   return speed < speeds[gait]![0] && speeds[slow]![0] < speeds[gait]![0] ? slow : gait;
 }
 
-function keepApart({ abilities, avoidance }: SteeringModel, figures: Steered[], room: number): void {
-  const walkers = figures.map(({ playback: { root, spring } }) => ({ root, velocity: spring }));
+function keepApart(
+  { abilities, avoidance, steerer }: SteeringModel,
+  figures: Steered[],
+  room: number,
+  targetsBefore: Target[],
+): void {
+  const { velocity } = steerer.matcher.settings;
+  const walkers = figures.map(({ playback, target, command }, at) => ({
+    place: restingPlace(playback, velocity),
+    velocity: targetsBefore[at]!,
+    wanted: target,
+    moves: command.speed > 0,
+  }));
+  const { aside } = steerer.matcher.settings;
   const targets = figures.map(({ command, target }, at): Target => {
     if (!(command.speed > 0)) return target;
-    const change = keptApart(walkers[at]!, walkers, room, avoidance);
-    return abilities.target(around(command, aside(target, change, avoidance), target[2])).target;
+    const [x, z] = keptApart(walkers[at]!, walkers, room, avoidance);
+    if (x === target[0] && z === target[1]) return abilities.target(command).target;
+    const pace = Math.hypot(x, z);
+    const way = Math.atan2(x, z);
+    const goes = pace > avoidance.waits;
+    // it faces the way around others, unless that leads aside or back
+    const along =
+      goes && command.facing === command.direction && Math.abs(wrapped(way - command.direction)) < aside;
+    const around = {
+      ...command,
+      speed: goes ? pace : 0,
+      direction: goes ? way : command.direction,
+      facing: along ? way : target[2],
+    };
+    return abilities.target(around).target;
   });
   figures.forEach((figure, at) => (figure.target = targets[at]!));
-}
-
-/** A command that goes around others at a velocity. toFace: the facing of its target. */
-function around(command: Command, [x, z]: readonly [x: number, z: number], toFace: number): Command {
-  const speed = Math.hypot(x, z);
-  const direction = speed > 0 ? Math.atan2(x, z) : command.direction;
-  const facing = command.facing === command.direction ? direction : toFace;
-  return { ...command, speed, direction, facing };
 }

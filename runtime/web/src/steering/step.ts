@@ -136,7 +136,10 @@ export class Steerer {
     const across = stepZ * spring[0] - stepX * spring[1];
     const veers = moving && along > settings.veer_within * Math.abs(across);
     const angle = veers ? clamp(Math.atan(across / Math.max(along, 1e-6)), -settings.veer, settings.veer) : 0;
-    figure.root = [x + stepX + angle * stepZ, z + stepZ - angle * stepX, turned];
+    // a slow walk goes exactly as the springs do, whose ways recordings lack
+    figure.root = creeps
+      ? [x + spring[0] * dt, z + spring[1] * dt, turned]
+      : [x + stepX + angle * stepZ, z + stepZ - angle * stepX, turned];
     // the next playback rate; a slow walk shares the slowness between rate and stride
     const slowest = creeps ? settings.creep_slowest : settings.slowest;
     figure.rate = moving ? clamp(creeps ? Math.sqrt(ratio) : ratio, slowest, settings.fastest) : 1;
