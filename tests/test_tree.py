@@ -10,7 +10,7 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 80
+MOST_LARGE_FUNCTIONS = 79
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 MOST_BANNED_NAMES = 16
@@ -102,13 +102,13 @@ CEILINGS = {
     "motet.representation": 9_500,
     "motet.search": 3_600,
     "motet.serve": 17_100,
-    "motet.steering": 44_800,
+    "motet.steering": 46_100,
     "motet.text": 5_400,
     "motet_export": 11_400,
     "motet_train": 9_500,
     "motet_train.cli": 8_500,
     "motet_train.data": 22_000,
-    "motet_train.evaluate": 46_900,
+    "motet_train.evaluate": 47_800,
     "motet_train.models": 23_000,
     "motet_train.papers": 41_600,
     "motet_train.recipes": 17_300,

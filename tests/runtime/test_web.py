@@ -240,6 +240,20 @@ def turning_about(frames: int = 30) -> list[list[float]]:
     return found
 
 
+def crouching(frames: int = 24) -> list[list[float]]:
+    """An act, a squat that goes ahead while a hand jumps round; frames (T, 92), rounded."""
+    rows = []
+    for frame in range(frames):
+        part = frame / (frames - 1)
+        turns = np.tile([0.0, 0.0, 0.0, 1.0], (len(BONES), 1))
+        for bone, half in (("UpperLeg", -1.0 * part), ("LowerLeg", 1.15 * part), ("Hand", 1.2 * (frame > 14))):
+            for side in ("left", "right"):
+                turns[BONES.index(side + bone), ::3] = np.sin(half), np.cos(half)
+        rows.append([*np.ravel(turns), 0.0, 0.3 * part, 0.0, 0.95 - 0.6 * part])
+    found: list[list[float]] = np.round(rows, 5).tolist()
+    return found
+
+
 STEERED: list[dict[str, Any]] = [
     {"control": {"gait": "walk", "velocity": [[1.2, 0.4], [0.3, -1.1]]}},
     {"control": {"gait": ["run", "walk"], "speed": 2.5, "direction": [80.0, -40.0], "facing": [80.0, -20.0]}},
@@ -263,22 +277,28 @@ STEERED: list[dict[str, Any]] = [
     {"look_at": {"points": [-2.0, 0.4, -3.0], "who": [1]}, "control": {"gait": "walk", "velocity": [0.8, -0.6]}},
     {"reach": {"hand": "right", "points": [2.5, 1.6, 3.0], "who": [1]}},
     {"look_at": {"points": None}, "reach": {"hand": "left", "points": None, "who": [0]}, "end": {"who": [0]}},
+    {"reach": {"hand": "right", "points": [2.0, 1.3, 1.2]}, "control": {"gait": "walk", "velocity": [1.2, 0.0]}},
+    {"control": {"speed": 0.0}, "crouch": {"who": [0, 1], "upper": False}},
+    {},
+    {"act": {"who": [0, 1], "upper": False}, "reach": {"hand": "right", "points": [0.0, 1.6, -9.0]}},
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
-:func:`turning_about`."""
+:func:`turning_about`, and for "crouch" :func:`crouching`."""
 
 
 def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[list[Any]]]:
     """Of two figures in every twelfth picture, 48 a second: ground, hips, rotations, contacts; and what happens to each
     after each call."""
     session, found, happened = model.start(characters=2, hold_feet=hold_feet), [], []
-    act = Act.of("turn", np.array(turning_about(), np.float32), model.fps, model.settings(ActSettings))
+    acts: dict[str, Act | str | None] = {"end": None, "jump": "jump"}
+    for name, frames in (("act", turning_about()), ("crouch", crouching())):
+        acts[name] = Act.of(name, np.array(frames, np.float32), model.fps, model.settings(ActSettings))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ControlWarning)
         for calls in STEERED:
             for name, given in calls.items():
-                if name in ("act", "end", "jump"):
-                    session.act({"act": act, "end": None, "jump": "jump"}[name], **given)
+                if name in acts:
+                    session.act(acts[name], **given)
                 elif isinstance(given, dict):
                     getattr(session, name)(**given)
                 else:
@@ -317,6 +337,7 @@ def answers() -> dict[str, Any]:
         "travel": travelled(describe),
         "steering": STEERED,
         "acted": turning_about(),
+        "crouched": crouching(),
         "steered": steered(control, hold_feet=False)[0],
         "held": held,
         "happened": happened,

@@ -17,6 +17,7 @@ from motet.motion.scalar_or_batch import (
     product,
     root,
     rotated,
+    smaller,
     swing,
     times,
     unit,
@@ -31,6 +32,9 @@ class TwoBones:
 
     SHORTEST = -0.95
     """The cosine of the largest bend of a knee, 162 degrees: targets beyond it are not reached."""
+
+    FORWARD = 0.97
+    """The cosine of 14 degrees: a knee that is bent forward by more, as between two poses it may be, stays so."""
 
     EASED_SHARE = 0.5
     """The largest lengthening of a leg, as a share of the length left until it is straight."""
@@ -80,7 +84,8 @@ class TwoBones:
         """Rotations in the world of thigh and shin that bring the ankle to a target, or as near as possible.
 
         The knee turns about its axis, as far as that is square to the thigh, until the leg is as long as it has to be,
-        bent back even where it was bent forward; then thigh and shin turn together the shortest way.
+        bent to the side to which it was bent, back where it was nearly straight; then thigh and shin turn together the
+        shortest way.
         """
         # the law of cosines gives the bend for this length; then the leg swings to the target as a whole
         away = minus(target, self.hip)
@@ -90,15 +95,20 @@ class TwoBones:
 
     def _bend(self, cosine: Part) -> Quaternion:
         """The turn about the axis after which the shin is bent by the angle of a cosine."""
-        cosine = -larger(-larger(cosine, self.SHORTEST), -1.0)
+        # the present bend; a negative sine: forward
+        along_now = dot(self._along, self._down)
+        aside_now = dot(cross(self._along, self._down), self._axis)
+        by = 1 / larger(root(along_now * along_now + aside_now * aside_now), 1e-300)
+        cosine_now = along_now * by
+        sine_now = aside_now * by
+        # a knee that is bent more than knees can be is bent no less for it, and keeps its side
+        cosine = smaller(larger(cosine, smaller(cosine_now, self.SHORTEST)), 1.0)
+        is_forward = (sine_now < 0) & (cosine_now < self.FORWARD)
         sine = root(1 - cosine * cosine)
-        # negative: forward
-        now = dot(self._along, self._down)
-        aside = dot(cross(self._along, self._down), self._axis)
-        by = 1 / larger(root(now * now + aside * aside), 1e-300)
+        sine = where(is_forward, -sine, sine)
         # the cosine and sine of the difference of the angles, and half of it
-        turn_cosine = (cosine * now + sine * aside) * by
-        turn_sine = (sine * now - cosine * aside) * by
+        turn_cosine = cosine * cosine_now + sine * sine_now
+        turn_sine = sine * cosine_now - cosine * sine_now
         half = 1 + turn_cosine
         sine = where(half > 1e-12, turn_sine, 1.0)
         x, y, z = times(self._axis, sine)

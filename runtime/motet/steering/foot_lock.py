@@ -52,6 +52,8 @@ class FootLockSettings(Settings):
     """Contact above which a foot stands."""
     bears: Annotated[float, Range(0, 1, "m")] = 0.02
     """How much lower than the ball the heel or the tip must be to bear the foot."""
+    low: Annotated[float, Range(0, 1, "m")] = 0.5
+    """Height of the hips below which no foot is held: who squats or kneels turns on it."""
     steps: Annotated[float, Range(0, 1, "m")] = 0.08
     """How high a foot is lifted that swings while its contact is 1; a slower foot is lifted less."""
     lifts: Annotated[float, Range(0.001, 10, "s")] = 0.035
@@ -120,7 +122,7 @@ def _held(
     # the foot as it is played, and how it is corrected
     turned, places = joints_of(limb, hips, place)
     sole = _sole(turned, places)
-    foot = _corrected(foot_before, sole, limb.contact, settings, seconds)
+    foot = _corrected(foot_before, sole, limb.contact, place[1], settings, seconds)
     shift_x, shift_z, _, _, height, *_ = foot
     # no point of the sole is below the ground
     lift = larger(height - _lowest(sole), 0.0)
@@ -136,9 +138,15 @@ def _held(
 
 
 def _corrected(
-    foot_before: Sequence[Part], sole: Sequence[Vector], contact: Part, settings: FootLockSettings, seconds: float
+    foot_before: Sequence[Part],
+    sole: Sequence[Vector],
+    contact: Part,
+    hips_height: Part,
+    settings: FootLockSettings,
+    seconds: float,
 ) -> list[Part]:
     """The correction of a foot a tick later, as :attr:`FootLock.feet` has it."""
+    contact = where(hips_height > settings.low, contact, 0.0)
     shift_x, shift_z, drift_x, drift_z, height, rise, *sole_before = foot_before
     move_x, move_z = _sole_move(sole, sole_before, settings.bears)
     # hold: a foot that stands stays where it was, so its move since the last tick is taken from its offset; fade: the

@@ -2,12 +2,13 @@
 
 The arm is always brought to a point from the same pose, forward and half bent with the elbow down, by the shortest
 turn; so the elbow goes where people hold it, whatever the arm does in the recording. Between the recorded arm and this
-one the joints are mixed.
+one the joints are mixed. A point that cannot be held, behind the back or at the shoulder, is let go as smoothly as one
+that is taken back: the arm stays where it was and fades, rather than to follow the point through the body.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from motet.motion.scalar_or_batch import (
     computed,
     dot,
     inverse,
+    joined,
     larger,
     length,
     minus,
@@ -49,8 +51,10 @@ class ReachSettings(Settings):
 
     widest: Radians = float(np.radians(105))
     """How far an arm turns from diagonally forward, on its side."""
+    lets_go: Radians = float(np.radians(25))
+    """How much farther aside a point may be before the hand lets it go."""
     nearest: Share = 0.25
-    """Share of the arm's length: no hand is nearer to the shoulder."""
+    """Share of the arm's length: a point that is nearer to the shoulder is let go."""
     straight: Share = 0.95
     """Share of the arm's length up to which points are reached exactly."""
     stretched: Annotated[float, Range(0.001, 1)] = 0.04
@@ -68,6 +72,9 @@ PARTS = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 PALM = 0.09
 """Metres from the wrist to the middle of the hand, which is brought to the point."""
 
+AROUND = -0.7
+"""The cosine of half the turn, 270 degrees, beyond which an arm goes back the other way."""
+
 LEAST = 1e-3
 """The weight below which an arm is as it is played."""
 
@@ -81,9 +88,11 @@ class ReachLayer:
     points: Array
     """(B, 3) in the world, NaN for none."""
     aim: Follower
-    """(B, 3) where the hand goes for them."""
+    """(B, 3) where the hand goes for them, from the shoulder in the frame of the upper chest."""
     weight: Follower
     """(B, 1) from 0, the arm as it is played, to 1."""
+    signs: Array
+    """(B, 2) of the quaternions between which upper arms and forearms are mixed: 1 or -1, 0 where an arm rests."""
     beyond: Flags
     """(B,) whether the point was out of reach in the last tick."""
 
@@ -95,6 +104,7 @@ class ReachLayer:
             points=np.full((figures, 3), np.nan),
             aim=Follower.at(np.zeros((figures, 3))),
             weight=Follower.at(np.zeros((figures, 1))),
+            signs=np.zeros((figures, 2)),
             beyond=np.zeros(figures, dtype=bool),
         )
 
@@ -109,13 +119,16 @@ class ReachLayer:
             return self, pose
         has_point = ~np.isnan(self.points[:, 0])
         rests = self.weight.shown < LEAST
-        aim = self._aimed(has_point, rests, settings, seconds)
-        # the weight goes to 1, or back to 0
-        weight = self.weight.after(has_point[:, None].astype(np.float64), 0.5, settings.half_life, seconds)
+        # where the hand can be for its point, and whether that can be held
+        arm = _Arm.of(pose, self.side)
+        reachable, holds, beyond = arm.within_reach(self.points, settings)
+        # the aim goes there, or stays while the hand lets go; the weight goes to 1, or back to 0
+        aim = self._aimed(reachable, holds, rests, settings, seconds)
+        weight = self.weight.after(holds[:, None].astype(np.float64), 0.5, settings.half_life, seconds)
         # the arm
-        turned, beyond = _reached(pose, self.side, aim.shown, weight.shown[:, 0], settings)
+        signs, turned = arm.mixed(aim.shown, weight.shown, np.where(rests, 0.0, self.signs))
         rotations = self._with_arms(pose.rotations, turned, has_point | ~rests[:, 0])
-        layer = replace(self, aim=aim, weight=weight, beyond=beyond & has_point)
+        layer = replace(self, aim=aim, weight=weight, signs=signs, beyond=has_point & beyond)
         return layer, replace(pose, rotations=rotations)
 
     def _with_arms(self, rotations: Floats, arms: tuple[Quaternion, Quaternion], moves: Flags) -> Floats:
@@ -126,10 +139,10 @@ class ReachLayer:
             rotations[moves, bone] = np.transpose(quats).reshape(-1, 4)[moves]
         return rotations
 
-    def _aimed(self, has_point: Flags, rests: Flags, settings: ReachSettings, seconds: float) -> Follower:
-        """The aim a tick later: it follows the point; that of an arm at rest (B, 1) is there at once, as its weight
-        takes the arm there."""
-        wanted = np.where(has_point[:, None], self.points, self.aim.wanted)
+    def _aimed(self, reachable: Array, goes: Flags, rests: Flags, settings: ReachSettings, seconds: float) -> Follower:
+        """The aim a tick later: it follows the places (B, 3) of hands that go (B,); that of an arm at rest (B, 1) is
+        there at once, as its weight takes the arm there."""
+        wanted = np.where(goes[:, None], reachable, self.aim.wanted)
         aim = Follower(
             np.where(rests, wanted, self.aim.wanted),
             np.where(rests, 0 * wanted, self.aim.offset),
@@ -138,34 +151,61 @@ class ReachLayer:
         return aim.after(wanted, settings.leap, settings.half_life, seconds)
 
 
-def _reached(
-    pose: Pose, side: int, points: Array, weight: Array, settings: ReachSettings
-) -> tuple[tuple[Quaternion, Quaternion], Flags]:
-    """Rotations of upper arms and forearms in their parents' frames, with the hands on the way to points (B, 3) as far
-    as weights (B,) say; and whether these are out of reach (B,)."""
-    bones = [sided(LEFT_RIGHT[side], part) for part in PARTS]
-    offsets = [HUMANOID.joints[HUMANOID.index(bone)].offset for bone in bones]
-    shoulder, upper, lower, hand = (parts(pose.rotations[:, BONES.index(bone)]) for bone in bones)
-    # from the shoulder to the point, in the frame of the upper chest
-    to_point = minus(_in_chest(pose, points), plus(offsets[0], rotated(shoulder, offsets[1])))
-    # the arm that is forward and half bent, brought as near as it can
-    palm = plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0)))
-    arm = _ready_arm(side, offsets[2], palm)
-    reachable = _within(to_point, side, arm.longest, settings)
-    reaching_upper, reaching_lower = map(product, arm.turns(reachable), READY[side])
-    # mixed with the recorded arm, in the frames of the parents
-    (share,) = parts(weight[:, None])
-    mixed_upper = _mixed(upper, product(inverse(shoulder), reaching_upper), share)
-    mixed_lower = _mixed(lower, product(inverse(reaching_upper), reaching_lower), share)
-    # how far the hand still is from the point
-    missing = length(minus(reachable, to_point))
-    return (mixed_upper, mixed_lower), np.array(missing > settings.reached).reshape(-1)
+class _Arm(NamedTuple):
+    """The arms of a side as they are played."""
 
+    side: int
+    chest: Quaternion
+    """Of the upper chest in the world."""
+    start: Vector
+    """The shoulder joint in the world."""
+    shoulder: Quaternion
+    """Of the collar bone, of the upper arm and of the forearm in their parents' frames."""
+    upper: Quaternion
+    lower: Quaternion
+    ready: TwoBones
+    """The arm that is forward and half bent, in the frame of the upper chest, from the shoulder joint."""
 
-def _in_chest(pose: Pose, points: Array) -> Vector:
-    """Points (B, 3) of the world in the frame of the upper chest."""
-    place, chest = frame_of(pose, SPINE)
-    return rotated(inverse(chest), minus(parts(points), place))
+    @staticmethod
+    def of(pose: Pose, side: int) -> "_Arm":
+        """Those of a pose."""
+        bones = [sided(LEFT_RIGHT[side], part) for part in PARTS]
+        offsets = [HUMANOID.joints[HUMANOID.index(bone)].offset for bone in bones]
+        shoulder, upper, lower, hand = (parts(pose.rotations[:, BONES.index(bone)]) for bone in bones)
+        place, chest = frame_of(pose, SPINE)
+        start = plus(place, rotated(chest, plus(offsets[0], rotated(shoulder, offsets[1]))))
+        palm = plus(offsets[3], rotated(hand, (_out(side) * PALM, 0.0, 0.0)))
+        return _Arm(side, chest, start, shoulder, upper, lower, _ready_arm(side, offsets[2], palm))
+
+    def within_reach(self, points: Array, settings: ReachSettings) -> tuple[Array, Flags, Flags]:
+        """The places (B, 3) nearest to points (B, 3) of the world where hands can be, from the shoulder in the frame of
+        the upper chest; whether hands can be held there, and whether the points are out of reach (B,): no and yes where
+        there is none."""
+        to_point = rotated(inverse(self.chest), minus(parts(points), self.start))
+        place = _within(to_point, self.side, self.ready.longest, settings)
+        # beyond the edge a place would go round the shoulder faster than the point, and near it both do
+        distance = length(to_point)
+        is_ahead = _along(to_point, self.side) >= np.cos(min(settings.widest + settings.lets_go, np.pi)) * distance
+        holds = is_ahead & (distance > settings.nearest * self.ready.longest)
+        misses = length(minus(place, to_point)) > settings.reached
+        return joined(place), np.reshape(holds, -1), np.reshape(np.logical_not(holds) | misses, -1)
+
+    def mixed(self, places: Array, weight: Array, signs: Array) -> tuple[Array, tuple[Quaternion, Quaternion]]:
+        """Rotations of upper arms and forearms in their parents' frames, on the way to having hands at places (B, 3) as
+        far as weights (B, 1) say; and the signs (B, 2) of :class:`ReachLayer`, from those of the last tick."""
+        world_upper, world_lower = map(product, self.ready.turns(parts(places)), READY[self.side])
+        reaching_upper = product(inverse(self.shoulder), world_upper)
+        reaching_lower = product(inverse(world_upper), world_lower)
+        # an arm that is on its way around one side stays on it
+        upper_before, lower_before = parts(signs)
+        upper_sign = _sign(self.upper, reaching_upper, upper_before)
+        lower_sign = _sign(self.lower, reaching_lower, lower_before)
+        (share,) = parts(weight)
+        turned = (
+            _mixed(self.upper, reaching_upper, share, upper_sign),
+            _mixed(self.lower, reaching_lower, share, lower_sign),
+        )
+        return joined((upper_sign, lower_sign)), turned
 
 
 def _out(side: int) -> float:
@@ -217,9 +257,9 @@ def _within(to_point: Vector, side: int, longest: Part, settings: ReachSettings)
 def _turnable(to_point: Vector, side: int, widest: float) -> Vector:
     """The vector to a point, brought to the edge of the cone of directions within ``widest`` radians if beyond it."""
     widest_cosine = np.cos(widest)
-    axis = unit((_out(side), 0.0, 1.0))
+    axis = _diagonal(side)
     distance = length(to_point)
-    along = dot(to_point, axis)
+    along = _along(to_point, side)
     across = minus(to_point, times(axis, along))
     edge_along = times(axis, widest_cosine * distance)
     edge_across = times(unit(across), root(1 - widest_cosine * widest_cosine) * distance)
@@ -229,8 +269,25 @@ def _turnable(to_point: Vector, side: int, widest: float) -> Vector:
     return x, y, z
 
 
-def _mixed(first: Quaternion, second: Quaternion, share: Part) -> Quaternion:
-    """A rotation between two, by a share of the way."""
-    sign = where(sum(a * b for a, b in zip(first, second, strict=True)) < 0, -1.0, 1.0)
+def _diagonal(side: int) -> Vector:
+    """The direction diagonally forward, on a side."""
+    return unit((_out(side), 0.0, 1.0))
+
+
+def _along(to_point: Vector, side: int) -> Part:
+    """How far a point is in that direction."""
+    return dot(to_point, _diagonal(side))
+
+
+def _sign(first: Quaternion, second: Quaternion, before: Part) -> Part:
+    """The sign of the first quaternion beside the second: that of the shorter way from a rest, then as in the last
+    tick, unless this way has become too far around."""
+    cosine = sum(a * b for a, b in zip(first, second, strict=True))
+    nearer = where(cosine < 0, -1.0, 1.0)
+    return where((before == 0) | (cosine * before < AROUND), nearer, before)
+
+
+def _mixed(first: Quaternion, second: Quaternion, share: Part, sign: Part) -> Quaternion:
+    """A rotation between two, by a share of the way. sign: of the first quaternion."""
     x, y, z, w = ((1 - share) * sign * a + share * b for a, b in zip(first, second, strict=True))
     return normalised((x, y, z, w))

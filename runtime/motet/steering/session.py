@@ -31,6 +31,7 @@ from motet.steering.scripts import Order, parse_orders
 from motet.steering.spoken import Reading
 from motet.steering.step import tick
 from motet.steering.targets import CharacterIds, checked_path, chosen_ids, numbers_of
+from motet.steering.turn_limit import TurnLimit, TurnSettings
 from motet.text.clauses import Shown
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ class SteerSnapshot:
     """The left hands."""
     right: ReachLayer
     """The right hands."""
+    turns: TurnLimit
     going: Going
     happenings: Happenings
     target: Array
@@ -108,6 +110,7 @@ class SteerSession:
             look=LookLayer.none(characters),
             left=ReachLayer.none(0, characters),
             right=ReachLayer.none(1, characters),
+            turns=TurnLimit.none(characters),
             going=Going.none(characters),
             happenings=Happenings.none(characters),
             target=np.zeros((characters, 3)),
@@ -286,6 +289,8 @@ class SteerSession:
         state.look, pose = state.look.update(pose, settings(LookSettings), seconds)
         state.left, pose = state.left.update(pose, settings(ReachSettings), seconds)
         state.right, pose = state.right.update(pose, settings(ReachSettings), seconds)
+        # turn limit: no joint jumps
+        state.turns, pose = state.turns.update(pose, settings(TurnSettings), seconds)
         # what has happened since the last tick
         return replace(pose, events=self._events(pose)).read_only()
 
@@ -420,8 +425,8 @@ class SteerSession:
     def reach(self, hand: Literal["left", "right"], points: ArrayLike | None, *, who: CharacterIds = None) -> None:
         """Let a hand of characters be at points in the world from now on, or None: as it is recorded.
 
-        points: (3,) or one for each (n, 3), x, y and z in metres, for the middle of the hand. Only the arm moves. A
-        point that is too far, or behind the back, is out of reach: the hand goes as near as it can, and
+        points: (3,) or one for each (n, 3), x, y and z in metres, for the middle of the hand. Only the arm moves. The
+        hand goes as near as it can to a point that is too far, and lets go of one behind the back or at the shoulder;
         :attr:`out_of_reach` tells. ControlError like :meth:`look_at`.
         """
         if hand not in LEFT_RIGHT:
@@ -637,6 +642,7 @@ class SteerSession:
         codes = self.model.pose_codes.encode(pose.rotations, pose.height)
         self.model.matcher.pose(self._state.playback, np.broadcast_to(codes, (self.characters, codes.shape[1])))
         self._state.actions = self._no_acts()
+        self._state.turns = TurnLimit.none(self.characters)
 
     def run(self, script: str) -> list[Motion]:
         """Run a script (:mod:`motet.steering.scripts`) for all characters; one motion for each."""

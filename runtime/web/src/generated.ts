@@ -97,6 +97,7 @@ export const RETARGET = {
 // motet.figures.two_bones
 export const TWO_BONES = {
   EASED_SHARE: 0.5,
+  FORWARD: 0.97,
   GIVES: [0.012, 0.006],
   SHORTEST: -0.95,
 } as const;
@@ -381,6 +382,7 @@ export const footLockSettings = {
   swings: { default: 1, low: 0.01, high: 100, whole: false },
   stands: { default: 0.5, low: 0, high: 1, whole: false },
   bears: { default: 0.02, low: 0, high: 1, whole: false },
+  low: { default: 0.5, low: 0, high: 1, whole: false },
   steps: { default: 0.08, low: 0, high: 1, whole: false },
   lifts: { default: 0.035, low: 0.001, high: 10, whole: false },
 } as const;
@@ -438,6 +440,7 @@ export const STEERING = {
 
 // motet.steering.reach_layer
 export const REACH_LAYER = {
+  AROUND: -0.7,
   LEAST: 0.001,
   PALM: 0.09,
 } as const;
@@ -445,6 +448,7 @@ export const REACH_LAYER = {
 // motet.steering.reach_layer.ReachSettings
 export const reachSettings = {
   widest: { default: 1.8325957145940461, low: 0, high: 3.15, whole: false },
+  lets_go: { default: 0.4363323129985824, low: 0, high: 3.15, whole: false },
   nearest: { default: 0.25, low: 0, high: 1, whole: false },
   straight: { default: 0.95, low: 0, high: 1, whole: false },
   stretched: { default: 0.04, low: 0.001, high: 1, whole: false },
@@ -519,6 +523,25 @@ export const SPOKEN = {
 export const TARGETS = {
   LARGEST_COMMAND: 1000000,
   LONGEST_PATH: 10000,
+} as const;
+
+// motet.steering.turn_limit
+export const TURN_LIMIT = {
+  LIMITED: { 1: "trunk", 2: "trunk", 3: "trunk", 4: "head", 5: "head", 10: "shoulder", 18: "shoulder", 11: "upper_arm", 19: "upper_arm", 12: "lower_arm", 20: "lower_arm", 13: "hand", 21: "hand", 6: "upper_leg", 14: "upper_leg", 7: "lower_leg", 15: "lower_leg", 8: "foot", 16: "foot", 9: "toes", 17: "toes" },
+} as const;
+
+// motet.steering.turn_limit.TurnSettings
+export const turnSettings = {
+  trunk: { default: 540, low: 1, high: 5400, whole: false },
+  head: { default: 450, low: 1, high: 5400, whole: false },
+  shoulder: { default: 360, low: 1, high: 5400, whole: false },
+  upper_arm: { default: 960, low: 1, high: 5400, whole: false },
+  lower_arm: { default: 960, low: 1, high: 5400, whole: false },
+  hand: { default: 1035, low: 1, high: 5400, whole: false },
+  upper_leg: { default: 780, low: 1, high: 5400, whole: false },
+  lower_leg: { default: 990, low: 1, high: 5400, whole: false },
+  foot: { default: 1020, low: 1, high: 5400, whole: false },
+  toes: { default: 1035, low: 1, high: 5400, whole: false },
 } as const;
 
 // motet.steering.warping

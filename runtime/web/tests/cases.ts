@@ -302,7 +302,8 @@ async function steers(read: Read): Promise<void> {
     [true, python.held],
   ] as const) {
     const session = model.start({ characters: 2, holdFeet });
-    const turn = actOf(model, "turn", python.acted.flat());
+    const turn = actOf(model, "act", python.acted.flat());
+    const squat = actOf(model, "crouch", python.crouched.flat());
     type Go = Way & { points: number[][] | null };
     type Some = { who?: number[] };
     type Points = { points: number[] | number[][] | null };
@@ -311,6 +312,7 @@ async function steers(read: Read): Promise<void> {
       push?: number[];
       control?: Told;
       act?: { who: number[]; upper?: boolean };
+      crouch?: { who: number[]; upper?: boolean };
       end?: Some;
       jump?: Some;
       look_at?: Some & Points;
@@ -320,8 +322,9 @@ async function steers(read: Read): Promise<void> {
       go_along?: Go;
     };
     const found = (python.steering as Call[]).flatMap(
-      ({ put, push, control, act, end, jump, keep_apart, go_to, go_along, look_at, reach }, call) => {
+      ({ put, push, control, act, crouch, end, jump, keep_apart, go_to, go_along, look_at, reach }, call) => {
         if (act) session.act(turn, act);
+        if (crouch) session.act(squat, crouch);
         if (end) session.act(null, end);
         if (jump) session.act("jump", jump);
         if (look_at) session.lookAt(look_at.points, look_at);

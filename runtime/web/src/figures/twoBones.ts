@@ -61,10 +61,13 @@ export class TwoBones {
     const aim = minus(target, this.hip);
     const cosine =
       (dot(aim, aim) - this.upper ** 2 - this.lower ** 2) / (2 * this.upper * this.lower * this.inPlane);
-    const bent = Math.atan2(dot(cross(along, down), this.axis), dot(along, down)); // negative if forward
-    const bend = ofVector(
-      times(this.axis, Math.acos(Math.max(TWO_BONES.SHORTEST, Math.min(1, cosine))) - bent),
-    );
+    // the present bend; negative if forward
+    const bent = Math.atan2(dot(cross(along, down), this.axis), dot(along, down));
+    // a knee that is bent more than knees can be is bent no less for it, and keeps its side
+    const least = Math.min(Math.cos(bent), TWO_BONES.SHORTEST);
+    const angle = Math.acos(Math.max(least, Math.min(1, cosine)));
+    const isForward = bent < 0 && Math.cos(bent) < TWO_BONES.FORWARD;
+    const bend = ofVector(times(this.axis, (isForward ? -angle : angle) - bent));
     const thigh = swing(plus(along, rotated(bend, down)), aim);
     return { thigh, shin: product(thigh, bend) };
   }

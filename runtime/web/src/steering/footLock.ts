@@ -50,7 +50,7 @@ export function held(
     // the point that bears the foot: the ball, or heel or tip if they are lower
     const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
     // the shift that keeps it where it was, or that fades once the foot swings
-    const contact = pose.contacts[side]!;
+    const contact = pose.height > settings.low ? pose.contacts[side]! : 0;
     const moved = shift(
       foot,
       minus(soles[bears]!, (foot.soles ?? soles)[bears]!),

@@ -12,6 +12,7 @@ import {
   lookSettings,
   reachSettings,
   steeringSettings,
+  turnSettings,
 } from "../generated.js";
 import { type Act, actOf, reachOf } from "./acts.js";
 import type { Bundle, Manifest } from "../bundle/bundle.js";
@@ -49,6 +50,7 @@ export class ControlModel extends Model {
   readonly idle: Settings<typeof idleSettings>;
   readonly look: Settings<typeof lookSettings>;
   readonly reach: Settings<typeof reachSettings>;
+  readonly turns: Settings<typeof turnSettings>;
   readonly arrival: Settings<typeof arrivalSettings>;
   readonly avoidance: Settings<typeof avoidanceSettings>;
   private taken?: ReadonlyMap<string, readonly Act[]>;
@@ -64,6 +66,7 @@ export class ControlModel extends Model {
     this.idle = settingsOf("idle", idleSettings, manifest.settings.idle);
     this.look = settingsOf("look", lookSettings, manifest.settings.look);
     this.reach = settingsOf("reach", reachSettings, manifest.settings.reach);
+    this.turns = settingsOf("turns", turnSettings, manifest.settings.turns);
     this.arrival = settingsOf("arrival", arrivalSettings, manifest.settings.arrival);
     this.avoidance = settingsOf("avoidance", avoidanceSettings, manifest.settings.avoidance);
     const matcher = new Matcher(tables, odd, names.length, steering, this.fps);

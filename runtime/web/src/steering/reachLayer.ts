@@ -28,18 +28,20 @@ const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offse
 const TRUNK = SPINE.map((name) => BONES.indexOf(name));
 const RADIANS = Math.PI / 180;
 
-/** What a hand of a figure reaches for. aim: where it goes for it; weight: [0], the arm as it is played, to [1]; beyond: whether
- *  the point was out of reach in the last tick. */
+/** What a hand of a figure reaches for. aim: where it goes for it, from the shoulder in the frame of the upper chest; weight: [0], the
+ *  arm as it is played, to [1]; signs: of the quaternions between which upper arm and forearm are mixed, 1 or -1, 0 at rest; beyond:
+ *  whether the point was out of reach in the last tick. */
 export interface Reach {
   point: Vector | null;
   aim: Follower;
   weight: Follower;
+  signs: [upper: number, lower: number];
   beyond: boolean;
 }
 
 /** Of a hand that reaches for nothing. */
 export function idle(): Reach {
-  return { point: null, aim: followerAt([0, 0, 0]), weight: followerAt([0]), beyond: false };
+  return { point: null, aim: followerAt([0, 0, 0]), weight: followerAt([0]), signs: [0, 0], beyond: false };
 }
 
 /** A pose with the hand of a side there, a tick after the last; the reach goes on. */
@@ -52,35 +54,41 @@ export function reached(
 ): Played {
   const rests = shownBy(hand.weight)[0]! < REACH_LAYER.LEAST;
   if (!hand.point && rests) return pose;
-  const wanted = hand.point ?? hand.aim.wanted;
-  // an arm that does not reach yet goes to the point by its weight alone
-  hand.aim = followed(
-    rests ? followerAt([...wanted]) : hand.aim,
-    [...wanted],
-    settings.leap,
-    settings.half_life,
-    seconds,
-  );
-  hand.weight = followed(hand.weight, [hand.point ? 1 : 0], 0.5, settings.half_life, seconds);
-  const { upper, lower, gap } = arm(pose, side, shownBy(hand.aim) as Vector, settings);
-  hand.beyond = !!hand.point && gap > settings.reached;
-  const rotations = [...pose.rotations];
+  // where the hand can be for its point, and whether that can be held
+  const arm = armOf(pose, side);
+  const goal = hand.point && withinReach(arm, inChest(pose, hand.point), side, settings);
+  const goes = goal?.holds ?? false;
+  hand.beyond = !!goal && !(goal.holds && goal.gap <= settings.reached);
+  // the aim goes there, or stays while the hand lets go; an arm that does not reach yet goes there by its weight alone
+  const wanted = goes ? [...goal!.place] : hand.aim.wanted;
+  const aim = rests ? followerAt(wanted) : hand.aim;
+  hand.aim = followed(aim, wanted, settings.leap, settings.half_life, seconds);
+  hand.weight = followed(hand.weight, [goes ? 1 : 0], 0.5, settings.half_life, seconds);
+  // the arm; one that is on its way around one side stays on it
+  const { upper, lower } = turned(arm, side, shownBy(hand.aim) as Vector);
+  const before = rests ? [0, 0] : hand.signs;
+  hand.signs = [sign(arm.upper, upper, before[0]!), sign(arm.lower, lower, before[1]!)];
   const share = shownBy(hand.weight)[0]!;
+  const rotations = [...pose.rotations];
   const bones = ARMS[side]!;
-  rotations[bones[1]!] = mixed(rotations[bones[1]!]!, upper, share);
-  rotations[bones[2]!] = mixed(rotations[bones[2]!]!, lower, share);
+  rotations[bones[1]!] = mixed(arm.upper, upper, share, hand.signs[0]);
+  rotations[bones[2]!] = mixed(arm.lower, lower, share, hand.signs[1]);
   return { ...pose, rotations };
 }
 
-/** Rotations of an upper arm and a forearm in their parents' frames with the hand at a point, and the metres that are missing. */
-function arm(
-  pose: Played,
-  side: number,
-  point: Vector,
-  settings: Settings<typeof reachSettings>,
-): { upper: Quaternion; lower: Quaternion; gap: number } {
+/** An arm as it is played: where its shoulder joint is in the frame of the upper chest; the rotations of collar bone, upper arm and
+ *  forearm in their parents' frames; and the arm that is forward and half bent. */
+interface Arm {
+  start: Vector;
+  shoulder: Quaternion;
+  upper: Quaternion;
+  lower: Quaternion;
+  ready: TwoBones;
+}
+
+function armOf(pose: Played, side: number): Arm {
   const bones = ARMS[side]!;
-  const [shoulder, , , hand] = bones.map((bone) => pose.rotations[bone]!) as [
+  const [shoulder, upper, lower, hand] = bones.map((bone) => pose.rotations[bone]!) as [
     Quaternion,
     Quaternion,
     Quaternion,
@@ -88,21 +96,38 @@ function arm(
   ];
   const offsets = bones.map((bone) => OFFSETS[bone]!);
   const start = plus(offsets[0]!, rotated(shoulder, offsets[1]!));
-  const way = minus(inChest(pose, point), start);
-  const ready = readied(
-    side,
-    offsets[2]!,
-    plus(offsets[3]!, rotated(hand, [out(side) * REACH_LAYER.PALM, 0, 0])),
-  );
-  const near = within(way, side, ready.longest, settings);
-  const { thigh, shin } = ready.turns(near);
+  const palm = plus(offsets[3]!, rotated(hand, [out(side) * REACH_LAYER.PALM, 0, 0]));
+  return { start, shoulder, upper, lower, ready: readied(side, offsets[2]!, palm) };
+}
+
+/** The place nearest to a point in the frame of the upper chest where a hand can be, from the shoulder; whether it can be held there,
+ *  and the metres that are missing. */
+function withinReach(
+  { start, ready }: Arm,
+  point: Vector,
+  side: number,
+  settings: Settings<typeof reachSettings>,
+): { place: Vector; holds: boolean; gap: number } {
+  const way = minus(point, start);
+  const place = within(way, side, ready.longest, settings);
+  // beyond the edge a place would go round the shoulder faster than the point, and near it both do
+  const far = size(way);
+  const widest = Math.min(settings.widest + settings.lets_go, Math.PI);
+  const isAhead = dot(way, diagonal(side)) >= Math.cos(widest) * far;
+  const holds = isAhead && far > settings.nearest * ready.longest;
+  return { place, holds, gap: size(minus(place, way)) };
+}
+
+/** Rotations of an upper arm and a forearm in their parents' frames with the hand at a place, from the shoulder. */
+function turned(
+  { shoulder, ready }: Arm,
+  side: number,
+  place: Vector,
+): { upper: Quaternion; lower: Quaternion } {
+  const { thigh, shin } = ready.turns(place);
   const up = product(thigh, READY[side]![0]);
   const low = product(shin, READY[side]![1]);
-  return {
-    upper: product(inverse(shoulder), up),
-    lower: product(inverse(up), low),
-    gap: size(minus(near, way)),
-  };
+  return { upper: product(inverse(shoulder), up), lower: product(inverse(up), low) };
 }
 
 /** 1 for the left side, which is at positive x, -1 for the right. */
@@ -147,7 +172,7 @@ function within(
   settings: Settings<typeof reachSettings>,
 ): Vector {
   const widest = Math.cos(settings.widest);
-  const axis = unit([out(side), 0, 1]);
+  const axis = diagonal(side);
   const far = size(way);
   const along = dot(way, axis);
   const aside = unit(minus(way, times(axis, along)));
@@ -160,8 +185,19 @@ function within(
   return times(along >= widest * far ? way : edge, eased / Math.max(far, 1e-12));
 }
 
-/** A rotation between two, by a share of the way. */
-function mixed(first: Quaternion, second: Quaternion, share: number): Quaternion {
-  const near = first.reduce((sum, value, i) => sum + value * second[i]!, 0) < 0 ? -1 : 1;
-  return normalised(first.map((value, i) => (1 - share) * near * value + share * second[i]!) as Quaternion);
+/** The direction diagonally forward, on a side. */
+function diagonal(side: number): Vector {
+  return unit([out(side), 0, 1]);
+}
+
+/** The sign of the first quaternion beside the second: that of the shorter way from a rest, then as in the last tick, unless this
+ *  way has become too far around. */
+function sign(first: Quaternion, second: Quaternion, before: number): number {
+  const cosine = first.reduce((sum, value, i) => sum + value * second[i]!, 0);
+  return before === 0 || cosine * before < REACH_LAYER.AROUND ? (cosine < 0 ? -1 : 1) : before;
+}
+
+/** A rotation between two, by a share of the way. side: the sign of the first quaternion. */
+function mixed(first: Quaternion, second: Quaternion, share: number, side: number): Quaternion {
+  return normalised(first.map((value, i) => (1 - share) * side * value + share * second[i]!) as Quaternion);
 }

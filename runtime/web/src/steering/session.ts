@@ -271,7 +271,8 @@ export class ControlSession {
 
   /**
    * Let a hand of figures be at points in the world from now on, for the middle of the hand; null: as it is recorded. Only the arm
-   * moves. A hand goes as near as it can to a point that is too far or behind the back, and `outOfReach` tells. Otherwise like `lookAt`.
+   * moves. A hand goes as near as it can to a point that is too far, and lets go of one behind the back or at the shoulder;
+   * `outOfReach` tells. Otherwise like `lookAt`.
    */
   reach(
     hand: "left" | "right",

@@ -6,6 +6,7 @@ import type {
   idleSettings,
   lookSettings,
   reachSettings,
+  turnSettings,
 } from "../generated.js";
 import { type Acting, type ActingModel, begin, laid, noAct } from "./actionLayer.js";
 import type { Going } from "./paths.js";
@@ -19,6 +20,7 @@ import { idle, type Reach, reached } from "./reachLayer.js";
 import { breathed, kept, notYet, type Standing } from "./idle.js";
 import type { Settings } from "../settings.js";
 import type { Played, Steerer } from "./step.js";
+import { type Joints, limited } from "./turnLimit.js";
 
 /** What figures are steered with. */
 export interface SteeringModel extends ActingModel {
@@ -27,6 +29,7 @@ export interface SteeringModel extends ActingModel {
   readonly idle: Settings<typeof idleSettings>;
   readonly look: Settings<typeof lookSettings>;
   readonly reach: Settings<typeof reachSettings>;
+  readonly turns: Settings<typeof turnSettings>;
   readonly arrival: Settings<typeof arrivalSettings>;
   readonly avoidance: Settings<typeof avoidanceSettings>;
 }
@@ -43,6 +46,7 @@ export interface Steered {
   look: Look;
   /** Of the left and the right hand. */
   hands: [Reach, Reach];
+  joints: Joints;
   /** Of its last tick. */
   happenings: Happenings | null;
 }
@@ -66,6 +70,7 @@ export function standing(steerer: Steerer, gait: number, place?: Ground, phase?:
     command,
     target: [0, 0, facing],
     ...orders,
+    joints: { rotations: null },
     happenings: null,
   };
 }
@@ -99,12 +104,10 @@ export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, r
     : played;
   const pose = laid(model, acting, stood, playback, root, changed);
   if (whole && !command.speed) stand(figure);
-  return guided(
-    model,
-    figure,
-    holdFeet ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt) : pose,
-    dt,
-  );
+  const footed = holdFeet
+    ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt)
+    : pose;
+  return limited(figure.joints, guided(model, figure, footed, dt), model.turns, dt);
 }
 
 /** A pose with head and arms as the figure is told. */

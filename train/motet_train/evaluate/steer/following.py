@@ -132,6 +132,18 @@ class Track:
         return points.reshape(*self.height.shape, -1, 3)
 
 
+def turns(track: Track) -> Array:
+    """Degrees (T - 1, B, J) by which bones turn between frames, relative to their parents."""
+    before = track.rotations[:-1].astype(np.float64)
+    after = track.rotations[1:]
+    # of the two quaternions of a rotation the nearer one
+    signs = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1, 1)
+    # half the chord between unit quaternions is the sine of a quarter of the angle
+    half_chords = length(before - signs * after) / 2
+    angles: Array = np.degrees(4 * np.arcsin(np.minimum(half_chords, 1)))
+    return angles
+
+
 def joint_steps(track: Track) -> Array:
     """Metres (T - 1, B, J') by which joints move between frames, in the figures' own space."""
     return length(np.diff(track.in_place().places, axis=0))

@@ -24,7 +24,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.matching_rows import rows_of
 from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
-from motet_train.evaluate.positions import Flags, length, mean_and_tail
+from motet_train.evaluate.positions import Flags, mean_and_tail
 from motet_train.evaluate.steer.commands import act_figures, going_figures, said_acts
 from motet_train.evaluate.steer.following import (
     MEASURED_SPEEDS,
@@ -39,9 +39,11 @@ from motet_train.evaluate.steer.following import (
     stretches,
     tracks_of,
     turn_errors,
+    turns,
     way_off,
     ways_errors,
 )
+from motet_train.evaluate.steer.limbs import cut_figures, reach_figures
 from motet_train.evaluate.steer.paths import chase_figures, path_figures, slow_point_figures
 from motet_train.evaluate.steer.players import SEED, reversal_figures, stick_figures
 from motet_train.evaluate.tables import Report, gathered, read_goals, report_table
@@ -80,18 +82,6 @@ class Limits:
             low=float(heights.min()),
             high=float(heights.max()),
         )
-
-
-def turns(track: Track) -> Array:
-    """Degrees (T - 1, B, J) by which bones turn between frames, relative to their parents."""
-    before = track.rotations[:-1].astype(np.float64)
-    after = track.rotations[1:]
-    # of the two quaternions of a rotation the nearer one
-    signs = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1, 1)
-    # half the chord between unit quaternions is the sine of a quarter of the angle
-    half_chords = length(before - signs * after) / 2
-    angles: Array = np.degrees(4 * np.arcsin(np.minimum(half_chords, 1)))
-    return angles
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,11 +354,15 @@ def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Meas
 
 
 def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
-    """Group -> its measure, for models that act, and go to points."""
+    """Group -> its measure, for models that act, reach, and go to points."""
     acts = said_acts(model)
     measures: dict[str, Measure] = {"act_standing": partial(act_figures, acts=acts, leap=limits.leap, gait=None)}
     for gait in MEASURED_SPEEDS:
         measures[f"act_{gait}"] = partial(act_figures, acts=acts, leap=limits.leap, gait=gait)
+    measures["cut_standing"] = partial(cut_figures, acts=acts, gait=None)
+    for gait in MEASURED_SPEEDS:
+        measures[f"cut_{gait}"] = partial(cut_figures, acts=acts, gait=gait)
+    measures["reach"] = reach_figures
     for gait in MEASURED_SPEEDS:
         measures[f"going_{gait}"] = partial(going_figures, gait=gait)
         measures[f"paths_{gait}"] = partial(path_figures, gait=gait)
