@@ -1,0 +1,49 @@
+"""Draw the acts by key poses that ship, one strip each: `python docs/results/acts.py`, for docs/acts.md."""
+
+from functools import partial
+from pathlib import Path
+
+from matplotlib.figure import Figure
+from PIL import Image
+
+import motet
+import motet.keyed
+from motet_train.evaluate.figures import bodies, panels, save
+
+FOLDER = Path(__file__).parents[1] / "figures"
+SOME = (
+    *("salute", "wave", "shrug", "phone", "think", "clap"),
+    *("drink", "hammer", "play guitar", "shoot a bow", "facepalm", "squat"),
+)
+"""Those of the picture in the README."""
+
+COLUMNS, PER_SHEET, POSES = 3, 48, 5
+
+
+def sheet(names: list[str], standing: motet.Motion) -> Figure:
+    """Acts by name, three a row."""
+    rows = -(-len(names) // COLUMNS)
+    picture, axes = panels(rows, COLUMNS, (2.4 * COLUMNS, 1.35 * rows))
+    for place in axes:
+        place.axis("off")
+    for name, place in zip(names, axes, strict=False):
+        motion = motet.keyed.ours()[name].motion(standing)
+        place.set_title(f"{name}, {motion.duration:.1f} s", fontsize=8, loc="left")
+        bodies(place, motion, POSES)
+    return picture
+
+
+def main() -> None:
+    """Write the sheets."""
+    standing = motet.load_as(motet.SteerModel, "control").run("stop 14s")
+    names = list(motet.keyed.ours())
+    sheets = {"acts": list(SOME)}
+    for start in range(0, len(names), PER_SHEET):
+        sheets[f"acts-{1 + start // PER_SHEET}"] = names[start : start + PER_SHEET]
+    drawn = {name: partial(sheet, acts, standing) for name, acts in sheets.items()}
+    for path in save(drawn, FOLDER):
+        Image.open(path).quantize(48).save(path, optimize=True)
+
+
+if __name__ == "__main__":
+    main()
