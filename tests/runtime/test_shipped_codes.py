@@ -161,7 +161,7 @@ def test_more_hypotheses_begin_with_the_same(model: CodesModel) -> None:
 def test_it_says_what_it_does_not_know(model: CodesModel) -> None:
     assert model.understood(WALK).confident
     assert not model.understood("a person plays tennis").confident  # .28
-    strange = "a person repairs the violin of an astronaut"
+    strange = "a person repairs the cello of an astronaut"
     found = model.understood(strange)
     assert not found.confident
     assert len(found.nearest) == 3
@@ -220,7 +220,7 @@ def test_what_cannot_be_told_is_refused(model: CodesModel) -> None:
     with pytest.raises(DecodingError, match="start, end, both, not 'middle'"):
         model.story([WALK], stand="middle")  # type: ignore[arg-type]
     with pytest.raises(TextError, match="nearest: '"):
-        model.stream("a person repairs the violin of an astronaut", strict=True)
+        model.stream("a person repairs the cello of an astronaut", strict=True)
 
 
 def test_refusals_of_the_command_line_say_which_file_or_text(tmp_path: Path, walk: Motion) -> None:
@@ -252,7 +252,7 @@ def test_the_command_line_tells_a_story(tmp_path: Path, clips: Path, model: Code
     result = run("generate", WALK, "--after", clips / "39_14.amc", "--stand", "end", "-o", out)
     assert result.exit_code == 0, result.stderr
     assert run("generate", WALK, "--story", "--bundle", "language-to-motion", "-o", out).exit_code == 2
-    assert run("generate", "a violin", "--strict", "-o", out).exit_code == 1
+    assert run("generate", "a cello", "--strict", "-o", out).exit_code == 1
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -35,6 +35,14 @@ class NamedAct:
         """The stems of the words of its sentence that name an act."""
         return stems_of(self.sentence.split())
 
+    @property
+    def is_small(self) -> bool:
+        """Whether only head, trunk and shoulders move: codes of recordings lose movements as small."""
+        parts = set[str]()
+        for key in self.act.keys:
+            parts |= key.numbers.keys() | key.hands.keys()
+        return parts <= {"head", "chest", "shoulders"}
+
     def seconds(self, seed: int) -> float:
         """How long it lasts."""
         return self.act.seconds(seed)

@@ -236,7 +236,9 @@ class CodesModel(GenerateModel):
         self._sentences += ["", *(command.sentence for command in self._commands.acts)]
         self._words += [(), *(command.words for command in self._commands.acts)]
         self._rare = {word: math.log((1 + len(entries)) / count) for word, count in actions_with.items()}
-        self._verbs = verbs_of(actions_with) | (keyed_verbs() if self.contract.skeleton == HUMANOID else set())
+        self._verbs = verbs_of(actions_with) | self._commands.verbs
+        if self.contract.skeleton == HUMANOID:
+            self._verbs |= keyed_verbs()
 
     def _stems(self, action: int) -> frozenset[str]:
         """The stems of the words that describe an action."""
@@ -248,13 +250,17 @@ class CodesModel(GenerateModel):
         return frozenset(stem(word) for word in self._words[action] if is_command or DONE.search(word))
 
     def _keyed(self, sentence: str) -> NamedAct | None:
-        """The act by key poses that a sentence names; None where there is none, or a recorded action has all its words,
-        those of the act in its own sentence."""
+        """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
+        sentence is a command or a recorded action has all its words, those of the act in its own sentence."""
         if self.contract.skeleton != HUMANOID:
             return None
         words = self.vocabulary.rules.words(sentence)
         act = act_named(words) or self._keyed_counted(sentence)
         if act is None:
+            return None
+        if act.is_small:
+            return act
+        if self._commands.act(sentence) is not None:
             return None
         if not all(map(self.vocabulary.meant, words)) or self.lacking(sentence):
             return act
