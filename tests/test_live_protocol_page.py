@@ -76,8 +76,8 @@ def going(before: Message, after: Message) -> Any:
 
 
 def test_every_message_of_the_page_does_what_it_says() -> None:
-    run, velocity, start, put, push, go, look, act, reach = of_a_client()
-    kinds = [one["type"] for one in (run, velocity, start, put, push, go, look, act, reach)]
+    run, velocity, start, put, push, go, look, act, _, reach = of_a_client()
+    kinds = [message["type"] for message in (run, velocity, start, put, push, go, look, act, reach)]
     assert kinds == ["control", "control", "start", "put", "push", "go_to", "look_at", "act", "reach"]
 
     async def scenario(tell: Tell, hello: Message) -> None:
@@ -131,6 +131,17 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         np.testing.assert_allclose(np.array(gone["position"])[[0, 2]], go["points"], atol=0.08)
         x, y, z, w = gone["rotation"]
         assert abs(np.degrees(2 * np.arctan2(y, w)) - go["facing"]) < 10
+
+    with_server(scenario)
+
+
+def test_the_sentence_of_the_page_is_done() -> None:
+    (say,) = [message for message in of_a_client() if message["type"] == "say"]
+
+    async def scenario(tell: Tell, hello: Message) -> None:
+        # its first part: it walks
+        first, second = await tell(say, 15), await tell({"type": "look_at"}, 15)
+        assert np.hypot(*going(first, second)) > 0.3
 
     with_server(scenario)
 

@@ -92,7 +92,7 @@ CEILINGS = {
     "motet.draw": 12_300,
     "motet.figures": 32_100,
     "motet.formats": 36_800,
-    "motet.generate": 30_000,
+    "motet.generate": 30_100,
     "motet.keyed": 9_300,
     "motet.live": 5_000,
     "motet.models": 10_200,

@@ -20,6 +20,11 @@ STANDING = "a person stands still"
 IDLE = frozenset(map(stem, (*FUNCTION_WORDS, "does", "do", "makes", "gives", "human", "subject", "somebody", "please")))
 """Stems of words that name no act."""
 
+BODY = frozenset(
+    map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "chest", "shoulder", "leg", "knee", "foot"))
+)
+"""Stems of words that orders may begin with, and that are no verbs: "hands on hips"."""
+
 SIDES = frozenset(("left", "right"))
 
 
@@ -102,7 +107,7 @@ def verbs() -> frozenset[str]:
     first_words = []
     for act in ours().values():
         first_words += [sentence.split()[0] for sentence in act.says]
-    return stems_of(first_words)
+    return stems_of(first_words) - BODY
 
 
 @cache

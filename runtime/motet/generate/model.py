@@ -237,8 +237,6 @@ class CodesModel(GenerateModel):
         self._words += [(), *(command.words for command in self._commands.acts)]
         self._rare = {word: math.log((1 + len(entries)) / count) for word, count in actions_with.items()}
         self._verbs = verbs_of(actions_with) | self._commands.verbs
-        if self.contract.skeleton == HUMANOID:
-            self._verbs |= keyed_verbs()
 
     def _stems(self, action: int) -> frozenset[str]:
         """The stems of the words that describe an action."""
@@ -293,13 +291,19 @@ class CodesModel(GenerateModel):
         self.vocabulary.encode(sentence)
         shown_in_turn = []
         for whole in sentences_of(sentence):
-            parts = parts_of(whole, self._verbs)
+            parts = self._parts_of(whole)
             quantities = self.quantities(whole)
             if len(parts) > 1 and not self._shown_at_once(quantities, parts):
                 shown_in_turn += parts
             else:
                 shown_in_turn.append(whole)
         return shown_in_turn if len(shown_in_turn) > 1 else [sentence]
+
+    def _parts_of(self, sentence: str) -> list[str]:
+        """The parts of a sentence before verbs of recorded actions and commands, or, if one of them is then an act by
+        key poses, before the verbs of these, too."""
+        with_keyed = parts_of(sentence, self._verbs | keyed_verbs())
+        return with_keyed if any(map(self._keyed, with_keyed)) else parts_of(sentence, self._verbs)
 
     def _shown_at_once(self, quantities: Quantities, parts: Sequence[str]) -> bool:
         """Whether the likeliest action of a sentence shows all its parts, and no part has numbers of its own."""

@@ -12,7 +12,7 @@ THEN = re.compile(
     r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*", re.IGNORECASE
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
-OPENING = re.compile(r"((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
+OPENING = re.compile(r"^((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
 """Words that may stand before the verb of a part: its subject, or an adverb."""
 
 # fmt: off

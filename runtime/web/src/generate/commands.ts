@@ -24,7 +24,7 @@ export class Commands {
   readonly first: number;
   /** The number of the act of each command, whether it is shown for another one, and the verbs that they begin with. */
   private readonly numbers = new Map<string, { number: number; instead: boolean }>();
-  private readonly verbs = new Set<string>();
+  readonly verbs = new Set<string>();
 
   /** split: the words of a text. actions: how many known ones there are; the number after them stands for none. */
   constructor(

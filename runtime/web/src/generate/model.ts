@@ -126,7 +126,8 @@ export class GenerateModel extends LanguageModel {
     super(manifest);
     const split = (text: string) => this.vocabulary.split(text);
     this.commands = new Commands(manifest.commands ?? [], split, manifest.actions?.length ?? 0);
-    this.verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
+    const verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
+    this.verbs = new Set([...verbs, ...this.commands.verbs]);
   }
 
   /** Motions for a text; of one that asks for several things in a row each is a `Story`. */
