@@ -101,4 +101,23 @@ def test_what_is_understood_says_the_act(model: motet.CodesModel) -> None:
     assert understood.nearest == ("salute",)
     assert model.likeliest("a person salutes").lacking == ()
     model.check("a person salutes")
-    assert len(model.generate("salute", seconds=6.0)[0].frames) == pytest.approx(180, abs=4)
+
+
+@pytest.mark.parametrize("seconds", [0.1, 0.5, 1.5, 6.0])
+def test_it_lasts_as_long_as_it_is_to(model: motet.CodesModel, seconds: float) -> None:
+    assert len(model.generate("salute", seconds=seconds)[0].frames) == round(30 * seconds)
+    assert len(model.story(["salute", "nod three times"], seconds=seconds).frames) == round(60 * seconds)
+
+
+def test_a_hurried_act_is_done_to_its_end(model: motet.CodesModel) -> None:
+    usual = model.generate("salute")[0]
+    seconds = 0.7 * len(usual.frames) / 30
+    hurried = model.generate("salute", seconds=seconds)[0]
+    hand = HUMANOID.index("rightHand")
+    ends = [global_transforms(generated.motion)[1][-1, hand, 1] for generated in (usual, hurried)]
+    assert ends[1] == pytest.approx(ends[0], abs=0.1)
+    assert max(ends) < 1.1
+
+
+def test_no_act_lasts_longer_than_it_may(model: motet.CodesModel) -> None:
+    assert len(model.generate("salute", max_seconds=1.0)[0].frames) == 30

@@ -1,6 +1,7 @@
 """``motet key``: clips of acts by key poses."""
 
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 
 import click
@@ -52,7 +53,8 @@ def key(
 
 def _chosen(acts: Mapping[str, KeyedAct], names: tuple[str, ...]) -> Mapping[str, KeyedAct]:
     if unknown := [name for name in names if name not in acts]:
-        raise click.UsageError(f"there is no act {unknown[0]!r}, only {', '.join(acts)}")
+        near = get_close_matches(unknown[0], acts, 3, cutoff=0.0)
+        raise click.UsageError(f"there is no act {unknown[0]!r}; the nearest of {len(acts)} are {', '.join(near)}")
     return {name: acts[name] for name in names or acts}
 
 

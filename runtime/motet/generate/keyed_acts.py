@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from motet.decode.loop import Noise
 from motet.keyed import KeyedAct, ours
+from motet.keyed.acts import FPS
 from motet.keyed.keys import mirrored_keys
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -17,40 +17,38 @@ from motet.text.clauses import FUNCTION_WORDS, stem
 STANDING = "a person stands still"
 """The sentence of what they are laid over."""
 
-IDLE = frozenset(map(stem, (*FUNCTION_WORDS, "does", "do", "makes", "gives", "human", "subject", "somebody", "please")))
+IDLE = frozenset(map(stem, (*FUNCTION_WORDS, "does", "makes", "gives", "human", "subject", "please")))
 """Stems of words that name no act."""
 
-BODY = frozenset(
-    map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "chest", "shoulder", "leg", "knee", "foot"))
-)
+BODY = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
 """Stems of words that orders may begin with, and that are no verbs: "hands on hips"."""
+
+MOST_HURRIED = 2.0
+"""How many times as fast an act is played at most."""
 
 SIDES = frozenset(("left", "right"))
 
 
 @dataclass(frozen=True)
 class NamedAct:
-    """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act."""
+    """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act. is_counted:
+    whether the sentence says how often."""
 
     act: KeyedAct
     sentence: str
-
-    @property
-    def stems(self) -> frozenset[str]:
-        """The stems of the words of its sentence that name an act."""
-        return stems_of(self.sentence.split())
+    is_counted: bool = False
 
     @property
     def is_small(self) -> bool:
         """Whether only head, trunk and shoulders move: codes of recordings lose movements as small."""
-        parts = set[str]()
-        for key in self.act.keys:
-            parts |= key.numbers.keys() | key.hands.keys()
-        return parts <= {"head", "chest", "shoulders"}
+        small = {"head", "chest", "shoulders"}
+        return all(key.numbers.keys() <= small and not key.hands for key in self.act.keys)
 
-    def seconds(self, seed: int) -> float:
-        """How long it lasts."""
-        return self.act.seconds(seed)
+    def within(self, seconds: float, seed: int) -> "NamedAct":
+        """The act played up to twice as fast, if it lasts longer than some seconds."""
+        faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / FPS, 1 / FPS), 1, MOST_HURRIED)
+        slowest, fastest = faster * np.array(self.act.speed)
+        return replace(self, act=replace(self.act, speed=(slowest, fastest)))
 
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
         """Frames (T, D) of a figure that stands, in the contract's channels, that do the act."""
@@ -60,11 +58,6 @@ class NamedAct:
         # what the act changes is added: the frames of a motion are not quite those that it was made of
         shown[: len(acted)] += contract.frames(acted) - contract.frames(base)[: len(acted)]
         return shown
-
-
-def seed_of(noise: Noise) -> int:
-    """The seed of an act that is drawn next."""
-    return int(noise.random((1,), np.float32)[0] * (1 << 24))
 
 
 def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:
@@ -77,10 +70,13 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
     # the sentence that says the most of it
     _, name, sentence = max(matches)
     act = ours()[name]
-    act = _on_side(act, stems & SIDES - stems_of(sentence.split()))
+    # acts of either hand are written for the right one
+    sides = stems & SIDES - stems_of(sentence.split())
+    if act.mirrored and len(sides) == 1:
+        act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
     if times is not None and act.repeat is not None:
-        act = replace(act, repeat=replace(act.repeat, times=(round(times), round(times))))
-    return NamedAct(act, sentence)
+        act = replace(act, repeat=replace(act.repeat, times=(int(times),) * 2))
+    return NamedAct(act, sentence, times is not None)
 
 
 def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozenset[str]]]:
@@ -88,8 +84,7 @@ def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozens
     their stems."""
     for name, sentences in _sentences().items():
         sides = stems & SIDES if ours()[name].mirrored else frozenset()
-        known = frozenset[str]().union(*sentences.values())
-        if not stems - sides <= known:
+        if not stems - sides <= frozenset[str]().union(*sentences.values()):
             continue
         for sentence, of_sentence in sentences.items():
             if of_sentence and of_sentence <= stems:
@@ -117,11 +112,3 @@ def _sentences() -> Mapping[str, Mapping[str, frozenset[str]]]:
     for name, act in ours().items():
         table[name] = {sentence: stems_of(sentence.split()) for sentence in act.says}
     return table
-
-
-def _on_side(act: KeyedAct, sides: frozenset[str]) -> KeyedAct:
-    """An act of either hand with the hand of a side; acts are written for the right one."""
-    if not act.mirrored or len(sides) != 1:
-        return act
-    keys = mirrored_keys(act.keys) if "left" in sides else act.keys
-    return replace(act, keys=keys, mirrored=False)

@@ -29,7 +29,7 @@ from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecode
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
-from motet.generate.keyed_acts import STANDING, NamedAct, act_named
+from motet.generate.keyed_acts import STANDING, NamedAct, act_named, stems_of
 from motet.generate.keyed_acts import verbs as keyed_verbs
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
@@ -262,8 +262,8 @@ class CodesModel(GenerateModel):
             return None
         if not all(map(self.vocabulary.meant, words)) or self.lacking(sentence):
             return act
-        recorded = frozenset(map(stem, self._likeliest_recorded(sentence).split()))
-        return None if act.stems <= recorded else act
+        recorded = self._sentences[int(self._context(sentence).argmax())]
+        return None if stems_of(act.sentence.split()) <= stems_of(recorded.split()) else act
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
@@ -278,10 +278,6 @@ class CodesModel(GenerateModel):
         if named and not named.act.repeat and self._commands.act(quantities.text) is not None:
             return None
         return named
-
-    def _likeliest_recorded(self, sentence: str) -> str:
-        """The sentence of the recorded action that a sentence most likely is."""
-        return self._sentences[int(self._context(sentence).argmax())]
 
     def parts(self, sentence: str) -> list[str]:
         """The things that a text requests one after another: its sentences, and the parts of a sentence

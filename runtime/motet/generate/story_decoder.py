@@ -12,7 +12,7 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
-from motet.generate.keyed_acts import NamedAct, seed_of
+from motet.generate.keyed_acts import NamedAct
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -163,7 +163,8 @@ class Teller:
             for piece in self._pieces_of(run, context):
                 yield piece
                 tail = [np.concatenate([*tail, piece.frames])[-self._kept :]] if run is not runs[-1] else []
-            if tail:
+            # less than a step is too little to be continued
+            if tail and len(tail[0]) >= self.codec.field.hop:
                 frames = tail[0][len(tail[0]) % self.codec.field.hop :]
                 context = Context(frames, self.codec.codes_of(frames))
 
@@ -222,7 +223,7 @@ class Teller:
         """A request whose length comes first, stretch by stretch: each has its share of the turn and of the length."""
         actions = self._action(request)
         steps = self.codec.steps(request.seconds * request.pace)
-        drawn = drawn_steps(self._writer(context), actions, steps, exactly=True, whole=True)
+        drawn = drawn_steps(self._writer(context), actions, steps, exactly=True)
         decoder = OnDemand(StreamingDecoder(self.codec, context), drawn, steps, self._no_frames)
         length = max(1, round(request.seconds * self.contract.fps))
         edges = np.linspace(0, length, math.ceil(request.seconds / STRETCH) + 1).round().astype(int).tolist()
@@ -245,16 +246,28 @@ class Teller:
 
     def _keyed(self, number: int, request: Request, act: NamedAct, context: Context | None) -> Iterator[Piece]:
         """An act by key poses, over a figure that stands as long."""
-        seed = seed_of(self.noise[0])
-        actions = self._action(request)
-        count = round(max(act.seconds(seed), request.seconds) * self.contract.fps) + 1
-        steps = self.codec.steps(count / self.contract.fps)
-        drawn = drawn_steps(self._writer(context), actions, steps, exactly=True, whole=True)
-        codes = np.concatenate([step for _, step in drawn])
+        seed = int(self.noise[0].random((1,), np.float32)[0] * 1e7)
+        if request.seconds:
+            act = act.within(request.seconds, seed)
+        # as many steps as the act has, or more; what lasts longer than it may is begun, and cut off
+        seconds = act.act.seconds(seed)
+        limit = seconds if act.is_counted else min(seconds, self.settings["max_seconds"])
+        last = max(1, round((request.seconds or limit) * self.contract.fps))
+        steps = self.codec.steps(max(seconds, request.seconds)) + 1
+        action = self._action(request)
+        frames = self._decoded(self._drawn(action, steps, context), context)
+        shown = act.laid_over(frames, self.contract, seed)[:last]
+        yield Piece(number, int(action[0]), shown, len(shown))
+
+    def _drawn(self, action: Ids, steps: int, context: Context | None) -> Ids:
+        """As many steps of an action (N, P)."""
+        drawn = drawn_steps(self._writer(context), action, steps, exactly=True)
+        return np.concatenate([step for _, step in drawn])
+
+    def _decoded(self, codes: Ids, context: Context | None) -> Array:
+        """All frames of codes."""
         decoder = StreamingDecoder(self.codec, context)
-        frames = np.concatenate([decoder.push(codes), decoder.finish()])[:count]
-        shown = act.laid_over(frames, self.contract, seed)
-        yield Piece(number, int(actions[0]), shown, len(shown))
+        return np.concatenate([decoder.push(codes), decoder.finish()])
 
     @property
     def _no_frames(self) -> Array:
@@ -274,8 +287,7 @@ class Teller:
             if not over and (rounds < least_rounds or len(codes) < 1.2 * steps_measured):
                 continue
             steps_measured = len(codes)
-            decoder = StreamingDecoder(self.codec, context)
-            frames = np.concatenate([decoder.push(codes), decoder.finish()])
+            frames = self._decoded(codes, context)
             # It ends with what is requested, or where as many draws have never shown the act.
             seen = Seen.of(self.contract, frames)
             in_vain = (

@@ -11,7 +11,7 @@ from motet.errors import MotionError
 from motet.figures.feet.contacts import rise
 from motet.figures.humanoid import ARM, BONES, HUMANOID, LEFT_RIGHT, LEG, NECK, SPINE, limb_of, sided
 from motet.keyed.draw import Drawn, HandPose, HandTrack
-from motet.keyed.parts import FLOOR, OTHER_HAND, PLACES, TOUCHES, Place
+from motet.keyed.parts import FLOOR, OTHER_HAND, PLACES, SIDE_OF_HAND, TOUCHES, Place
 from motet.keyed.trunk import Figure
 from motet.motion.rotations import (
     Array,
@@ -27,9 +27,6 @@ from motet.motion.rotations import (
 )
 
 TRUNK = ("hips", *SPINE)
-
-SIDES = {"left_hand": ("left", 1.0), "right_hand": ("right", -1.0)}
-"""Hand -> the name of its side, and the sign of x there."""
 
 UPPER_ARM = float(np.linalg.norm(HUMANOID.offsets[HUMANOID.index("leftLowerArm")]))
 FOREARM = float(np.linalg.norm(HUMANOID.offsets[HUMANOID.index("leftHand")]))
@@ -63,7 +60,8 @@ def with_hands(figure: Figure, act: Drawn, name: str) -> Figure:
     # a hand that goes to the other one comes after it
     order = sorted(act.hands, key=lambda hand: any(pose.place == OTHER_HAND for pose in act.hands[hand].poses))
     for hand in order:
-        side, sign = SIDES[hand]
+        side = hand.removesuffix("_hand")
+        sign = SIDE_OF_HAND[hand]
         figure = _with_shoulder(figure, act.hands[hand], side, sign)
         figure = _with_hand(figure, act.hands[hand], side, sign, f"{name}, {hand}")
     return figure

@@ -77,15 +77,15 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
 
 
 class Place(NamedTuple):
-    """A place on the body: a bone, "" at its end for that of the hand's side, and where it is in the bone's frame, in
-    metres, of the left side."""
+    """A place on the body: a bone, without its side if it is one of two, and where the place of the left side is in the
+    bone's frame, in metres."""
 
     bone: str
     x: float
     y: float
     z: float
     sided: bool = False
-    """Whether the bone is one of two."""
+    """Whether the bone is one of two, that of the hand's side."""
 
 
 PLACES: Mapping[str, Place] = {
