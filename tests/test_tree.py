@@ -261,6 +261,21 @@ def test_code_is_plain() -> None:
     assert len(nested) <= MOST_NESTED_COMPREHENSIONS, nested
 
 
+SHARED_NAMES = frozenset({"DEFAULT", "PAPER", "RECIPES", "LOOPS", "_PLACES"})
+"""What each recipe, loop or package calls what a registry or :mod:`motet.lazy` reads of it."""
+
+
+def test_a_constant_has_its_name_alone() -> None:
+    """A name that stands for several values says too little."""
+    modules = dict[str, list[str]]()
+    for module, tree in TREES.items():
+        for statement in tree.body:
+            target = statement.targets[0] if isinstance(statement, ast.Assign) else getattr(statement, "target", None)
+            if isinstance(target, ast.Name) and target.id.isupper() and len(target.id) > 1:
+                modules.setdefault(target.id, []).append(module)
+    assert {name: places for name, places in modules.items() if len(places) > 1 and name not in SHARED_NAMES} == {}
+
+
 def test_imports_are_found() -> None:
     """What the other tests stand on."""
     assert "motet.errors" in imports("motet.files")

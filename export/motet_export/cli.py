@@ -13,7 +13,7 @@ from motet.files import new_folder
 from motet.models.load import KINDS
 from motet_export.bundles import export_run, halve_bundle, parity_of, renew_golden
 from motet_export.restored import restored
-from motet_train.runs import MANIFEST, Run
+from motet_train.runs import RUN_MANIFEST, Run
 
 
 @click.command()
@@ -59,11 +59,11 @@ def _rewrite(bundle: Bundle, out: Path, back: bool, golden: bool, commands: Path
 def _runs(folder: Path, out: Path) -> dict[Path, Run]:
     """The runs to export, by the path of the bundle: a single run, or those in the subfolders that are models."""
     runs = {}
-    for manifest in sorted(folder.glob(f"*/{MANIFEST}")):
+    for manifest in sorted(folder.glob(f"*/{RUN_MANIFEST}")):
         run = Run.load(manifest.parent)
         if run.manifest["verb"] in KINDS:
             runs[out / f"{manifest.parent.name}.zip"] = run
-    if (folder / MANIFEST).is_file() or not runs:
+    if (folder / RUN_MANIFEST).is_file() or not runs:
         return {out: Run.load(folder)}
     out.mkdir(parents=True, exist_ok=True)
     return runs

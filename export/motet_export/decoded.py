@@ -27,7 +27,7 @@ from motet.predict.model import PredictModel
 from motet.search.model import SearchModel
 from motet.steering.model import SteerModel
 from motet.text.vocabulary import MAX_WORDS, SPECIALS
-from motet_export.parity import FRAMES, Examples, nudged, sides, walks
+from motet_export.parity import FRAME_INPUTS, Examples, nudged, sides, walks
 
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], Decoded]]
@@ -83,7 +83,7 @@ def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[b
     feeds = {}
     # inputs of single calls, and of a whole run
     for role, graph in model.graphs.items():
-        framed = any(graph.spec.takes(name) for name in FRAMES)
+        framed = any(graph.spec.takes(name) for name in FRAME_INPUTS)
         feeds[role] = draws[role](rng, GOLDEN_ROWS if framed else FEW_ROWS)
     inputs, settings = golden_run(model, rng)
     frames = walks(model.contract, rng, 1, 12)[0].astype(np.float64)

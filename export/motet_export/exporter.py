@@ -17,7 +17,7 @@ from motet.bundle.graph import Floats, GraphSpec
 from motet.bundle.graph_safety import check_graph
 from motet.errors import BundleError, MotetError
 
-LEAST = 256
+SMALLEST_QUANTISED = 256
 """Smallest number of elements of a tensor that is stored in fewer bits."""
 
 Small = tuple[NDArray[Any], Floats | None]
@@ -126,7 +126,7 @@ def _strip(graph: onnx.GraphProto) -> None:
 def round_weights(net: nn.Module) -> None:
     """Round a net's weights to half precision, so that its graphs can be stored in 16 bits without loss."""
     for parameter in net.parameters():
-        if parameter.numel() >= LEAST:
+        if parameter.numel() >= SMALLEST_QUANTISED:
             parameter.copy_(parameter.half().float())
 
 
@@ -171,7 +171,7 @@ def _stored(model: bytes, smaller: Callable[[Floats], Small | None], **label: st
     nodes = []
     # the new nodes come first: a graph's nodes are sorted by dependence
     for tensor in list(proto.graph.initializer):
-        if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < LEAST:
+        if tensor.data_type != TensorProto.FLOAT or np.prod(tensor.dims) < SMALLEST_QUANTISED:
             continue
         stored = smaller(numpy_helper.to_array(tensor))
         if stored is not None:

@@ -32,26 +32,26 @@ from motet.representation.contract import MotionContract
 from motet.representation.placed import placed_by_way
 from motet_export.exporter import ExportError
 
-CARRIED = 1e-4
+CARRIED_TOLERANCE = 1e-4
 """Bound on the error after many carried steps or a whole run."""
 
-STEPS = 200
+CARRIED_STEPS = 200
 """Steps whose state is carried."""
 
 FAR_SHARE = 0.01
 """Of the numbers in frames that are drawn: those that are far from all data."""
 
-FAR = (10.0, 1000.0)
+FAR_DEVIATIONS = (10.0, 1000.0)
 """Standard deviations from the mean, between which these lie: nets clip at 50."""
 
-FRAMES = ("frames", "frame", "history")
+FRAME_INPUTS = ("frames", "frame", "history")
 """Inputs that are frames, or codes of frames: they are drawn like the training data's."""
 
 RANGED = ("noise", "variety", "temperature", "past", "plain", "after")
 """Inputs that zeros, ones or negatives are no numbers for: noise in [0, 1), variety in [0, 1], temperatures above 0;
 and frames beside a gap, with rotations by two columns, which must not be parallel."""
 
-MEANING = ("verb", "model", "loop", "motion", "text", "vocabulary", "common", "control", "defaults", "config")
+MEANING_FIELDS = ("verb", "model", "loop", "motion", "text", "vocabulary", "common", "control", "defaults", "config")
 """What a manifest says of a model's numbers."""
 
 Examples = Callable[[np.random.Generator, int], Arrays]
@@ -73,7 +73,7 @@ def check_meaning(onnx: BundleModel, torch: BundleModel) -> None:
     """Rung 0: the bundle says of its numbers what the run says; ExportError names what differs."""
     # as JSON, in which a tuple is a list
     declared, trained = (json.loads(json.dumps(model.manifest.source)) for model in (onnx, torch))
-    for part in MEANING:
+    for part in MEANING_FIELDS:
         if declared.get(part) != trained.get(part):
             raise ExportError(f"parity: the bundle's {_difference(part, declared, trained)} is not the run's")
     for kind in onnx.SETTINGS:
@@ -135,10 +135,10 @@ def check_carried(
     rng = np.random.default_rng(2)
     largest = 0.0
     rounding = 0.0
-    for n in range(STEPS):
+    for n in range(CARRIED_STEPS):
         if n % (horizon or 1) == 0:
             inputs = draw(rng, batch)
-        if n % (horizon or STEPS) == 0:
+        if n % (horizon or CARRIED_STEPS) == 0:
             states = [_states(inputs, torch.spec)] * 3
 
         # three runs: ONNX Runtime's, torch's, and torch's with other last bits
@@ -151,8 +151,10 @@ def check_carried(
         rounding = max(rounding, error(moved, expected))
 
     # a net that amplifies rounding is held to ten times its own; one that does so more cannot be compared
-    bound = min(max(CARRIED, 10 * rounding), 1e-2)
-    return _bounded("step.carried", largest, bound, rounding=rounding, steps=STEPS, horizon=horizon, batch=batch)
+    bound = min(max(CARRIED_TOLERANCE, 10 * rounding), 1e-2)
+    return _bounded(
+        "step.carried", largest, bound, rounding=rounding, steps=CARRIED_STEPS, horizon=horizon, batch=batch
+    )
 
 
 def _states(inputs: Arrays, spec: GraphSpec) -> dict[str, NDArray[Any]]:
@@ -175,7 +177,7 @@ def nudged(state: Arrays, rng: np.random.Generator, of_zero: float = 0.0) -> dic
 def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:
     """Rung 4: whole decoded runs with the same seeds; each callable gives what ONNX and what torch decoded."""
     errors = {name: error(*run()) for name, run in runs.items()}
-    return _bounded("runs", max(errors.values()), CARRIED, **errors)
+    return _bounded("runs", max(errors.values()), CARRIED_TOLERANCE, **errors)
 
 
 def _bounded(name: str, largest: float, bound: float, **details: Any) -> dict[str, Any]:
@@ -213,7 +215,7 @@ class _Inputs:
         for name, value in inputs.items():
             if name == "history":
                 inputs[name] = self._history(value.shape, rng)
-            elif name in FRAMES:
+            elif name in FRAME_INPUTS:
                 inputs[name] = self._frames(value.shape, rng)
             if self.far and value.dtype == np.float32 and name not in RANGED:
                 inputs[name] = extremes(inputs[name])
@@ -287,13 +289,14 @@ def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames:
 
 
 def strained(frames: NDArray[np.float32], contract: MotionContract, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Frames (..., C) of which single numbers, but one at least, are at ``FAR`` standard deviations from the mean."""
+    """Frames (..., C) of which single numbers, but one at least, are at ``FAR_DEVIATIONS`` standard deviations from the
+    mean."""
     # which numbers, at least one of them
     far = rng.random(frames.shape) < FAR_SHARE
     far.flat[rng.integers(far.size)] = True
 
     # to either side, and as often near as very far
-    low, high = np.log10(FAR)
+    low, high = np.log10(FAR_DEVIATIONS)
     off = 10 ** rng.uniform(low, high, frames.shape) * rng.choice([-1.0, 1.0], frames.shape)
     std = np.where(contract.std > 0, contract.std, 1.0)
     return np.where(far, contract.mean + std * off, frames).astype(np.float32)

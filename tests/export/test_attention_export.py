@@ -19,7 +19,7 @@ from motet.decode.beam import score_words
 from motet.errors import BundleError
 from motet.models.describe import DescribeModel
 from motet.models.load import load, verify
-from motet.text.vocabulary import RULES, SPECIALS
+from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
 from motet_train.runs import Run
@@ -59,7 +59,7 @@ def run() -> Run:
         "model": "motion-to-language",
         "loop": "beam",
         "motion": MOTION,
-        "text": RULES.to_json(),
+        "text": NEW_MODEL_RULES.to_json(),
         "vocabulary": WORDS,
         "config": asdict(config),
         "defaults": {"beams": 5, "max_words": 8, "draws": 30, "temperature": 1.0},

@@ -20,14 +20,14 @@ from motet.motion.kinematics import positions
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
-from motet.text.vocabulary import RULES, SPECIALS
+from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.parity import example, walks
 from motet_train.models.action_net import ActionsConfig, stems_of
 from motet_train.models.codec import CodecConfig
 from motet_train.models.kinematics import tree_of
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
-from motet_train.recipes.codes import DRAWING
+from motet_train.recipes.codes import DRAWING_SETTINGS
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
@@ -61,8 +61,14 @@ def run() -> Run:
     named = {"name": "small-codes", "verb": "generate", "model": "motion-codes", "loop": "codes"}
     actions = [{"sentence": said, "words": said.split()} for said in SAID]
     plain = json.loads(json.dumps(asdict(net.config)))
-    known = {"text": RULES.to_json(), "vocabulary": WORDS, "common": COMMON, "actions": actions, "config": plain}
-    settings = {"defaults": {**DRAWING, "memory": 0.3}, "licence": {}, "training": {}}
+    known = {
+        "text": NEW_MODEL_RULES.to_json(),
+        "vocabulary": WORDS,
+        "common": COMMON,
+        "actions": actions,
+        "config": plain,
+    }
+    settings = {"defaults": {**DRAWING_SETTINGS, "memory": 0.3}, "licence": {}, "training": {}}
     return Run({**named, **known, **settings, "motion": CONTRACT.to_json()}, net.eval())
 
 

@@ -12,7 +12,7 @@ from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
 from motet.decode.beam import Limits, beam_search
 from motet.models.describe import DescribeModel
 from motet.models.load import load, verify
-from motet.text.vocabulary import EOS, PAD, RULES, SOS, SPECIALS, UNK
+from motet.text.vocabulary import EOS, NEW_MODEL_RULES, PAD, SOS, SPECIALS, UNK
 from motet_export.bundles import export_run
 from motet_export.exporter import export_graph
 from motet_export.parity import check_carried
@@ -141,7 +141,7 @@ def test_a_bundle_of_it_works_and_is_described_alone_as_in_a_batch(
     net: Transformer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     named = {"name": "small", "verb": "describe", "model": "transformer", "loop": "beam", "motion": MOTION}
-    words = {"text": RULES.to_json(), "vocabulary": WORDS, "defaults": {"beams": 3, "max_words": 6}}
+    words = {"text": NEW_MODEL_RULES.to_json(), "vocabulary": WORDS, "defaults": {"beams": 3, "max_words": 6}}
     export_run(Run({**named, **words, "config": {}, "licence": {"weights": None}}, net), tmp_path / "x.zip")
     model = load(tmp_path / "x.zip")
     assert isinstance(model, DescribeModel)

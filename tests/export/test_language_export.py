@@ -14,7 +14,7 @@ from motet.generate.base import GenerateModel
 from motet.models.describe import DescribeModel
 from motet.models.load import load, verify
 from motet.representation.contract import Z_LIMIT
-from motet.text.vocabulary import RULES, SPECIALS
+from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_export.parity import example
@@ -59,7 +59,7 @@ def run(verb: str) -> Run:
     return Run(
         {
             **manifest,
-            "text": RULES.to_json(),
+            "text": NEW_MODEL_RULES.to_json(),
             "vocabulary": WORDS,
             "config": config,
             "defaults": defaults,

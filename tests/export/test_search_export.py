@@ -13,7 +13,7 @@ from motet.models.load import load, verify
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet.search.model import SearchModel
-from motet.text.vocabulary import RULES, SPECIALS
+from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.parity import example, walks
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
@@ -40,7 +40,12 @@ def run() -> Run:
     frames = torch.from_numpy(walks(CONTRACT, np.random.default_rng(0), 50, 20))
     net.see_by(net.statistics(frames, torch.full((50,), 20)))
     named = {"name": "small-search", "verb": "search", "model": "joint-embedding", "loop": "nearest"}
-    known = {"text": RULES.to_json(), "vocabulary": WORDS, "config": asdict(net.config), "defaults": {"count": 5}}
+    known = {
+        "text": NEW_MODEL_RULES.to_json(),
+        "vocabulary": WORDS,
+        "config": asdict(net.config),
+        "defaults": {"count": 5},
+    }
     return Run({**named, **known, "motion": CONTRACT.to_json(), "licence": {}, "training": {}}, net)
 
 

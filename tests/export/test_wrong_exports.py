@@ -15,7 +15,7 @@ from onnx import numpy_helper
 from motet.bundle.bundle import Bundle, write_bundle
 from motet.errors import BundleError
 from motet.models.load import verify
-from motet.text.vocabulary import RULES, SPECIALS
+from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
@@ -61,7 +61,7 @@ def run(verb: str) -> Run:
             parameter.mul_(2.0)  # as far from linear as a trained net
     net.measure_by(np.array(MOTION["mean"]), np.array(MOTION["std"]))
     manifest = {"name": f"small-{verb}", "verb": verb, "model": model, "loop": loop, "motion": MOTION}
-    known = {"text": RULES.to_json(), "vocabulary": WORDS, "config": asdict(net.config), "defaults": defaults}
+    known = {"text": NEW_MODEL_RULES.to_json(), "vocabulary": WORDS, "config": asdict(net.config), "defaults": defaults}
     return Run({**manifest, **known, "licence": {}, "training": {}}, net.eval())
 
 

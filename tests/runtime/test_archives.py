@@ -91,7 +91,7 @@ def test_a_zip_in_a_zip_is_not_opened(tmp_path: Path) -> None:
 
 
 def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
-    packed = zipped(tmp_path / "bomb.zip", ("a.bvh", b"\0" * (archives.SMALL + 1)))
+    packed = zipped(tmp_path / "bomb.zip", ("a.bvh", b"\0" * (archives.SMALL_FILE + 1)))
     with pytest.raises(motet.FormatError, match=r"a\.bvh: cannot be unpacked: it has more than 16777216 bytes"):
         Source(packed / "a.bvh").read()
     with ZipFiles(packed) as files, pytest.raises(motet.FormatError):
@@ -100,7 +100,7 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
 
 
 def test_what_a_zip_announces_is_not_trusted(tmp_path: Path) -> None:
-    packed = zipped(tmp_path / "bomb.zip", ("a.bvh", b"\0" * (archives.SMALL + 1)))
+    packed = zipped(tmp_path / "bomb.zip", ("a.bvh", b"\0" * (archives.SMALL_FILE + 1)))
     content = bytearray(packed.read_bytes())
     entry = content.index(b"PK\x01\x02")
     struct.pack_into("<L", content, entry + 24, 1000)  # of its unpacked size

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fake_models import CHANNELS, CONTRACT, VOCABULARY, FakeGraph, describe_model, moving
 
-from motet.bench.cases import WORDS, cases
+from motet.bench.cases import CASE_WORDS, cases
 from motet.errors import BundleError, DecodingError, MotionError, TextError, TextWarning
 from motet.formats import write_motion
 from motet.models.describe import DescribeModel, Description
@@ -232,7 +232,7 @@ def test_the_benchmark_measures_sentences_of_one_length(tmp_path: Path) -> None:
     assert [case.count for case in found] == [32, 128, 1, 1, 1, 1, 1]
     step = model.graphs["step"]
     assert isinstance(step, FakeGraph)
-    for case, calls in zip(found, [WORDS + 1] * 4 + [0, 1], strict=False):
+    for case, calls in zip(found, [CASE_WORDS + 1] * 4 + [0, 1], strict=False):
         step.calls = 0
         case.call()
         assert step.calls == calls, case.name

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from test_odd_figures import ON_THE_FLOOR, posed
 
-from motet.figures.floor import LIMBS, THICKNESS, TOLERATED, above_floor
+from motet.figures.floor import LIMB_ENDS, THICKNESS, TOLERATED, above_floor
 from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.kinematics import global_transforms, positions
 from motet.motion.motion import Motion
 
 PARENTS = np.array([joint.parent for joint in HUMANOID.joints])[1:]
-TRUNK = [i for i, name in enumerate(HUMANOID.names) if not name.endswith(LIMBS)]
+TRUNK = [i for i, name in enumerate(HUMANOID.names) if not name.endswith(LIMB_ENDS)]
 
 
 def sunk(motion: Motion, depth: float) -> Motion:

@@ -220,7 +220,7 @@ def test_a_process_that_breaks_down_is_a_broken_file(
 ) -> None:
     pytest.importorskip("ufbx")
     (tmp_path / "program.py").write_text(program)
-    monkeypatch.setattr(fbx, "PROGRAM", tmp_path / "program.py")
+    monkeypatch.setattr(fbx, "FBX_PROGRAM", tmp_path / "program.py")
     monkeypatch.setattr(fbx, "FBX_SECONDS", 0.2 if "sleep" in program else 60)
     with pytest.raises(FormatError, match=said):
         load(b"")
@@ -288,7 +288,7 @@ def load_memory(content, **settings):
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are Linux's")
 def test_the_memory_of_the_process_is_bounded_by_the_size_of_the_file(tmp_path: Path) -> None:
     (tmp_path / "ufbx.py").write_text(UFBX)
-    command = [sys.executable, "-P", str(fbx.PROGRAM), "0"]
+    command = [sys.executable, "-P", str(fbx.FBX_PROGRAM), "0"]
     environment = {"PYTHONPATH": str(tmp_path)}
     done = subprocess.run(command, input=bytes(1000), env=environment, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (1, b"MemoryError")

@@ -7,7 +7,7 @@ import pytest
 from fake_models import CONTRACT, generate_model, moving
 from figures import walker
 
-from motet.bench.cases import SECONDS, cases
+from motet.bench.cases import CASE_SECONDS, cases
 from motet.errors import DecodingError, MotionError, TextError, TextWarning
 from motet.formats import read_motion
 from motet.generate.base import Generated, GenerateModel
@@ -178,4 +178,4 @@ def test_the_benchmark_measures_motions_of_one_length(model: GenerateModel) -> N
     many, one = found["generate.motions"], found["generate.one"]
     made = [row[0].motion for row in [one.call(), *many.call()]]  # type: ignore[misc,index]
     assert len(made) == 1 + many.count
-    assert {(len(motion) - 1) / motion.fps for motion in made} == {SECONDS - 1 / model.fps}
+    assert {(len(motion) - 1) / motion.fps for motion in made} == {CASE_SECONDS - 1 / model.fps}

@@ -14,7 +14,7 @@ from motet.generate.commands import Commands
 from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
 from motet.motion.rotations import Array
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 
 pytestmark = pytest.mark.numeric
 
@@ -53,7 +53,7 @@ def turn(motion: Generated) -> float:
 
 
 def commands(*entries: dict[str, object]) -> Commands:
-    return Commands.of([Fields(entry) for entry in entries], RULES, 2)
+    return Commands.of([Fields(entry) for entry in entries], NEW_MODEL_RULES, 2)
 
 
 @pytest.mark.parametrize(

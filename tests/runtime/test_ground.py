@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from motet.generate.codec import REACH, moved, nearest_moves, seen_from, way_of
+from motet.generate.codec import RADIAN_METRES, moved, nearest_moves, seen_from, way_of
 from motet.motion.rotations import Array
 from motet.representation.root_block import way
 
@@ -51,7 +51,7 @@ def naive_nearest(path: Array, book: Array) -> tuple[list[int], list[list[float]
     entries, led = [], [list(path[0])]
     for wanted in path[1:]:
         ends = [naive_moved(np.array(led[-1]), move) for move in book]
-        off = [math.dist(end[:2], wanted[:2]) ** 2 + (REACH * (end[2] - wanted[2])) ** 2 for end in ends]
+        off = [math.dist(end[:2], wanted[:2]) ** 2 + (RADIAN_METRES * (end[2] - wanted[2])) ** 2 for end in ends]
         entries.append(off.index(min(off)))
         led.append(ends[entries[-1]])
     return entries, led
@@ -90,7 +90,7 @@ def test_errors_do_not_add_up(book: Array) -> None:
     assert off[:, -50:].max() < 1.5 * off[:, :50].max()
     # each move chosen for itself leads far astray
     wanted = seen_from(paths[:, :-1], paths[:, 1:])
-    apart = ((wanted[..., None, :] - book) * [1, 1, REACH]) ** 2
+    apart = ((wanted[..., None, :] - book) * [1, 1, RADIAN_METRES]) ** 2
     alone = way_of(paths[:, 0], book[apart.sum(axis=-1).argmin(axis=-1)])
     assert np.linalg.norm((alone - paths)[:, -1, :2], axis=-1).min() > 3 * off.max()
 

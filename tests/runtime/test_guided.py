@@ -34,7 +34,7 @@ def joint(pose: Pose, name: str) -> tuple[Array, Array]:
 def eyes(pose: Pose) -> tuple[Array, Array]:
     """Where they are and where they look, in the world."""
     turned, places = joint(pose, "head")
-    return places + quat_rotated(turned, np.array(looking.EYES)), quat_rotated(turned, np.array([0.0, 0, 1]))
+    return places + quat_rotated(turned, np.array(looking.EYES_OFFSET)), quat_rotated(turned, np.array([0.0, 0, 1]))
 
 
 def gaze(pose: Pose) -> Array:

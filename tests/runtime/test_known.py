@@ -8,7 +8,7 @@ from fake_models import CONTRACT, FakeGraph, describe_model, moving, spec
 
 from motet.errors import BundleError, DecodingError
 from motet.models.describe import DescribeModel
-from motet.models.nearest_neighbour import NOTHING, RIGHT, AnswerSettings, Known, Seen, path_of
+from motet.models.nearest_neighbour import GOES_RIGHT, NOTHING, AnswerSettings, Known, Seen, path_of
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 
@@ -71,7 +71,7 @@ def test_turns_are_measured_and_told() -> None:
 
 def test_between_straight_and_turned_the_other_side_is_not_told() -> None:
     ways = KNOWN.ways.copy()
-    ways[0, 0] = RIGHT
+    ways[0, 0] = GOES_RIGHT
     known = replace(KNOWN, ways=ways)
     texts = {}
     for turn in (-35.0, 35.0):

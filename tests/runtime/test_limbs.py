@@ -14,10 +14,10 @@ from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
 from motet.steering.sentence_acts import SaidActs
-from motet.steering.turn_limit import KINDS, TurnLimit, TurnSettings
+from motet.steering.turn_limit import BONES_OF_LIMIT, TurnLimit, TurnSettings
 
 DT = 1 / 30
-FAST = TurnSettings(**dict.fromkeys(KINDS, 5400.0))
+FAST = TurnSettings(**dict.fromkeys(BONES_OF_LIMIT, 5400.0))
 """Settings by which nothing is limited."""
 
 
@@ -100,7 +100,7 @@ def test_joints_go_to_where_they_jump_at_their_limits(characters: int) -> None:
         limit, pose = limit.update(pose, TurnSettings(), DT)
         shown.append(pose.rotations)
     steps = turned(np.stack(shown))
-    for kind, bones in KINDS.items():
+    for kind, bones in BONES_OF_LIMIT.items():
         most = getattr(TurnSettings(), kind) * DT
         for bone in bones:
             figures = steps[:, :, BONES.index(bone)]

@@ -165,7 +165,7 @@ def test_a_long_turn_is_streamed_stretch_by_stretch(model: CodesModel, monkeypat
 def test_what_is_played_slower_is_the_same_in_stretches(model: CodesModel, monkeypatch: pytest.MonkeyPatch) -> None:
     assert model.quantities("a person bows slowly").amounts == {"pace": 0.75}
     whole = model.story("a person bows slowly", seconds=12).frames
-    monkeypatch.setattr("motet.generate.story_decoder.STRETCH", 2.5)
+    monkeypatch.setattr("motet.generate.story_decoder.STRETCH_SECONDS", 2.5)
     frames = model.story("a person bows slowly", seconds=12).frames
     assert len(frames) == 12 * model.fps
     assert np.abs(frames[:, 3:] - whole[:, 3:]).max() < 0.05  # shown within a fraction of a frame of the same time

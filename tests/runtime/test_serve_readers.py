@@ -60,7 +60,7 @@ async def opened(count: int = 2, body_bytes: int = 1 << 20) -> AsyncIterator[Rea
 
 
 def program(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    monkeypatch.setattr(readers, "PROGRAM", ("-c", text))
+    monkeypatch.setattr(readers, "READER_PROGRAM", ("-c", text))
 
 
 def hanging(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Path:

@@ -9,11 +9,11 @@ from motet import SteerModel, SteerSession, load
 from motet.figures.humanoid import HUMANOID
 from motet.motion.rotations import Array, conjugate, quat_product
 from motet.motion.springs import damping_of
-from motet.steering.idle import TURNS, IdleSettings
+from motet.steering.idle import BREATH_TURNS, IdleSettings
 from motet.steering.pose import Pose
 
 IDLE = IdleSettings()
-TURNED = [bone for bone, by in TURNS.items() if by]
+TURNED = [bone for bone, by in BREATH_TURNS.items() if by]
 """Bones that a breath turns: spine, upper chest, neck and shoulders."""
 
 GOES, STANDS, GOES_ON = 45, 240, 120

@@ -8,9 +8,20 @@ import pytest
 
 from motet.errors import BundleError, TextError
 from motet.text.spelling import corrected, distance
-from motet.text.vocabulary import EOS, MAX_WORDS, PAD, RULES, SOS, SPECIALS, SPELLING, UNK, TextRules, Vocabulary
+from motet.text.vocabulary import (
+    EOS,
+    MAX_WORDS,
+    NEW_MODEL_RULES,
+    PAD,
+    SOS,
+    SPECIALS,
+    SPELLING,
+    UNK,
+    TextRules,
+    Vocabulary,
+)
 
-LENIENT = replace(RULES, spelling={})
+LENIENT = replace(NEW_MODEL_RULES, spelling={})
 
 SENTENCES = [
     "A person walks forward.",
@@ -40,20 +51,20 @@ SENTENCES = [
     ],
 )
 def test_normalise(sentence: str, normal: str) -> None:
-    assert RULES.normalise(sentence) == normal
-    assert RULES.normalise(normal) == normal
-    assert RULES.normalise(sentence.upper()) == normal
+    assert NEW_MODEL_RULES.normalise(sentence) == normal
+    assert NEW_MODEL_RULES.normalise(normal) == normal
+    assert NEW_MODEL_RULES.normalise(sentence.upper()) == normal
 
 
 def test_the_spelling_table_is_normal_and_settled() -> None:
     for wrong, right in SPELLING.items():
         assert LENIENT.normalise(wrong) == wrong
-        assert RULES.normalise(right) == LENIENT.normalise(right)
-    assert replace(RULES, spelling={"teh": "the"}).normalise("teh walk") == "the walk"
+        assert NEW_MODEL_RULES.normalise(right) == LENIENT.normalise(right)
+    assert replace(NEW_MODEL_RULES, spelling={"teh": "the"}).normalise("teh walk") == "the walk"
 
 
 def test_rules_travel_and_the_codes_own_do_not_change_what_a_vocabulary_reads() -> None:
-    plain = json.loads(json.dumps(replace(RULES, spelling={"klaw": "walk"}, spelled=3).to_json()))
+    plain = json.loads(json.dumps(replace(NEW_MODEL_RULES, spelling={"klaw": "walk"}, spelled=3).to_json()))
     rules = TextRules.from_json(plain)
     old = Vocabulary([*SPECIALS, "walk", "wlaks", "2", "5", "one", "steps"], rules)
     assert rules.to_json() == plain
@@ -78,9 +89,9 @@ def test_rules_travel_and_the_codes_own_do_not_change_what_a_vocabulary_reads() 
 )
 def test_what_is_not_a_set_of_rules(change: dict[str, Any], reason: str) -> None:
     with pytest.raises(BundleError, match=reason):
-        TextRules.from_json({**RULES.to_json(), **change})
+        TextRules.from_json({**NEW_MODEL_RULES.to_json(), **change})
     with pytest.raises(BundleError, match=r"text\.hundred: is missing"):
-        TextRules.from_json({key: value for key, value in RULES.to_json().items() if key != "hundred"})
+        TextRules.from_json({key: value for key, value in NEW_MODEL_RULES.to_json().items() if key != "hundred"})
 
 
 @pytest.mark.parametrize(
@@ -118,7 +129,7 @@ def test_a_long_sentence_is_refused_at_once() -> None:
 
 
 def test_each_digit_is_a_word() -> None:
-    assert RULES.words("Turns 180 degrees, 3D") == ["turns", "1", "8", "0", "degrees", "3", "d"]
+    assert NEW_MODEL_RULES.words("Turns 180 degrees, 3D") == ["turns", "1", "8", "0", "degrees", "3", "d"]
 
 
 def test_a_vocabulary_is_sorted_by_count_then_name() -> None:
@@ -134,7 +145,7 @@ def test_sentences_survive_the_way_there_and_back() -> None:
     for sentence in SENTENCES:
         ids, unknown = vocabulary.encode(sentence)
         assert (ids.dtype, unknown) == (np.int64, [])
-        wanted = RULES.normalise(sentence).replace(" 1 ", " one ")
+        wanted = NEW_MODEL_RULES.normalise(sentence).replace(" 1 ", " one ")
         assert vocabulary.decode(ids) == wanted
         assert vocabulary.decode([1, *ids.tolist(), 2, 0, 0]) == wanted
 

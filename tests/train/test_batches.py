@@ -7,7 +7,7 @@ from language_data import small_store, walker
 
 from motet.motion.mirroring import mirror
 from motet.representation.root_block import to_root_block
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.batches import Batch, Examples, examples, frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import mirror_text
@@ -130,7 +130,9 @@ def test_motion_and_sentence_are_mirrored_together(store: Store) -> None:
     for frames, words in rows([batch]):
         side = int(frames in mirrored)
         seen[side] += 1
-        texts = [(RULES.normalise, mirror_text)[side](s) for s in (mirrored if side else plain)[frames].sentences]
+        texts = [
+            (NEW_MODEL_RULES.normalise, mirror_text)[side](s) for s in (mirrored if side else plain)[frames].sentences
+        ]
         assert found.vocabulary.decode(words) in texts
     assert min(seen) > 0.2 * sum(seen)
 
@@ -175,4 +177,4 @@ def test_what_cannot_be_mirrored_is_refused(store: Store) -> None:
 )
 def test_sentences_are_mirrored(sentence: str, mirrored: str) -> None:
     assert mirror_text(sentence) == mirrored
-    assert mirror_text(mirrored) == RULES.normalise(sentence)
+    assert mirror_text(mirrored) == NEW_MODEL_RULES.normalise(sentence)

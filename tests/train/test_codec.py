@@ -15,7 +15,7 @@ from sklearn.cluster import KMeans
 
 from motet.cli import main
 from motet.figures.humanoid.bones import HUMANOID
-from motet.generate.codec import REACH, moved, seen_from, way_of
+from motet.generate.codec import RADIAN_METRES, moved, seen_from, way_of
 from motet.motion.kinematics import positions
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import END_SUFFIX
@@ -175,7 +175,7 @@ def test_a_book_is_about_as_near_to_moves_as_can_be() -> None:
     found = fit_book(walks(), 4, 24, seed=0)
     assert found.shape == (24, 3)
     assert not found[0].any()
-    scale = np.array([1, 1, REACH])
+    scale = np.array([1, 1, RADIAN_METRES])
     moves = np.concatenate([seen_from(way[:-4], way[4:]) for way in walks()]) * scale
 
     def cost(book: np.ndarray) -> float:

@@ -26,9 +26,8 @@ from language_models import (
 
 from motet.cli import main
 from motet.motion.motion import Motion
-from motet.text.vocabulary import RULES, Vocabulary
-from motet_train.data.store import FRAMES as FRAMES_FILE
-from motet_train.data.store import INDEX, Store
+from motet.text.vocabulary import NEW_MODEL_RULES, Vocabulary
+from motet_train.data.store import FRAMES_FILE, INDEX, Store
 from motet_train.evaluate.language.describe import bleu, copied_bleu, describe_report, nearest_motions
 from motet_train.evaluate.language.generate import (
     LANGUAGE_GOALS,
@@ -230,7 +229,7 @@ def runs(tmp_path: Path) -> Path:
     _write(STORE, tmp_path / "store")
     vocabulary = list(Vocabulary.of(s for entry in STORE.records for s in entry.sentences).words)
     shared = {"channels": len(CHANNELS), "words": len(vocabulary), **SIZES}
-    more = {"motion": STORE.contract(range(20)).to_json(), "text": RULES.to_json(), "vocabulary": vocabulary}
+    more = {"motion": STORE.contract(range(20)).to_json(), "text": NEW_MODEL_RULES.to_json(), "vocabulary": vocabulary}
     for name, verb, by in (("describe", "describe", "trial"), ("unseen", "describe", "subject")):
         net = MODELS["motion-to-language"](shared | {"dropout": 0.4, "gates": "sigmoid"})
         settings = {

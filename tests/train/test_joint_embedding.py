@@ -21,7 +21,7 @@ from motet_train.data.preparation import Preparation
 from motet_train.data.sentences import alike
 from motet_train.data.store import Store, prepare
 from motet_train.models.joint_embedding import (
-    SMALLEST,
+    DEVIATION_FLOOR,
     JointEmbedding,
     JointEmbeddingConfig,
     contrast,
@@ -78,7 +78,7 @@ def test_statistics_are_those_of_numpy() -> None:
         wanted = [frames.mean(axis=0), frames.std(axis=0), frames.min(axis=0), frames.max(axis=0), *means]
         np.testing.assert_allclose(found[row], np.concatenate(wanted), atol=1e-5)
         steps = np.diff(frames, axis=0, prepend=frames[:1]).reshape(length, 2, 3)
-        speed = np.hypot(np.linalg.norm(steps, axis=-1), SMALLEST)
+        speed = np.hypot(np.linalg.norm(steps, axis=-1), DEVIATION_FLOOR)
         np.testing.assert_allclose(speeds[row], np.sqrt([*speed.mean(axis=0), *speed.max(axis=0)]), atol=1e-5)
 
 

@@ -6,12 +6,12 @@ import torch
 
 from motet.models.describe import DescribeModel
 from motet.models.load import load_as
-from motet.models.nearest_neighbour import LEFT, RIGHT, STRAIGHT
+from motet.models.nearest_neighbour import GOES_LEFT, GOES_RIGHT, GOES_STRAIGHT
 from motet.representation.root_block import ROOT_BLOCK
 from motet_train.data.batches import Views
 from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.errors import DataError
-from motet_train.data.kinds import KINDS, careful, named, shown_by
+from motet_train.data.kinds import KIND_PATTERNS, careful, named, shown_by
 from motet_train.data.store import Entry, split
 from motet_train.evaluate.language.actions import calibration_error
 from motet_train.models.discriminant import discriminate
@@ -26,7 +26,7 @@ def test_sentences_name_kinds_of_action() -> None:
     assert named("he walks without jumping") == {"walk"}
     assert named("he lifts his left arm") == frozenset()
     assert named("somebody gets up from the chair") == {"rise", "sit"}
-    assert len(KINDS) > 40
+    assert len(KIND_PATTERNS) > 40
 
 
 def test_what_one_annotator_says_makes_nothing_right() -> None:
@@ -40,20 +40,20 @@ def test_what_one_annotator_says_makes_nothing_right() -> None:
 
 
 def test_where_sentences_say_that_somebody_goes() -> None:
-    assert way_of("she walks and turns left") == (LEFT, 0, 1)
-    assert way_of("he veers to the right by 45 degrees while running")[:2] == (RIGHT, 45)
-    assert way_of("he runs straight ahead") == (STRAIGHT, 0, 1)
+    assert way_of("she walks and turns left") == (GOES_LEFT, 0, 1)
+    assert way_of("he veers to the right by 45 degrees while running")[:2] == (GOES_RIGHT, 45)
+    assert way_of("he runs straight ahead") == (GOES_STRAIGHT, 0, 1)
     assert way_of("a person walks using the left and the right foot in turn")[0] == 0
-    assert way_of("he pivots right")[0] == RIGHT
-    assert way_of("someone walks off to the left")[0] == way_of("she runs diagonally left")[0] == LEFT
-    assert way_of("a man runs and changes direction to the right")[0] == RIGHT
+    assert way_of("he pivots right")[0] == GOES_RIGHT
+    assert way_of("someone walks off to the left")[0] == way_of("she runs diagonally left")[0] == GOES_LEFT
+    assert way_of("a man runs and changes direction to the right")[0] == GOES_RIGHT
     assert way_of("she sits")[2] == 0
 
 
 def test_a_side_is_that_of_the_path_whatever_the_verb() -> None:
-    assert way_of("a woman walks straight and then continues to the right") == (RIGHT, 0, 1)
-    assert way_of("the running man does not keep straight but bears left") == (LEFT, 0, 1)
-    assert way_of("man walks then 90 degrees right") == (RIGHT, 90, 1)
+    assert way_of("a woman walks straight and then continues to the right") == (GOES_RIGHT, 0, 1)
+    assert way_of("the running man does not keep straight but bears left") == (GOES_LEFT, 0, 1)
+    assert way_of("man walks then 90 degrees right") == (GOES_RIGHT, 90, 1)
     # who steps or jumps to a side does not turn there
     assert way_of("quick sidestep left")[0] == way_of("a figure jumps right and stops")[0] == 0
 

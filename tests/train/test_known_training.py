@@ -11,7 +11,7 @@ from language_data import small_store
 from motet.cli import main
 from motet.models.describe import DescribeModel
 from motet.models.nearest_neighbour import NOTHING
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.store import Store
 from motet_train.evaluate.language.actions import error_by_chance
 from motet_train.runs import Run
@@ -45,7 +45,7 @@ def test_known_motions_answer_for_clips_kept_back(folder: Path) -> None:
     assert model.known is not None
     split = run.manifest["training"]["split"]
     test = [i for i, entry in enumerate(store.records) if entry.name in split["test"]]
-    said = {RULES.normalise(s) for entry in store.records for s in entry.sentences}
+    said = {NEW_MODEL_RULES.normalise(s) for entry in store.records for s in entry.sentences}
     for row in model.describe([store.motion(i) for i in test], 3):
         assert len({one.text for one in row}) == len(row)
         for one in row:

@@ -22,10 +22,10 @@ from motet.steering.settings import SteeringSettings
 from motet.steering.step import PoseCodes, tick
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.matching_rows import MatchingRows, _leaps, mirrored_poses, rows_of
-from motet_train.data.recorded import SLOPE, Recording, _levelled, _with_even_collars
+from motet_train.data.recorded import COLLAR_SLOPE, Recording, _levelled, _with_even_collars
 from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
-from motet_train.models.matching import DTYPES, Matching, MatchingConfig
+from motet_train.models.matching import DTYPE_OF_TABLE, Matching, MatchingConfig
 from motet_train.recipes.matching import take
 
 CLIPS = CMU_FOLDER
@@ -84,7 +84,7 @@ def test_collars_slope_alike_whoever_is_recorded_and_arms_stay(walk: Motion, dro
     found = named("root_sixd").motion(_with_even_collars(before))
     bones = np.einsum("tjab,jb->tja", local_rotations(found, collars), HUMANOID.offsets[arms])
     slopes = np.degrees(np.arctan2(-bones[..., 1], np.abs(bones[..., 0])))
-    assert slopes.mean(axis=0) == pytest.approx(SLOPE, abs=0.1)
+    assert slopes.mean(axis=0) == pytest.approx(COLLAR_SLOPE, abs=0.1)
     turns, as_before = (global_transforms(motion)[0][:, arms] for motion in (found, named("root_sixd").motion(before)))
     np.testing.assert_allclose(turns, as_before, atol=1e-6)
 
@@ -148,7 +148,7 @@ def test_codes_of_a_mirror_image_differ_by_signs(net: Matching, rows: MatchingRo
 
 def test_tables_are_the_rows(net: Matching, rows: MatchingRows) -> None:
     tables = net.tables()
-    assert {name: table.dtype for name, table in tables.items()} == DTYPES
+    assert {name: table.dtype for name, table in tables.items()} == DTYPE_OF_TABLE
     np.testing.assert_array_equal(tables["left"], rows.left)
     np.testing.assert_array_equal(tables["shows"], rows.gaits)
     np.testing.assert_allclose(tables["moves"], np.column_stack([rows.moves, rows.speed, rows.contacts]), atol=1e-5)

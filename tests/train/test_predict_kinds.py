@@ -13,11 +13,11 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Entry
 from motet_train.evaluate.predict.floors import FLOORS
 from motet_train.evaluate.predict.mocap import (
+    EVERYTHING_ELSE,
     MOTION_KINDS,
     PLACE,
     POSE,
     QUARTERS,
-    REST,
     Measured,
     by_kind,
     calibration,
@@ -40,16 +40,16 @@ def entry(name: str, action: str = "", *sentences: str, subject: str = "1") -> E
         ("walk, veer left", (), "walks and runs"),
         ("Run Jump Over", (), "walks and runs"),
         ("run/jog", (), "walks and runs"),
-        ("jumping jacks, side twists, squats, jog", (), REST),
+        ("jumping jacks, side twists, squats, jog", (), EVERYTHING_ELSE),
         ("charleston_side_by_side_female", ("Someone walks.",), "dance"),
         ("playground - climb, hang, swing", (), "climbing"),
         ("body jab right", (), "boxing"),
         ("walk with box", (), "walks and runs"),
-        ("elephant (human subject)", ("Someone walks around heavily.",), REST),
+        ("elephant (human subject)", ("Someone walks around heavily.",), EVERYTHING_ELSE),
         ("", ("A man walks.", "Someone goes ahead.", "He is walking."), "walks and runs"),
-        ("", ("Runs up and kicks a ball.", "A shot.", "Someone kicks."), REST),
+        ("", ("Runs up and kicks a ball.", "A shot.", "Someone kicks."), EVERYTHING_ELSE),
         ("", ("A dancer runs.",), "dance"),
-        ("", (), REST),
+        ("", (), EVERYTHING_ELSE),
     ],
 )
 def test_kinds_are_said_by_words(action: str, sentences: tuple[str, ...], kind: str) -> None:
@@ -59,8 +59,8 @@ def test_kinds_are_said_by_words(action: str, sentences: tuple[str, ...], kind: 
 def test_kinds_are_listed_in_their_order() -> None:
     entries = [entry("a", "walk"), entry("b", "wave"), entry("c", "boxing"), entry("d", "run")]
     found = {kind: [one.name for one in members] for kind, members in by_kind(entries).items()}
-    assert found == {"boxing": ["c"], "walks and runs": ["a", "d"], REST: ["b"]}
-    assert list(found) == [kind for kind in (*MOTION_KINDS, REST) if kind in found]
+    assert found == {"boxing": ["c"], "walks and runs": ["a", "d"], EVERYTHING_ELSE: ["b"]}
+    assert list(found) == [kind for kind in (*MOTION_KINDS, EVERYTHING_ELSE) if kind in found]
 
 
 def measured(**systems: float) -> Measured:
@@ -90,7 +90,7 @@ def test_distances_are_means_over_the_windows_of_a_kind() -> None:
     models: Any = {"a": Unsure(), "b": Unsure()}
     reports = mocap_report(models, measured(a=1.0, b=2.0), ENTRIES[:4])
     assert list(reports) == ["a", "b"]
-    assert list(reports["b"]["kinds"]) == ["boxing", "walks and runs", REST]
+    assert list(reports["b"]["kinds"]) == ["boxing", "walks and runs", EVERYTHING_ELSE]
     boxing, walks = reports["b"]["kinds"]["boxing"], reports["b"]["kinds"]["walks and runs"]
     assert [boxing[count] for count in ("recordings", "people", "windows")] == [1, 1, 2]
     assert [walks[count] for count in ("recordings", "people", "windows")] == [2, 1, 2]

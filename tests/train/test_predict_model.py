@@ -17,7 +17,7 @@ from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.models.figure_predictor import (
-    LEAST,
+    ERROR_FLOOR,
     ErrorHead,
     FigurePredictor,
     FigurePredictorConfig,
@@ -222,7 +222,7 @@ def test_signs_grow_with_what_they_are_signs_of() -> None:
     apart = error_signs(past, steps, agreed + 1)
     assert (faster > alike).sum(dim=(0, 1)).tolist() == [15, 15, 15, 0, 0, 0]
     assert (apart > alike).sum(dim=(0, 1)).tolist() == [0, 0, 0, 0, 15, 0]
-    torch.testing.assert_close(apart[..., 4], torch.log(torch.tensor([1.0, 2, 3]) + LEAST).expand(5, 3))
+    torch.testing.assert_close(apart[..., 4], torch.log(torch.tensor([1.0, 2, 3]) + ERROR_FLOOR).expand(5, 3))
 
 
 SIDES = FigurePredictorConfig(

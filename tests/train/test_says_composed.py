@@ -5,7 +5,7 @@ import pytest
 from says_figures import standing, walking
 
 from motet_train.evaluate.text_adherence import composed
-from motet_train.evaluate.text_adherence.prompts import RULES
+from motet_train.evaluate.text_adherence.prompts import RULE_BY_NAME
 from motet_train.evaluate.text_adherence.track import Track
 
 
@@ -39,4 +39,4 @@ def test_the_table_names_rules_that_exist() -> None:
     table = composed.table()
     assert len(table["composed"]) == 20
     assert all(len(row["parts"]) > 1 for row in table["composed"])
-    assert {rule["is"] for row in table["composed"] for part in row["parts"] for rule in part} <= set(RULES)
+    assert {rule["is"] for row in table["composed"] for part in row["parts"] for rule in part} <= set(RULE_BY_NAME)

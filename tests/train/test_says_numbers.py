@@ -41,13 +41,13 @@ def test_jumps_and_dips_are_counted() -> None:
     dips[:, HUMANOID.index("hips"), 1] -= 0.3 * np.sin(np.pi * time / 2) ** 2
     assert numbers.met(Track(hops), {"text": "", "times": 4, "act": "jumps"})
     assert not numbers.met(Track(hops), {"text": "", "times": 3, "act": "jumps"})
-    assert numbers.ACTS["dips"](Track(dips)) == 2
+    assert numbers.COUNTS_BY_NAME["dips"](Track(dips)) == 2
 
 
 def test_the_table_has_eight_of_each_kind() -> None:
     for kind in numbers.BARS:
         rows = [row for row in numbers.table() if kind in row]
         assert len(rows) == 8
-        assert {row.get("act") for row in rows} <= ({*numbers.ACTS} if kind == "times" else {None})
+        assert {row.get("act") for row in rows} <= ({*numbers.COUNTS_BY_NAME} if kind == "times" else {None})
     with pytest.raises(StopIteration):
         numbers.met(Track(standing(1)), {"text": "nothing"})

@@ -13,7 +13,7 @@ from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import read_motion
 from motet.motion.mirroring import mirror
 from motet_train.data.errors import DataError
-from motet_train.evaluate.text_adherence.prompts import RULES, actions, holds, prompts
+from motet_train.evaluate.text_adherence.prompts import RULE_BY_NAME, actions, holds, prompts
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, longest, spells, swings, track_of
 
 WAVE = np.sin(2 * np.pi * times(2.0))
@@ -151,23 +151,25 @@ CASES: list[tuple[str, dict[str, Any], np.ndarray, np.ndarray]] = [
 
 @pytest.mark.parametrize(("rule", "given", "yes", "no"), CASES, ids=[f"{i}-{case[0]}" for i, case in enumerate(CASES)])
 def test_rules_tell_figures_apart(rule: str, given: dict[str, Any], yes: np.ndarray, no: np.ndarray) -> None:
-    assert RULES[rule](Track(yes), **given) is True
-    assert RULES[rule](Track(no), **given) is False
+    assert RULE_BY_NAME[rule](Track(yes), **given) is True
+    assert RULE_BY_NAME[rule](Track(no), **given) is False
 
 
 def test_every_rule_is_told_apart_and_asked_for() -> None:
-    assert {case[0] for case in CASES} == set(RULES)
+    assert {case[0] for case in CASES} == set(RULE_BY_NAME)
     asked = [rule for prompt in prompts() for rule in prompt.rules]
-    assert {rule["is"] for rule in asked} == set(RULES)
+    assert {rule["is"] for rule in asked} == set(RULE_BY_NAME)
     for rule in asked:
-        inspect.signature(RULES[rule["is"]]).bind(None, **{key: value for key, value in rule.items() if key != "is"})
+        inspect.signature(RULE_BY_NAME[rule["is"]]).bind(
+            None, **{key: value for key, value in rule.items() if key != "is"}
+        )
 
 
-@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("rule", RULE_BY_NAME)
 def test_a_single_frame_is_judged(rule: str) -> None:
     """Every prompt can be put to a motion of one frame; nothing is done in so short a time."""
     (given,) = [case[1] for case in CASES if case[0] == rule][:1]
-    assert RULES[rule](Track(standing()[:1]), **given) in (True, False)
+    assert RULE_BY_NAME[rule](Track(standing()[:1]), **given) in (True, False)
     assert not holds(Track(standing()[:1]), [{"is": rule, **given}])
 
 

@@ -131,7 +131,7 @@ def test_figures_that_stand_before_their_points_are_off() -> None:
 
 
 def test_ends_of_paths_are_reached_late_or_never(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(paths, "UNTIL", 12.0)
+    monkeypatch.setattr(paths, "PATH_SECONDS", 12.0)
     usual = path_figures(Told(), "walk")
     assert usual["zigzag_never"] == usual["circles_never"] == 0
     # corners end ticks early

@@ -73,7 +73,7 @@ def test_every_act_is_cut_by_every_act_at_ticks_of_its_own(monkeypatch: pytest.M
 
 
 def test_hands_reach_for_points_ahead_and_behind(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(limbs, "POINTS", 12)
+    monkeypatch.setattr(limbs, "REACHED_POINTS", 12)
     assert limbs.reach_figures(Arms(jump=40.0))["turn"] == pytest.approx(40, abs=1e-3)  # type: ignore[arg-type]
     assert limbs.reach_figures(Arms())["turn"] == 0  # type: ignore[arg-type]
     assert ARM > 0

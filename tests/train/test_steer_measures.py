@@ -21,7 +21,7 @@ from motet_train.data.recorded import Recording
 from motet_train.evaluate.positions import mean_and_tail, slides
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import (
-    PACES,
+    CHANGED_SPEEDS,
     Track,
     aside_errors,
     creep_errors,
@@ -33,7 +33,7 @@ from motet_train.evaluate.steer.following import (
     turn_errors,
     ways_errors,
 )
-from motet_train.evaluate.steer.players import FIGURES, reversal_figures, stick_figures
+from motet_train.evaluate.steer.players import STEERED_FIGURES, reversal_figures, stick_figures
 from motet_train.evaluate.steer.report import Limits, Watch, astray, broken, frozen, turns, wandering, watched
 
 
@@ -100,7 +100,7 @@ def test_speed_errors_are_shares() -> None:
     assert found["rest"] == 0
     # only what is between 1 and 2 s after a change counts
     assert speed_errors(puppets(late=0.9))["worst"] == pytest.approx(0, abs=1e-4)
-    assert speed_errors(puppets(late=1.2))["rest"] == pytest.approx(0.2 * np.mean(PACES[1:]), rel=0.01)
+    assert speed_errors(puppets(late=1.2))["rest"] == pytest.approx(0.2 * np.mean(CHANGED_SPEEDS[1:]), rel=0.01)
 
 
 def test_turns_take_as_long_as_a_figure_takes() -> None:
@@ -155,7 +155,7 @@ def test_a_player_reverses_walks_and_weaves() -> None:
     ways = np.unique([asked["direction"] for asked in told])
     assert ways.tolist() == [0, 180]
     changes = np.diff([asked["direction"] for asked in told], axis=0) != 0
-    assert changes.sum() == pytest.approx(FIGURES * 23.0 / 2.0, rel=0.1)
+    assert changes.sum() == pytest.approx(STEERED_FIGURES * 23.0 / 2.0, rel=0.1)
     told.clear()
     stick_figures(model)
     speeds, ways = (np.array([asked[name] for asked in told]) for name in ("speed", "direction"))

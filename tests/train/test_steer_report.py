@@ -74,12 +74,12 @@ def report(model: SteerModel, store: Store) -> Any:
         warnings.simplefilter("error")
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
-        patch.setattr(following, "STRAIGHT", 2.0)
-        patch.setattr(commands, "SAID", ("wave",))
-        patch.setattr(commands, "UNTIL", 1.0)
-        patch.setattr(limbs, "AHEAD", 0.2)
-        patch.setattr(limbs, "POINTS", 3)
-        patch.setattr(players, "SECONDS", 1.0)
+        patch.setattr(following, "STRAIGHT_SECONDS", 2.0)
+        patch.setattr(commands, "MEASURED_ACTS", ("wave",))
+        patch.setattr(commands, "POINT_SECONDS", 1.0)
+        patch.setattr(limbs, "STARTING_DISTANCE", 0.2)
+        patch.setattr(limbs, "REACHED_POINTS", 3)
+        patch.setattr(players, "STEERED_SECONDS", 1.0)
         return steer_report(model, Recorded.of(store), minutes=0.02, characters=3)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from motet.errors import MotetError
 from motet_train.data.corpus import Corpus
 from motet_train.data.predict_data import store_material
-from motet_train.data.preparation import ALL, preparation
+from motet_train.data.preparation import PARTS_OF_ALL_VERBS, preparation
 from motet_train.data.store import Store, part, prepare_parts
 from motet_train.progress import log, preparing
 from motet_train.recipes import actions, codec, codes, fill, known, language, matching, predict, search
@@ -53,7 +53,7 @@ STAGES: Mapping[str, Stage] = {
     "search": Stage("search", search.DEFAULT, search.train_search),
     "predict": Stage(
         "predict",
-        predict.FILES,
+        predict.FIGURE_RECIPE,
         lambda store, job, data, by: predict.train_predict(store_material(store, data, by), job),
     ),
     "actions": Stage("generate", actions.DEFAULT, actions.train_actions),
@@ -133,7 +133,7 @@ class Plan:
         else:
             log.info("preparing %d motion files into %s", len(self.data), place)
             with preparing(len(self.data)) as done:
-                prepare_parts(self.data, place, ALL, done)
+                prepare_parts(self.data, place, PARTS_OF_ALL_VERBS, done)
         return place
 
     def _train(self, name: str, stage: Stage, place: Path) -> None:

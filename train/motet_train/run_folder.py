@@ -14,7 +14,7 @@ from motet.errors import OutputError
 from motet_train import distributed
 from motet_train.progress import Shown, log
 from motet_train.recipes.recipe import SETTINGS, Job, Recipe
-from motet_train.runs import MANIFEST, WEIGHTS, Run, RunError
+from motet_train.runs import RUN_MANIFEST, WEIGHTS, Run, RunError
 from motet_train.settings import to_toml
 from motet_train.trainer import CHECKPOINT, LOG
 
@@ -96,7 +96,7 @@ def is_finished(out: Path) -> bool:
     """Whether a folder holds a finished run."""
     try:
         # only a finished run states how long it took
-        return "seconds" in json.loads((out / MANIFEST).read_text(encoding="utf-8"))["training"]
+        return "seconds" in json.loads((out / RUN_MANIFEST).read_text(encoding="utf-8"))["training"]
     except (OSError, ValueError, KeyError, TypeError):
         return False
 
@@ -105,7 +105,7 @@ def _unborn(out: Path) -> bool:
     """Whether a folder is empty, or has a run killed before its first checkpoint, so that training can start over."""
     if not out.is_dir() or (out / CHECKPOINT).exists():
         return False
-    ours = (MANIFEST, SETTINGS, LOG, WEIGHTS, "tensorboard")
+    ours = (RUN_MANIFEST, SETTINGS, LOG, WEIGHTS, "tensorboard")
     temporary = tuple(f".{name}." for name in (*ours, CHECKPOINT))
     names = [path.name for path in out.iterdir()]
     return all(name in ours or name.startswith(temporary) for name in names) and not is_finished(out)

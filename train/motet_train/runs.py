@@ -36,7 +36,7 @@ from motet_train.papers import li2018
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion
 from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM
 
-MANIFEST = "run.json"
+RUN_MANIFEST = "run.json"
 WEIGHTS = "weights.pt"
 
 MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
@@ -57,7 +57,16 @@ MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
 }
 """Name of a model -> its constructor from the configuration in the manifest."""
 
-DAMAGE = (OSError, EOFError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, AssertionError)
+CHECKPOINT_ERRORS = (
+    OSError,
+    EOFError,
+    RuntimeError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    AssertionError,
+)
 """Errors, besides UnpicklingError, that torch raises for a damaged file."""
 
 
@@ -113,16 +122,16 @@ class Run:
     def save(self, folder: Path) -> None:
         """Write the run into an existing folder."""
         write_whole(folder / WEIGHTS, to_bytes(self.model.state_dict()))
-        write_whole(folder / MANIFEST, json.dumps(self.manifest, indent=1) + "\n")
+        write_whole(folder / RUN_MANIFEST, json.dumps(self.manifest, indent=1) + "\n")
 
     @staticmethod
     def load(folder: Path) -> "Run":
         """Read a run that :meth:`save` wrote, onto the CPU; RunError if that fails."""
-        for name in (MANIFEST, WEIGHTS):
+        for name in (RUN_MANIFEST, WEIGHTS):
             if not (folder / name).is_file():
                 raise RunError(f"{folder} is not a training run: it has no {name}")
         try:
-            manifest = json.loads((folder / MANIFEST).read_text())
+            manifest = json.loads((folder / RUN_MANIFEST).read_text())
             model = MODELS[manifest["model"]](manifest["config"])
             model.load_state_dict(read_state(folder / WEIGHTS))
         except (KeyError, TypeError, ValueError, RuntimeError, OSError) as error:
@@ -163,7 +172,7 @@ def read_state(path: Path) -> Any:
     except pickle.UnpicklingError as error:  # its text, from torch, explains in eight lines how to execute it anyway
         reason = "it is damaged, or holds objects other than tensors and plain values, which could execute anything"
         raise RunError(f"{path} cannot be read: {reason}") from error
-    except DAMAGE as error:
+    except CHECKPOINT_ERRORS as error:
         raise RunError(f"{path} cannot be read: {str(error).partition(chr(10))[0] or 'it is cut off'}") from error
 
 

@@ -20,7 +20,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 from motet.errors import MotetError
 from motet_train.recipes.recipe import Recipe
 
-TABLES = {"training": "training", "model": "config", "visits": "visits"}
+PART_OF_TABLE = {"training": "training", "model": "config", "visits": "visits"}
 """Table of a file -> the part of the recipe that it changes."""
 
 
@@ -37,7 +37,7 @@ def read_settings(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, Any]]
             tables[key] = value
         else:
             options[key] = value
-    _refuse_unknown(path, tables, TABLES)
+    _refuse_unknown(path, tables, PART_OF_TABLE)
     return options, tables
 
 
@@ -46,7 +46,7 @@ def read_stages(path: Path, stages: Collection[str]) -> dict[str, dict[str, dict
     data = _read(path)
     _refuse_unknown(path, data, stages)
     for stage, tables in data.items():
-        _refuse_unknown(path, tables if isinstance(tables, dict) else {"": tables}, TABLES, f"{stage}.")
+        _refuse_unknown(path, tables if isinstance(tables, dict) else {"": tables}, PART_OF_TABLE, f"{stage}.")
     return data
 
 
@@ -67,7 +67,7 @@ def changed(recipe: Recipe, tables: Mapping[str, Mapping[str, Any]], options: Ma
 
     Options that are None change nothing. SettingsError names a setting that is unknown or of a wrong type.
     """
-    for table, part in TABLES.items():
+    for table, part in PART_OF_TABLE.items():
         current = getattr(recipe, part)
         names: set[str] = set()
         if current is not None:
@@ -88,7 +88,7 @@ def changed(recipe: Recipe, tables: Mapping[str, Mapping[str, Any]], options: Ma
 def to_toml(options: Mapping[str, Any], recipe: Recipe) -> str:
     """The text of a file that :func:`read_settings` reads, with all settings of the recipe."""
     lines = [f"{name} = {_plain(value)}" for name, value in options.items() if value is not None]
-    for table, part in TABLES.items():
+    for table, part in PART_OF_TABLE.items():
         if (current := getattr(recipe, part)) is not None:
             lines += _table(table, current, recipe.derived)
     return "\n".join(lines) + "\n"

@@ -29,9 +29,9 @@ from motet.search.model import SearchModel
 from motet.steering.model import SteerModel
 from motet.text.vocabulary import EOS, SPECIALS
 
-BEAMS = 5
-WORDS = 10
-SECONDS = 7.0
+CASE_BEAMS = 5
+CASE_WORDS = 10
+CASE_SECONDS = 7.0
 """Lengths of all descriptions and motions, so that the speed does not depend on what a model produces."""
 
 
@@ -90,12 +90,12 @@ def _(model: DescribeModel, file: Path | None = None) -> list[Case]:
 
 
 def describe_cases(model: DescribeModel) -> list[Case]:
-    """Descriptions of :data:`WORDS` words a second that the net writes, many at once and one alone; encoder and step of
-    one alone. By beam search; and one by consensus of 100 draws."""
+    """Descriptions of :data:`CASE_WORDS` words a second that the net writes, many at once and one alone; encoder and
+    step of one alone. By beam search; and one by consensus of 100 draws."""
     end = model.vocabulary.ids[EOS]
     motion = _noise(model.contract, model.fps)
     never = {"log_probabilities": lambda rows: np.where(np.arange(rows.shape[1]) == end, np.float32(-1e9), rows)}
-    manifest = replace(model.manifest, defaults={"beams": BEAMS, "max_words": WORDS}, loop="beam")
+    manifest = replace(model.manifest, defaults={"beams": CASE_BEAMS, "max_words": CASE_WORDS}, loop="beam")
     graphs = {name: graph for name, graph in model.graphs.items() if name != "space"}  # it writes nothing
     steady = DescribeModel(manifest, {**graphs, "step": _Steady(model.graphs["step"], never)})
     return [
@@ -109,10 +109,12 @@ def describe_cases(model: DescribeModel) -> list[Case]:
 
 @cases.register
 def mixture_cases(model: MixtureModel, _: Path | None = None) -> list[Case]:
-    """Motions of :data:`SECONDS` a second, many at once and one alone; encoder and step of one alone."""
+    """Motions of :data:`CASE_SECONDS` a second, many at once and one alone; encoder and step of one alone."""
     text = _text(model)
     step = _Steady(model.graphs["step"], {"active": np.ones_like})
-    manifest = replace(model.manifest, defaults={**model.defaults, "hypotheses": BEAMS, "max_seconds": SECONDS})
+    manifest = replace(
+        model.manifest, defaults={**model.defaults, "hypotheses": CASE_BEAMS, "max_seconds": CASE_SECONDS}
+    )
     steady = MixtureModel(manifest, {**model.graphs, "step": step})
     return [
         *_batches("generate.motions", lambda size: steady.generate([text] * size), "motions/s", (16, 64)),
@@ -124,9 +126,9 @@ def mixture_cases(model: MixtureModel, _: Path | None = None) -> list[Case]:
 
 @cases.register
 def codes_cases(model: CodesModel, _: Path | None = None) -> list[Case]:
-    """The first frames of a stream, and :data:`SECONDS` of motion, alone and many at once."""
+    """The first frames of a stream, and :data:`CASE_SECONDS` of motion, alone and many at once."""
     text = _text(model)
-    made = partial(model.generate, seconds=SECONDS)
+    made = partial(model.generate, seconds=CASE_SECONDS)
     return [
         *_batches("generate.motions", lambda size: made([text] * size), "motions/s", (16, 64)),
         Case("generate.one", lambda: made(text)),
@@ -186,7 +188,7 @@ def fill_cases(model: FillModel, _: Path | None = None) -> list[Case]:
 
 @cases.register
 def search_cases(model: SearchModel, _: Path | None = None) -> list[Case]:
-    """A sentence of :data:`WORDS` words, a motion of :data:`SECONDS`, and a question to 100,000 vectors."""
+    """A sentence of :data:`CASE_WORDS` words, a motion of :data:`CASE_SECONDS`, and a question to 100,000 vectors."""
     text = _text(model)
     motion = _noise(model.contract, model.fps)
     vectors = np.random.default_rng(0).normal(size=(100_000, model.sizes["E"])).astype(np.float32)
@@ -222,19 +224,19 @@ def _wandering(contract: MotionContract, frames: int) -> Motion:
 
 
 def _noise(contract: MotionContract, fps: float) -> Motion:
-    """Frames of :data:`SECONDS` that are drawn one by one."""
-    size = (round(SECONDS * fps), len(contract.channels))
+    """Frames of :data:`CASE_SECONDS` that are drawn one by one."""
+    size = (round(CASE_SECONDS * fps), len(contract.channels))
     return contract.features(np.random.default_rng(0).normal(contract.mean, contract.std, size))
 
 
 def _text(model: LanguageModel) -> str:
-    return " ".join(model.vocabulary.words[len(SPECIALS) :][:WORDS])
+    return " ".join(model.vocabulary.words[len(SPECIALS) :][:CASE_WORDS])
 
 
 def _step_call(step: Graph) -> Call:
     """One call of a step for all beams of one request."""
     rng = np.random.default_rng(0)
-    feeds = {tensor.name: tensor.example(rng, BEAMS) for tensor in step.spec.inputs}
+    feeds = {tensor.name: tensor.example(rng, CASE_BEAMS) for tensor in step.spec.inputs}
     return lambda: step(feeds)
 
 

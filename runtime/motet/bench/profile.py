@@ -17,7 +17,7 @@ from motet.bundle.graph import SessionOptions
 
 PRODUCTS = ("MatMul", "Gemm", "TransposeMatMul", "MatMulInteger", "MatMulIntegerToFloat", "DynamicQuantizeMatMul")
 
-GATES = {"GRU": 3, "LSTM": 4, "RNN": 1}
+GATES_BY_CELL = {"GRU": 3, "LSTM": 4, "RNN": 1}
 """Rows of a recurrent kernel's weights for each of its units."""
 
 HOLDERS = ("Scan", "Loop", "If")
@@ -129,9 +129,9 @@ def operations_of(kernel: Mapping[str, Any]) -> float:
     outputs = [next(iter(shape.values())) for shape in kernel["output_type_shape"]]
     if name in PRODUCTS:
         return 2.0 * float(math.prod(outputs[0])) * float(inputs[0][-1])
-    if name in GATES:
+    if name in GATES_BY_CELL:
         directions, batch, units = outputs[-1][-3:]  # of all states or of the last ones
-        return 2.0 * float(inputs[0][0] * directions * batch * units * GATES[name] * (inputs[0][2] + units))
+        return 2.0 * float(inputs[0][0] * directions * batch * units * GATES_BY_CELL[name] * (inputs[0][2] + units))
     if name == "Conv":
         return 2.0 * float(math.prod(outputs[0])) * float(math.prod(inputs[1][1:]))
     return 0.0

@@ -21,7 +21,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from motet.bundle.fields import LARGEST, Json
+from motet.bundle.fields import LARGEST_NUMBER, Json
 from motet.bundle.graph import LateGraph, OnnxGraph, SessionOptions, TensorSpec
 from motet.bundle.manifest import FORMAT, MANIFEST, FileEntry, Manifest
 from motet.bundle.members import Archive, Folder, array_of
@@ -116,8 +116,11 @@ class Bundle:
             array = array_of(self.read(table_entry.file), table_entry.file, [table_entry.dtype])
             if array.shape != table_entry.shape:
                 raise BundleError(f"its shape is {list(array.shape)}, declared as {list(table_entry.shape)}")
-            if array.dtype.kind == "f" and not -LARGEST <= float(array.min()) <= float(array.max()) <= LARGEST:
-                raise BundleError(f"some numbers are not between -{LARGEST:g} and {LARGEST:g}")
+            if (
+                array.dtype.kind == "f"
+                and not -LARGEST_NUMBER <= float(array.min()) <= float(array.max()) <= LARGEST_NUMBER
+            ):
+                raise BundleError(f"some numbers are not between -{LARGEST_NUMBER:g} and {LARGEST_NUMBER:g}")
             return array
 
     def check_files(self) -> list[str]:

@@ -14,7 +14,7 @@ from motet.settings import is_number
 Json = Mapping[str, Any]
 """A JSON object."""
 
-LARGEST = 1e9
+LARGEST_NUMBER = 1e9
 """Of any number: what is larger is an error, and would overflow in float32 soon."""
 
 
@@ -73,7 +73,7 @@ class Fields:
             raise self.fault(f"one of {', '.join(allowed)}", text, key)
         return text
 
-    def number(self, key: str, low: float = -LARGEST, high: float = LARGEST) -> float:
+    def number(self, key: str, low: float = -LARGEST_NUMBER, high: float = LARGEST_NUMBER) -> float:
         """A number between two others."""
         number = self.value(key)
         if not is_number(number) or not low <= number <= high:
@@ -103,14 +103,14 @@ class Fields:
             raise BundleError(f"manifest, {self.at(key)}: holds a string twice")
         return tuple(strings)
 
-    def numbers(self, key: str, count: int, low: float = -LARGEST) -> NDArray[np.float64]:
+    def numbers(self, key: str, count: int, low: float = -LARGEST_NUMBER) -> NDArray[np.float64]:
         """A list of ``count`` numbers as (count,) float64."""
         items = self.items(key)
         if len(items) != count:
             raise BundleError(f"manifest, {self.at(key)}: must hold {count} numbers, not {len(items)}")
         for item in items:
-            if not is_number(item) or not low <= item <= LARGEST:
-                raise self.fault(f"numbers between {low:g} and {LARGEST:g}", item, key)
+            if not is_number(item) or not low <= item <= LARGEST_NUMBER:
+                raise self.fault(f"numbers between {low:g} and {LARGEST_NUMBER:g}", item, key)
         return np.array(items, dtype=np.float64)
 
     def wholes(self, key: str, low: int, high: int) -> tuple[int, ...]:

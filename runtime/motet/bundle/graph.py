@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.bundle.fields import LARGEST, Fields
+from motet.bundle.fields import LARGEST_NUMBER, Fields
 from motet.bundle.graph_safety import check_graph
 from motet.errors import BundleError, SettingError
 from motet.settings import checked_int
@@ -100,7 +100,7 @@ def provider_of(name: str) -> str:
 Arrays = Mapping[str, NDArray[Any]]
 Floats = NDArray[np.float32]
 
-DTYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
+TENSOR_TYPES = {"float32": "tensor(float)", "int64": "tensor(int64)", "bool": "tensor(bool)"}
 """dtype in a manifest -> type in ONNX Runtime."""
 
 MAX_AXIS = 1 << 20
@@ -126,7 +126,7 @@ class TensorSpec:
             raise data.fault(f"names, and numbers between 1 and {MAX_AXIS}", shape, "shape")
         if len(shape) > 8 or np.prod(fixed, dtype=np.float64) > 1 << 22:
             raise data.fault(f"at most 8 axes with at most {1 << 22} numbers a row", shape, "shape")
-        return TensorSpec(data.text("name"), tuple(shape), data.one_of("dtype", DTYPES))
+        return TensorSpec(data.text("name"), tuple(shape), data.one_of("dtype", TENSOR_TYPES))
 
     def size(self, axis: int) -> int:
         """The size of a fixed axis; BundleError if the axis is dynamic."""
@@ -277,8 +277,8 @@ class OnnxGraph:
         """Named inputs to named outputs; arrays must have the contract's dtypes.
 
         BundleError where the graph fails, or gives numbers that are not finite, or beyond
-        :data:`motet.bundle.fields.LARGEST`, whose squares would not be, but for caches, which only the graph reads.
-        """
+        :data:`motet.bundle.fields.LARGEST_NUMBER`, whose squares would not be, but for caches, which only the graph
+        reads."""
         try:
             outputs = dict(zip(self._outputs, self._session.run(self._outputs, feeds), strict=True))
         except Exception as error:
@@ -286,8 +286,11 @@ class OnnxGraph:
         # numbers that are not finite, or whose squares would not be, end here
         for name in self._checked:
             array = outputs[name]
-            if array.dtype.kind == "f" and not -LARGEST <= array.min(initial=0) <= array.max(initial=0) <= LARGEST:
-                raise BundleError(f"the graph's output {name!r} is not finite, or beyond {LARGEST:g}")
+            if (
+                array.dtype.kind == "f"
+                and not -LARGEST_NUMBER <= array.min(initial=0) <= array.max(initial=0) <= LARGEST_NUMBER
+            ):
+                raise BundleError(f"the graph's output {name!r} is not finite, or beyond {LARGEST_NUMBER:g}")
         return outputs
 
 
@@ -323,7 +326,7 @@ class LateGraph:
 def _check_contract(kind: str, nodes: Any, declared: tuple[TensorSpec, ...]) -> None:
     """BundleError where ONNX Runtime's tensors of a graph are not those that its contract declares."""
     actual = {node.name: (node.type, _sizes(node.shape)) for node in nodes}
-    wanted = {tensor.name: (DTYPES[tensor.dtype], _sizes(tensor.shape)) for tensor in declared}
+    wanted = {tensor.name: (TENSOR_TYPES[tensor.dtype], _sizes(tensor.shape)) for tensor in declared}
     for name in sorted(actual.keys() | wanted.keys()):
         if actual.get(name) != wanted.get(name):
             difference = f"{actual.get(name, 'absent')}, declared {wanted.get(name, 'nowhere')}"

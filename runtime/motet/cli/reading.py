@@ -20,7 +20,7 @@ log = logging.getLogger(__name__)
 FPS_IN = click.FloatRange(*FRAME_RATES)
 """Frame rates that files may have, as :func:`motet.formats.text.frame_rate` takes them."""
 
-FPS = click.FloatRange(0, 10_000, min_open=True)
+FRAME_RATE = click.FloatRange(0, 10_000, min_open=True)
 """Frame rates that a motion is resampled to."""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from motet.cli.reading import FPS
+from motet.cli.reading import FRAME_RATE
 from motet.corpus.sources import Source
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
@@ -102,7 +102,9 @@ def write_options(command: Callable[..., None]) -> Callable[..., None]:
         metavar="CHARACTER",
         help=f"Write this character ({' '.join(BODIES)}) with mesh and materials, and the results as clips in it.",
     )
-    @click.option("--fps", type=FPS, help="Frame rate to write, such as 24, 25, 30 or 60. [default: the result's own]")
+    @click.option(
+        "--fps", type=FRAME_RATE, help="Frame rate to write, such as 24, 25, 30 or 60. [default: the result's own]"
+    )
     @click.option("--in-place", is_flag=True, help="Remove horizontal travel; height and turns stay.")
     @functools.wraps(command)
     def with_output(like: Path | None, onto: Path | None, fps: float | None, in_place: bool, **options: Any) -> None:

@@ -37,7 +37,7 @@ from motet.representation.placed import placed, pose_of, put_at, seen_from, unpl
 from motet.steering.model import SteerModel
 from motet.text.clauses import Passage
 
-REACH = 0.5
+KEY_POSE_SECONDS = 0.5
 """Seconds within which a figure comes to a pose, and leaves it."""
 
 DRIFT = 0.5
@@ -46,7 +46,7 @@ DRIFT = 0.5
 DRAWS = 4
 """The most times that an unsteered motion is drawn."""
 
-FLAT = np.array([1.0, np.nan, 1.0])
+GROUND_PLANE = np.array([1.0, np.nan, 1.0])
 """Multiplies a place: x and z stay, and the height is free."""
 
 GROUND = [0, 2]
@@ -275,7 +275,7 @@ def _moves(motion: Motion) -> Moves:
 def _led_to(moves: Moves, leg: Leg, last: int, at: int, fps: float, text: str) -> Moves:
     """Moves of a text that are led from where they are at one frame to the place of a leg at another."""
     start = moves.root[last]
-    here = {last: Key(place=start * FLAT, facing=moves.facing[last])}
+    here = {last: Key(place=start * GROUND_PLANE, facing=moves.facing[last])}
     # The way over the ground that the motion goes, and the way to the place; NaN without one.
     place = np.full(3, np.nan)
     if leg.place is not None:
@@ -329,7 +329,7 @@ def _through(motion: Motion, poses: Mapping[int, Array]) -> Motion:
         pose_there = unplaced(put_at(seen_from(pose, pose_of(pose[0])), place_of_figure), motion)
         height = np.array([np.nan, pose[0, 1], np.nan])
         keys[at] = Key(dict(enumerate(local_rotations(pose_there)[0])), height, moves.facing[at])
-    moves = moves.through(keys, round(REACH * motion.fps))
+    moves = moves.through(keys, round(KEY_POSE_SECONDS * motion.fps))
     turns = {name: moves.turns[:, joint] for joint, name in enumerate(HUMANOID.names)}
     return posed(motion, turns, {BONES[0]: moves.root}).continuous()
 

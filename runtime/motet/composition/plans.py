@@ -18,23 +18,23 @@ from motet.formats import read_motion
 from motet.motion.motion import Motion, motions_of
 from motet.settings import is_number
 
-LONGEST = 600.0
+LONGEST_COMPOSITION = 600.0
 """Seconds of a composition."""
 
-FARTHEST = 1000.0
+FARTHEST_PLACE = 1000.0
 """Metres from its start, and degrees."""
 
-SHORTEST = 0.3
+SHORTEST_PROMPT = 0.3
 """Seconds of a prompt."""
 
-APART = 0.1 - 1e-9
+MOMENT_SECONDS = 0.1 - 1e-9
 """Seconds from one moment to the next."""
 
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+SIGNED_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 PART = re.compile(
-    rf"(?P<at>{NUMBER})s?(?!\S)(?:\s+at\s+(?P<x>{NUMBER})\s+(?P<z>{NUMBER})(?!\S))?"
-    rf"(?:\s+facing\s+(?P<facing>{NUMBER})(?!\S))?"
-    rf"(?:\s+pose\s+(?P<pose>\S+?)(?:@(?P<pose_at>{NUMBER}))?(?!\S))?(?:\s+(?P<text>.+))?",
+    rf"(?P<at>{SIGNED_NUMBER})s?(?!\S)(?:\s+at\s+(?P<x>{SIGNED_NUMBER})\s+(?P<z>{SIGNED_NUMBER})(?!\S))?"
+    rf"(?:\s+facing\s+(?P<facing>{SIGNED_NUMBER})(?!\S))?"
+    rf"(?:\s+pose\s+(?P<pose>\S+?)(?:@(?P<pose_at>{SIGNED_NUMBER}))?(?!\S))?(?:\s+(?P<text>.+))?",
     re.DOTALL,
 )
 
@@ -69,8 +69,8 @@ class Moment:
             motions_of([self.pose])
         place = self.place
         motion = self.pose
-        if not (is_number(self.at) and 0 <= self.at <= LONGEST):
-            raise SettingError(f"at must be 0 to {LONGEST:g} s, not {self.at!r}")
+        if not (is_number(self.at) and 0 <= self.at <= LONGEST_COMPOSITION):
+            raise SettingError(f"at must be 0 to {LONGEST_COMPOSITION:g} s, not {self.at!r}")
         if self.text is not None and not (isinstance(self.text, str) and self.text.strip()):
             raise SettingError("text must be a prompt")
         if place is not None and not (isinstance(place, Sequence) and len(place) == 2 and all(map(_near, place))):
@@ -82,7 +82,7 @@ class Moment:
 
 
 def _near(value: object) -> bool:
-    return is_number(value) and abs(float(value)) <= FARTHEST  # type: ignore[arg-type]  # a number it is
+    return is_number(value) and abs(float(value)) <= FARTHEST_PLACE  # type: ignore[arg-type]  # a number it is
 
 
 def read_plan(path: str | Path, read: Reader = read_motion) -> list[Moment]:
@@ -146,7 +146,7 @@ def time_line(moments: Sequence[Moment]) -> list[Moment]:
     if len(line) < 2 or line[0].at or line[0].text is None:
         raise SettingError("a plan begins with a prompt at 0 s, and its last moment is its end")
     for number, (before, moment) in enumerate(pairwise(line), start=2):
-        if moment.at - before.at < APART:
+        if moment.at - before.at < MOMENT_SECONDS:
             raise SettingError(
                 f"moment {number} is at {moment.at:g} s, the one before it at {before.at:g} s: times must rise"
             )
@@ -163,5 +163,5 @@ def _check_prompts(line: Sequence[Moment]) -> None:
     prompts = [moment for moment in line if moment.text is not None]
     for prompt, following in pairwise([*prompts, end]):
         seconds = following.at - prompt.at
-        if seconds < SHORTEST:
-            raise SettingError(f"{quoted(str(prompt.text))} has {seconds:.2g} s: a prompt needs {SHORTEST:g}")
+        if seconds < SHORTEST_PROMPT:
+            raise SettingError(f"{quoted(str(prompt.text))} has {seconds:.2g} s: a prompt needs {SHORTEST_PROMPT:g}")

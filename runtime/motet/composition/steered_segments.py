@@ -18,7 +18,15 @@ from motet.steering.pose import Pose
 from motet.steering.session import SteerSession
 from motet.text.clauses import FUNCTION_WORDS, stem
 
-GAITS = {"walk": "walk", "stroll": "walk", "go": "walk", "run": "run", "jog": "run", "skip": "skip", "zombi": "zombie"}
+GAIT_STEMS = {
+    "walk": "walk",
+    "stroll": "walk",
+    "go": "walk",
+    "run": "run",
+    "jog": "run",
+    "skip": "skip",
+    "zombi": "zombie",
+}
 """Stems of words -> the gait that they mean."""
 
 EASY = {stem("forward"), stem("straight"), stem("ahead"), stem("slowly"), stem("quickly"), stem("fast"), stem("like")}
@@ -27,12 +35,12 @@ EASY = {stem("forward"), stem("straight"), stem("ahead"), stem("slowly"), stem("
 GOAL = re.compile(r"\b(to|towards?|into|past|around|across|along)\s+(a|an|the|his|her|their)\s+\w+")
 """The destination in words, which a place replaces."""
 
-BACK = {stem("backward"), stem("backwards")}
+BACKWARD_STEMS = {stem("backward"), stem("backwards")}
 
-STOP = 0.5
+STOPPING_SECONDS = 0.5
 """Seconds in which a figure stops."""
 
-TURN = 0.8
+QUARTER_TURN_SECONDS = 0.8
 """Seconds in which a standing figure turns by 90 degrees."""
 
 START = 0.3
@@ -41,10 +49,10 @@ START = 0.3
 HURRIED = 0.5
 """Share of the time to stop and turn that is needed at least."""
 
-AHEAD = math.radians(30)
+PASSING_ANGLE = math.radians(30)
 """A figure walks on through a place if its facing there is no farther from its way."""
 
-NEAR = 0.05
+ARRIVAL_DISTANCE = 0.05
 """Metres within which a figure is at a place."""
 
 AGAIN = 0.2
@@ -83,10 +91,10 @@ class Walk(NamedTuple):
 def gait_of(text: str, model: SteerModel) -> Gait | None:
     """The gait of a prompt for walking or running and nothing else, such as "a person walks slowly"; else None."""
     words = [stem(word) for word in re.findall(r"\w+", GOAL.sub("", text.lower())) if word not in FUNCTION_WORDS]
-    named = [GAITS[word] for word in words if GAITS.get(word) in model.gaits]
-    if not named or not all(word in GAITS or word in EASY or word in BACK for word in words):
+    named = [GAIT_STEMS[word] for word in words if GAIT_STEMS.get(word) in model.gaits]
+    if not named or not all(word in GAIT_STEMS or word in EASY or word in BACKWARD_STEMS for word in words):
         return None
-    back = not BACK.isdisjoint(words)
+    back = not BACKWARD_STEMS.isdisjoint(words)
     low, usual, ahead, _, backwards = model.abilities.speeds[model.abilities.number(named[-1])].tolist()
     high = backwards if back else ahead
     return Gait(named[-1], min(low, high), min(usual, high), high, back) if high > 0 else None
@@ -138,7 +146,7 @@ def _command(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: A
     distance = float(np.hypot(*gap))
     direction = float(np.arctan2(*gap))
     left -= _pause(walk, leg, direction)
-    if distance < NEAR or left <= 0:
+    if distance < ARRIVAL_DISTANCE or left <= 0:
         session.control(speed=0, facing=None if leg.facing is None else math.degrees(leg.facing))
         return
     speed = float(np.clip(distance / max(left, AGAIN), gait.low, gait.high))
@@ -155,9 +163,9 @@ def _pause(walk: Walk, leg: Leg, way: float) -> float:
     """Seconds that a figure stands at a place: before another act, and to turn; it walks through all others."""
     ahead = way + math.pi * walk.gait.back
     turn = 0.0 if leg.facing is None else abs(float(wrapped(np.array(leg.facing - ahead))))
-    turn = turn if turn > AHEAD else 0.0
+    turn = turn if turn > PASSING_ANGLE else 0.0
     stands = walk.halts and leg is walk.legs[-1]
-    return STOP * (stands or turn > 0) + TURN * turn / (math.pi / 2)
+    return STOPPING_SECONDS * (stands or turn > 0) + QUARTER_TURN_SECONDS * turn / (math.pi / 2)
 
 
 def _check(walk: Walk, ground: Array, fps: float) -> None:
@@ -173,7 +181,7 @@ def _check(walk: Walk, ground: Array, fps: float) -> None:
         starting = START * min(1.0, then - now) if leg is walk.legs[0] else 0.0
         pause = HURRIED * _pause(walk, leg, float(np.arctan2(*gap)))
         need = far / walk.gait.high + pause + starting
-        if far > NEAR and need > then - now:
+        if far > ARRIVAL_DISTANCE and need > then - now:
             raise MotionError(
                 f"{walk.text!r} cannot be at the place of {then:.3g} s in time: {far:.1f} m at up to "
                 f"{walk.gait.high:g} m/s take {need:.1f} s, so be there at {now + need:.1f} s, or go faster"

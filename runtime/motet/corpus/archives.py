@@ -21,10 +21,10 @@ MAX_FILE = 512 << 20
 """Bytes of a file, unpacked."""
 
 MAX_RATIO = 100
-SMALL = 16 << 20
+SMALL_FILE = 16 << 20
 """How many times its packed size a file may be, unpacked, if it is not small; motions as text shrink to a tenth."""
 
-DAMAGE = (
+ARCHIVE_ERRORS = (
     zipfile.BadZipFile,
     zlib.error,
     struct.error,
@@ -63,7 +63,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
             try:
                 file = stack.enter_context(_Bounded(io.FileIO(path)))
                 self._zip = stack.enter_context(zipfile.ZipFile(file))
-            except DAMAGE as error:
+            except ARCHIVE_ERRORS as error:
                 raise FormatError(path, f"not a readable zip file: {error}") from error
             self._open = stack.pop_all()
         members = {info.orig_filename: info for info in self._zip.infolist()}
@@ -82,7 +82,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
         info = self._members.get(name)
         if info is None:
             raise FormatError(shown, "cannot be unpacked: there is no plain file of this name in the zip")
-        limit = min(MAX_FILE, max(SMALL, MAX_RATIO * info.compress_size))
+        limit = min(MAX_FILE, max(SMALL_FILE, MAX_RATIO * info.compress_size))
         too_large = FormatError(
             shown, f"cannot be unpacked: it has more than {limit} bytes, too many for its packed size"
         )
@@ -93,7 +93,7 @@ class ZipFiles(AbstractContextManager["ZipFiles"]):
             place.parent.mkdir(parents=True, exist_ok=True)
             with self._zip.open(info) as packed, place.open("wb") as file:
                 copied = copy_bounded(packed, file, limit)
-        except DAMAGE as error:
+        except ARCHIVE_ERRORS as error:
             raise FormatError(shown, f"cannot be unpacked: {error}") from error
         if not copied:  # the zip announced less
             place.unlink()

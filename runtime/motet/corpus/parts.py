@@ -30,10 +30,10 @@ from motet.jobs import Shard
 if sys.platform != "win32":
     import fcntl
 
-MOST = 10**9
+MOST_ITEMS = 10**9
 """Files and answers that a part may say it is of."""
 
-LARGEST = 3e38
+LARGEST_ELEMENT = 3e38
 """Of a number of a vector: more is none in float32."""
 
 LONGEST_LINE = 64 << 20
@@ -226,7 +226,7 @@ def _head(path: Path) -> dict[str, Any]:
 def _checked_head(line: bytes, path: Path) -> dict[str, Any]:
     head = _parsed(line, path, 1)
     numbers = [head.get(name) for name in ("files", "answers")]
-    counted = all(type(number) is int and 0 <= number <= MOST for number in numbers)
+    counted = all(type(number) is int and 0 <= number <= MOST_ITEMS for number in numbers)
     try:
         if not counted or not isinstance(head.get("verb"), str):
             raise ValueError("it does not say its verb, and how many files and answers it is of")
@@ -357,7 +357,7 @@ def _write_vectors(parts: Sequence[Path], out: Path) -> int:
     count = 0
     for answer, vector in _vectors(parts):
         first = first or vector
-        numbers = all(isinstance(value, int | float) and abs(value) <= LARGEST for value in vector)
+        numbers = all(isinstance(value, int | float) and abs(value) <= LARGEST_ELEMENT for value in vector)
         if not numbers or len(vector) != len(first):
             raise FormatError(answer["input"], f"its vector is not of {len(first)} numbers: run its command again")
         count += 1

@@ -30,7 +30,7 @@ INKS = np.array([(168, 179, 198), COLOURS[LEFT], COLOURS[RIGHT], COLOURS[MIDDLE]
 
 BANDS = {"left": LEFT_PART, "right": RIGHT_PART}
 
-TRUNK = (
+TRUNK_RINGS = (
     (0.855, 0.086, 0.845, -0.106, 0.174, 0.0),
     (0.905, 0.090, 0.900, -0.118, 0.174, 0.0),
     (0.955, 0.096, 0.960, -0.114, 0.168, 0.0),
@@ -54,7 +54,7 @@ TRUNK = (
 """Of each ring its height and place in front, those behind, half its width, and where its middle is from side to side:
 from the crotch to the crown."""
 
-LEG = (
+LEG_RINGS = (
     (0.775, 0.084, 0.775, -0.090, 0.084, 0.091),
     (0.640, 0.069, 0.640, -0.069, 0.068, 0.091),
     (0.540, 0.058, 0.540, -0.052, 0.055, 0.090),
@@ -70,7 +70,7 @@ LEG = (
 )
 """As of the trunk, of the left leg from the thigh to the toes."""
 
-ARM = (
+ARM_RINGS = (
     (0.045, 0.054, -0.046, 0.056, -0.056),
     (0.110, 0.050, -0.048, 0.052, -0.050),
     (0.195, 0.044, -0.044, 0.044, -0.046),
@@ -97,7 +97,7 @@ class Finger(NamedTuple):
     curl: tuple[float, float]
 
 
-FINGERS = (
+FINGER_SHAPES = (
     Finger((0.588, -0.003, 0.011), 0.130, 0.0102, 1.0, (8.0, 14.0)),
     Finger((0.588, -0.003, 0.030), 0.119, 0.0100, 3.0, (7.0, 12.0)),
     Finger((0.586, -0.003, -0.009), 0.121, 0.0098, -2.0, (9.0, 16.0)),
@@ -109,8 +109,8 @@ FINGERS = (
 PHALANGES = ((0.0, 1.0), (0.45, 1.06), (0.74, 0.95), (0.94, 0.74), (1.0, 0.3))
 """Of each ring of a finger how far along it is, and how much of the radius it has."""
 
-AROUND = 24
-AROUND_FINGER = 6
+RING_CORNERS = 24
+FINGER_RING_CORNERS = 6
 """Corners of the trunk's rings, the first in front, and of fingers'. Limbs have 16."""
 
 HOLE_ROW = 12
@@ -121,14 +121,16 @@ HOLE = 4
 BRIDGE = np.array([(0.22, -0.018), (0.48, -0.026), (0.74, -0.020)])
 """Of corners from the trunk's lowest ring in front to the one behind how far along they are, and how far above."""
 
-SLOPE = np.radians(50.0)
+ARM_SLOPE = np.radians(50.0)
 """How far arms hang as they are shaped."""
 
 SHOULDER = T_POSE[HUMANOID.index("leftUpperArm")]
-DOWN_ARM = np.array([[np.cos(SLOPE), -np.sin(SLOPE), 0.0], [np.sin(SLOPE), np.cos(SLOPE), 0.0], [0.0, 0.0, 1.0]])
+DOWN_ARM = np.array(
+    [[np.cos(ARM_SLOPE), -np.sin(ARM_SLOPE), 0.0], [np.sin(ARM_SLOPE), np.cos(ARM_SLOPE), 0.0], [0.0, 0.0, 1.0]]
+)
 """The axes of the left arm as it is shaped: along it, over it, and in front."""
 
-SPINE = ("hips", "spine", "chest", "upperChest", "neck", "head")
+TRUNK_JOINTS = ("hips", "spine", "chest", "upperChest", "neck", "head")
 
 Numbers = NDArray[np.intp]
 
@@ -140,7 +142,7 @@ BAND = 0.025
 COARSE_PATCHES = 5
 """Of the coarsest body: trunk, legs and arms without fingers."""
 
-SMOOTH = 6
+SMOOTHING_ROUNDS = 6
 """How often weights even out between neighbours."""
 
 
@@ -214,7 +216,7 @@ def _whole() -> tuple[Mesh, list[Patch]]:
     corners = Corners()
     patches = _patches(corners)
     triangles = np.concatenate([patch_triangles(patch.grid, patch.is_drawn, patch.closes) for patch in patches])
-    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], SMOOTH)
+    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], SMOOTHING_ROUNDS)
     return _with_arms_up(Mesh(corners.places, triangles, joints, weights, corners.parts)), patches
 
 
@@ -225,20 +227,20 @@ def _patches(corners: Corners) -> list[Patch]:
     arm = _arm(corners.places[_shoulder(trunk)])
     patches = [Patch(trunk, _without_holes(trunk), (False, True))]
     for side in LEFT_RIGHT:
-        on_side = trunk if side == "left" else trunk[:, -np.arange(AROUND)]
+        on_side = trunk if side == "left" else trunk[:, -np.arange(RING_CORNERS)]
         patches.append(_limb(corners, leg, side, _hip(on_side)))
         patches.append(_limb(corners, arm, side, _shoulder(on_side)))
-    for finger in map(_finger, FINGERS):
+    for finger in map(_finger, FINGER_SHAPES):
         patches += [_limb(corners, finger, side) for side in LEFT_RIGHT]
     return patches
 
 
 def _trunk(corners: Corners) -> Numbers:
     """Number the trunk's rings (R, C), and after them a bridge from front to back through the crotch."""
-    rings = smoothed(_spanned(TRUNK, *ring(AROUND, 2.3).T))
+    rings = smoothed(_spanned(TRUNK_RINGS, *ring(RING_CORNERS, 2.3).T))
     trunk = corners.add(rings, _bones_of_trunk(rings), np.array(BODY))
     front = rings[0, 0]
-    bridge = front + BRIDGE[:, :1] * (rings[0, AROUND // 2] - front) + BRIDGE[:, 1:] * [0.0, 1.0, 0.0]
+    bridge = front + BRIDGE[:, :1] * (rings[0, RING_CORNERS // 2] - front) + BRIDGE[:, 1:] * [0.0, 1.0, 0.0]
     corners.add(bridge[None], np.array(HUMANOID.index("hips")), np.array(BODY))
     return trunk
 
@@ -267,7 +269,7 @@ def _spanned(table: Sequence[Sequence[float]], front: Array, left: Array) -> Arr
 
 def _bones_of_trunk(rings: Array) -> Numbers:
     """The joint of each corner (R, C): by its ring's height one of the spine, beside it a collar bone or a leg."""
-    spine = np.array([HUMANOID.index(name) for name in SPINE])
+    spine = np.array([HUMANOID.index(name) for name in TRUNK_JOINTS])
     on_spine = np.searchsorted(T_POSE[spine[1:], 1], rings[..., 1].mean(axis=1), "right")
     bones = np.repeat(spine[on_spine][:, None], rings.shape[1], axis=1)
     x, y, _ = np.moveaxis(rings, -1, 0)
@@ -279,7 +281,7 @@ def _bones_of_trunk(rings: Array) -> Numbers:
 
 def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
     """Which squares of the trunk are drawn."""
-    is_drawn = np.full((len(trunk) - 1, AROUND), True)
+    is_drawn = np.full((len(trunk) - 1, RING_CORNERS), True)
     for column in HOLE_COLUMNS:
         is_drawn[HOLE_ROW : HOLE_ROW + HOLE, column : column + HOLE] = False
     return is_drawn
@@ -287,7 +289,7 @@ def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
 
 def _hip(trunk: Numbers) -> Numbers:
     """Corners (16,) that a left leg begins with: half of the lowest ring from the back, and the bridge."""
-    return np.append(trunk[0, AROUND // 2 :: -1], trunk.size + np.arange(len(BRIDGE)))
+    return np.append(trunk[0, RING_CORNERS // 2 :: -1], trunk.size + np.arange(len(BRIDGE)))
 
 
 def _shoulder(trunk: Numbers) -> Numbers:
@@ -299,7 +301,7 @@ def _shoulder(trunk: Numbers) -> Numbers:
 def _leg(start: Array) -> Limb:
     """The leg from corners (16, 3) of the trunk on: its rings begin behind, and go round by the outer side."""
     outline = np.roll(ring(len(start), 2.2), 6, axis=0)
-    rings = smoothed(np.concatenate([start[None], _spanned(LEG, outline[:, 1], outline[:, 0])]))[1:]
+    rings = smoothed(np.concatenate([start[None], _spanned(LEG_RINGS, outline[:, 1], outline[:, 0])]))[1:]
     _, height, ahead = rings.mean(axis=1).T
     bones = np.array(["UpperLeg", "LowerLeg", "Foot"])[np.searchsorted([-0.5, -0.08], -height)]
     bones[ahead > 0.13] = "Toes"
@@ -309,7 +311,7 @@ def _leg(start: Array) -> Limb:
 def _arm(start: Array) -> Limb:
     """The arm and the palm from corners (16, 3) of the trunk on: its rings begin behind, and go round over the top."""
     up, ahead = np.roll(ring(len(start), 2.2), 2, axis=0).T
-    along, over, under, front, back = np.array(ARM).T[..., None]
+    along, over, under, front, back = np.array(ARM_RINGS).T[..., None]
     height = np.where(up > 0, over, -under) * up
     depth = np.where(ahead > 0, front, -back) * ahead
     rings = _hanging(np.stack(np.broadcast_arrays(along, height, depth), axis=-1))
@@ -340,7 +342,7 @@ def _finger(finger: Finger) -> Limb:
 
 def _rings_around(middles: Array, upward: Array, sideways: Array, radii: Array) -> Array:
     """Rings (R, 6, 3) around middles (R, 3) in planes that two axes (R, 3) and (3,) span, with radii (R, 1)."""
-    up, side = ring(AROUND_FINGER).T[..., None]
+    up, side = ring(FINGER_RING_CORNERS).T[..., None]
     rings: Array = middles[:, None] + radii[:, None] * (up * upward[:, None] + side * sideways)
     return rings
 

@@ -20,9 +20,9 @@ from motet.motion.rotations import Array
 
 Colour = tuple[int, int, int]
 
-BACK = (232, 235, 241)
-LINES = (150, 158, 176)
-SHADE = (166, 172, 186)
+BACKGROUND = (232, 235, 241)
+GRID_COLOUR = (150, 158, 176)
+SHADOW_COLOUR = (166, 172, 186)
 
 DRAWN_LARGER = 3
 """Pictures are drawn larger by this factor and scaled down, for smooth edges."""
@@ -72,12 +72,12 @@ class Stage:
 
     def picture(self, mesh: Mesh, corners: Array, target: Array) -> Image.Image:
         """A mesh with corners (V, 3), in heights, and the camera at ``target`` (x, z) on the ground."""
-        image = Image.new("RGB", (self.pixels, self.pixels), BACK)
+        image = Image.new("RGB", (self.pixels, self.pixels), BACKGROUND)
         draw = ImageDraw.Draw(image)
         local = corners - [target[0], 0.0, target[1]]
         self._draw_ground(draw, target)
         normals = normals_of(corners, mesh.triangles)[mesh.triangles[:, 0]]
-        image.paste(SHADE, mask=self._shadow(local[mesh.triangles[normals @ SUN > -0.3]]))
+        image.paste(SHADOW_COLOUR, mask=self._shadow(local[mesh.triangles[normals @ SUN > -0.3]]))
         self._draw_body(draw, mesh, corners, *self._seen(local))
         return image.resize((self.size, self.size), Image.Resampling.BOX)
 
@@ -116,7 +116,7 @@ class Stage:
         """A line through places (N, 3), each piece of it as dark as its share (N - 1,) of 1."""
         pixels = self._seen(line)[0].tolist()
         for start, end, share in zip(pixels[:-1], pixels[1:], shares.tolist(), strict=True):
-            draw.line([*start, *end], fill=_mixed(BACK, LINES, share), width=DRAWN_LARGER - 1)
+            draw.line([*start, *end], fill=_mixed(BACKGROUND, GRID_COLOUR, share), width=DRAWN_LARGER - 1)
 
     def _shadow(self, triangles: Array) -> Image.Image:
         """How much of a shadow of triangles (F, 3, 3) there is at each pixel."""

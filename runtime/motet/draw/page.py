@@ -30,7 +30,7 @@ from motet.motion.rotations import Array, rotmat_to_quat
 COARSER = (1, 2)
 """Levels of coarser bodies of people."""
 
-SHORT = 32767
+LARGEST_INT16 = 32767
 """The largest int16."""
 
 SCOPE = "const openStage = (() => {{\n{}\nreturn openStage;\n}})();"
@@ -102,13 +102,13 @@ def _turns_data(turns: Array) -> dict[str, Any]:
     """The joints that turn, and their quaternions."""
     turning = np.abs(turns - np.eye(3)).max(axis=(0, 2, 3)) >= 1e-6
     quaternions = rotmat_to_quat(turns[:, turning])
-    return {"turning": np.flatnonzero(turning).tolist(), "turns": _text(np.round(quaternions * SHORT), "<i2")}
+    return {"turning": np.flatnonzero(turning).tolist(), "turns": _text(np.round(quaternions * LARGEST_INT16), "<i2")}
 
 
 def _moves_data(moves: Array) -> dict[str, Any]:
     """The joints that move in their parents' frames, and their places there in steps."""
     moving = np.flatnonzero(np.ptp(moves[:, 1:], axis=0).max(axis=-1) > 1e-5) + 1
-    step = float(max(1e-4, np.abs(moves[:, moving]).max(initial=0) / SHORT))
+    step = float(max(1e-4, np.abs(moves[:, moving]).max(initial=0) / LARGEST_INT16))
     return {"step": step, "moving": moving.tolist(), "moves": _text(np.round(moves[:, moving] / step), "<i2")}
 
 
@@ -126,7 +126,7 @@ def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
 
 
 def _mesh_data(mesh: Mesh) -> dict[str, Any]:
-    step = float(np.abs(mesh.places).max() / SHORT)
+    step = float(np.abs(mesh.places).max() / LARGEST_INT16)
     return {
         "step": step,
         "places": _text(np.round(mesh.places / step), "<i2"),

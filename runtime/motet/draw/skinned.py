@@ -21,9 +21,14 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, angle_of, product, rotated, unit
 from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
 
-PARTS = {LEFT: LEFT_PART, RIGHT: RIGHT_PART, MIDDLE: MIDDLE_PART}
+PART_OF_SIDE = {LEFT: LEFT_PART, RIGHT: RIGHT_PART, MIDDLE: MIDDLE_PART}
 
-LIMBS = (("UpperArm", "LowerArm", 0), ("LowerArm", "Hand", 0), ("UpperLeg", "LowerLeg", 1), ("LowerLeg", "Foot", 1))
+BONE_ENDS = (
+    ("UpperArm", "LowerArm", 0),
+    ("LowerArm", "Hand", 0),
+    ("UpperLeg", "LowerLeg", 1),
+    ("LowerLeg", "Foot", 1),
+)
 """Bones that have lengths of their own: where each ends, and along which axis of its joint."""
 
 WIDTHS = {"UpperLeg": ("hips",), "UpperArm": ("upperChest", "leftShoulder", "rightShoulder")}
@@ -108,7 +113,7 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     body = figure.fitted.body
     places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
     scales = np.ones((len(HUMANOID.joints), 3))
-    for bone, end, axis in LIMBS:
+    for bone, end, axis in BONE_ENDS:
         for side in LEFT_RIGHT:
             if sided(side, end) in body.joints:
                 ratio = _length_ratio(places, body.joints, sided(side, bone), sided(side, end))
@@ -178,7 +183,7 @@ def _capsule(bone: Bone, rest: Array, end_carrier: int, corners: int = 10) -> Me
     radii = np.repeat([bone.start_radius, bone.end_radius], 3)[:, None, None]
     places, triangles = loft(middles + radii * _unit_rings(rest[bone.end] - rest[bone.start], corners))
     carriers = np.repeat([bone.carriers[0], end_carrier], 3 * corners)
-    parts = np.full(len(places), PARTS[bone.side])
+    parts = np.full(len(places), PART_OF_SIDE[bone.side])
     return Mesh(places, triangles, carriers[:, None], np.ones((len(places), 1)), parts)
 
 

@@ -16,9 +16,9 @@ from motet.motion.rotations import Array, unit
 SUN = unit(np.array([0.42, 1.0, 0.5]))
 """Towards the sun."""
 
-WIDE = 110
-TALL = 190
-APART = 0.75
+POSE_WIDTH = 110
+POSE_HEIGHT = 190
+POSE_SPACING = 0.75
 """Pixels of a pose, and heights from one to the next."""
 
 
@@ -34,7 +34,7 @@ class Shape(NamedTuple):
 def strip(motion: Motion, poses: int = 5) -> str:
     """The SVG of a motion in some of its poses, from its first frame to its last. MotionError as of the page."""
     drawn = [_drawn(shape, number) for number, shape in enumerate(shapes(motion, poses))]
-    return f'<svg viewBox="0 0 {WIDE * poses} {TALL}" xmlns="http://www.w3.org/2000/svg">{"".join(drawn)}</svg>'
+    return f'<svg viewBox="0 0 {POSE_WIDTH * poses} {POSE_HEIGHT}" xmlns="http://www.w3.org/2000/svg">{"".join(drawn)}</svg>'
 
 
 def shapes(motion: Motion, poses: int) -> Iterator[Shape]:
@@ -73,8 +73,8 @@ def lit(mesh: Mesh, corners: Array) -> Array:
 
 def _drawn(shape: Shape, number: int) -> str:
     """A pose of the strip by its number, after its shadow."""
-    origin = [WIDE * (number + 0.5), TALL - 14]
-    scale = WIDE / APART * np.array([1, -1])
+    origin = [POSE_WIDTH * (number + 0.5), POSE_HEIGHT - 14]
+    scale = POSE_WIDTH / POSE_SPACING * np.array([1, -1])
     shadow = "".join(_paths(origin + scale * shape.shadow))
     body = []
     for path, ink in zip(_paths(origin + scale * shape.triangles), shape.inks.astype(np.uint8), strict=True):

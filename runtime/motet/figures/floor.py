@@ -21,7 +21,7 @@ THICKNESS = {
 }
 """Metres from a joint to the skin, less than most people's: nobody who touches the floor is to float over it."""
 
-LIMBS = ("LowerArm", "Hand", "Foot", "Toes", "Hand_end", "Toes_end")
+LIMB_ENDS = ("LowerArm", "Hand", "Foot", "Toes", "Hand_end", "Toes_end")
 """Ends of the names of joints that are turned upwards about the joint before; the rest is lifted as a whole."""
 
 TOLERATED = 0.015
@@ -45,7 +45,7 @@ def above_floor(motion: Motion) -> Motion:
     places = np.array(places)
     reach = SOFT * motion.fps
     thickness = _thickness()
-    limbs = [joint for joint, name in enumerate(HUMANOID.names) if name.endswith(LIMBS)]
+    limbs = [joint for joint, name in enumerate(HUMANOID.names) if name.endswith(LIMB_ENDS)]
 
     # the whole body rises until all but the limbs is above the floor
     body = np.setdiff1d(np.arange(len(thickness)), limbs)
@@ -65,7 +65,7 @@ def _thickness() -> Array:
     thickness = []
     for name in HUMANOID.names:
         skin = THICKNESS.get(name.removeprefix("left").removeprefix("right"), 0.0)
-        thickness.append(skin - TOLERATED if name.endswith(LIMBS[:4]) else skin)
+        thickness.append(skin - TOLERATED if name.endswith(LIMB_ENDS[:4]) else skin)
     return np.array(thickness)
 
 

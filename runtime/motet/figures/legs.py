@@ -27,7 +27,7 @@ _LEG_NAMES = limb_of("left", LEG) + limb_of("right", LEG)
 LEG_BONES = np.array([BONES.index(name) for name in _LEG_NAMES]).reshape(2, 4)
 """Bones (2, 4) of both legs among the humanoid's."""
 
-OFFSETS: NDArray[Any] = HUMANOID.offsets[[HUMANOID.index(name) for name in _LEG_NAMES]].reshape(2, 4, 3)
+LEG_OFFSETS: NDArray[Any] = HUMANOID.offsets[[HUMANOID.index(name) for name in _LEG_NAMES]].reshape(2, 4, 3)
 """Where they begin in their parents' frames (2, 4, 3), the hips' for the first."""
 
 
@@ -43,7 +43,7 @@ class Limb(NamedTuple):
 def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
     """The left and the right leg of one character, or the legs of all as one; of poses' rotations and contacts."""
     if len(rotations) == 1:
-        for bones, offsets, contact in zip(LEG_BONES, OFFSETS.tolist(), contacts[0].tolist(), strict=True):
+        for bones, offsets, contact in zip(LEG_BONES, LEG_OFFSETS.tolist(), contacts[0].tolist(), strict=True):
             yield Limb(rotations[0, bones].tolist(), offsets, contact)
     else:
         local = np.array(
@@ -51,7 +51,7 @@ def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
             dtype=np.float64,
             order="C",
         )
-        offsets = OFFSETS.transpose(1, 2, 0)[..., None]
+        offsets = LEG_OFFSETS.transpose(1, 2, 0)[..., None]
         yield Limb(
             [tuple(quats) for quats in local],
             [tuple(offset) for offset in offsets],

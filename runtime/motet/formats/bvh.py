@@ -25,7 +25,7 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
 
-CHANNELS = {f"{axis}position": f"t{axis}" for axis in "xyz"} | {f"{axis}rotation": f"r{axis}" for axis in "xyz"}
+CHANNEL_NAMES = {f"{axis}position": f"t{axis}" for axis in "xyz"} | {f"{axis}rotation": f"r{axis}" for axis in "xyz"}
 """Channels in small letters -> their names in a motion."""
 
 MOST_EMPTY_FRAMES = 10**7
@@ -211,10 +211,10 @@ def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
     """The channels after their count, as "tx" ... "rz"; FormatError for others, or another count."""
     channels = []
     for word in words[1:]:
-        if word.lower() not in CHANNELS:
+        if word.lower() not in CHANNEL_NAMES:
             expected = "expected one of Xposition ... Zposition, Xrotation ... Zrotation"
             raise FormatError(path, f"channel {quoted(word)}: {expected}", line)
-        channels.append(CHANNELS[word.lower()])
+        channels.append(CHANNEL_NAMES[word.lower()])
     if words[:1] != [str(len(channels))] or len(set(channels)) < len(channels):
         reason = f"CHANNELS needs a count and that many different channels, not {quoted(' '.join(words))}"
         raise FormatError(path, reason, line)

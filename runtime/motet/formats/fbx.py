@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 Takes = list[tuple[str, set[int]]]
 """The names of takes, and the nodes that each moves."""
 
-PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
+FBX_PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
 
 FBX_MAX_BYTES = 2**29
 FBX_SECONDS = 600
@@ -91,7 +91,7 @@ def as_gltf(file: File, take: int | None = None) -> BytesIO:
     if find_spec("ufbx") is None:
         raise FormatError(path, "FBX files need the package ufbx: install the extra with  pip install 'motet[fbx]'")
     # a process of its own, since untrusted files may crash ufbx
-    command = [sys.executable, "-P", str(PROGRAM), "-1" if take is None else str(take)]
+    command = [sys.executable, "-P", str(FBX_PROGRAM), "-1" if take is None else str(take)]
     try:
         done = subprocess.run(command, input=content, capture_output=True, timeout=FBX_SECONDS, check=False)
     except subprocess.TimeoutExpired as error:

@@ -36,12 +36,12 @@ Matrix = Sequence[Vector]
 Json = dict[str, Any]
 """A JSON object."""
 
-KEPT: list[Any] = []
+CALLBACKS: list[Any] = []
 
 
 def keep(thing: Any) -> Any:
     """An object of ufbx, which must not be freed."""
-    KEPT.append(thing)
+    CALLBACKS.append(thing)
     return thing
 
 

@@ -37,7 +37,7 @@ INDICES = 34963
 """glTF's buffer targets."""
 
 CODES = {dtype: code for code, dtype in COMPONENTS.items()}
-TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+ELEMENT_TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 """glTF's numbers for dtypes, and its names for the shapes of an accessor's elements."""
 
 Track = tuple[int, str, Array]
@@ -77,7 +77,7 @@ class Buffer:
             "bufferView": len(self.views) - 1,
             "componentType": CODES[dtype],
             "count": len(content),
-            "type": TYPES[content.shape[1:]],
+            "type": ELEMENT_TYPES[content.shape[1:]],
         }
         if normalized:
             accessor["normalized"] = True

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from motet.errors import FormatError, MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
 from motet.files import File, place_of
-from motet.formats.gltf_data import REST, Gltf, Json, Tracks, broken, parse
+from motet.formats.gltf_data import REST_TRANSFORM, Gltf, Json, Tracks, broken, parse
 from motet.formats.text import (
     Clip,
     Contents,
@@ -435,7 +435,7 @@ def _channels(animation: Json) -> Iterator[tuple[Json, int, str]]:
     for channel in animation.get("channels", []):
         node = channel["target"].get("node")
         path = channel["target"].get("path")
-        if path in REST and node is not None:
+        if path in REST_TRANSFORM and node is not None:
             yield channel, node, path
 
 
@@ -481,7 +481,7 @@ def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
         values = gltf.array(sampler["output"])
         interpolation = sampler.get("interpolation", "LINEAR")
         expected = times.size * (3 if interpolation == "CUBICSPLINE" else 1)  # a spline's keys have tangents
-        if values.size != expected * len(REST[path]):
+        if values.size != expected * len(REST_TRANSFORM[path]):
             counts = f"{times.size} times and {len(values)} values, not {expected},"
             track = f"the {path} of {quoted(gltf.name(node))}"
             raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {track}: export it again")
@@ -524,7 +524,9 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
 
     Beyond the first and last key the value stays (glTF 2.0, section 3.11 and appendix C).
     """
-    values = values.reshape(len(times), -1, len(REST[name]))  # a key of a spline: in-tangent, value, out-tangent
+    values = values.reshape(
+        len(times), -1, len(REST_TRANSFORM[name])
+    )  # a key of a spline: in-tangent, value, out-tangent
     before, after = _keys_around(times, frames)
     span = np.maximum(times[after] - times[before], 1e-9)[:, None]
     share = np.clip((frames - times[before])[:, None] / span, 0, 1)

@@ -40,7 +40,7 @@ Json = dict[str, Any]
 Tracks = Mapping[tuple[int, str], Array]
 """(Node, "translation", "rotation" or "scale") -> values (T, 3 or 4)."""
 
-REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
+REST_TRANSFORM = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 """The parts of a node's transform, and what they are where a file does not say."""
 
 
@@ -130,7 +130,7 @@ class Gltf:
             scale = np.linalg.norm(matrix[:3, :3], axis=0)
             turn = rotmat_to_quat(matrix[:3, :3] / np.where(scale > 0, scale, 1.0))
             return {"translation": matrix[:3, 3], "rotation": turn, "scale": scale}
-        return {name: np.array(properties.get(name, values), np.float64) for name, values in REST.items()}
+        return {name: np.array(properties.get(name, values), np.float64) for name, values in REST_TRANSFORM.items()}
 
     def world(self, nodes: Iterable[int] | None = None, tracks: Tracks | None = None) -> tuple[Array, Array, Array]:
         """Linear maps and rotations (T, N, 3, 3) and positions (T, N, 3) of nodes in the world, at rest (T = 1) or

@@ -18,14 +18,14 @@ from motet.formats.text import frame_rate, numbers, read_bytes
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-MAX_DEPTH = 64
+MAX_NESTING = 64
 MAX_ELEMENTS = 10**5
 """Elements inside each other, MMM has seven; and before a frame ends, of which JointOrder has one per joint."""
 
 PIECE = 2**20
 """Bytes that are parsed at once: the parser restarts on a longer token, so few large pieces are fast."""
 
-KEPT = frozenset({"JointOrder", "MotionFrame"})
+READ_ELEMENTS = frozenset({"JointOrder", "MotionFrame"})
 """Elements of which all is read, at their end."""
 
 
@@ -131,19 +131,19 @@ class _Opened:
         """Count an element that begins or ends; FormatError for too many inside each other, or before a frame ends."""
         if event == "end":
             self._elements.pop()
-            self._since = 0 if element.tag in KEPT else self._since
+            self._since = 0 if element.tag in READ_ELEMENTS else self._since
             return
         self._elements.append(element)
         self._since += 1
-        if len(self._elements) > MAX_DEPTH:
-            raise FormatError(self._path, f"over {MAX_DEPTH} elements inside each other")
+        if len(self._elements) > MAX_NESTING:
+            raise FormatError(self._path, f"over {MAX_NESTING} elements inside each other")
         if self._since > MAX_ELEMENTS:
             raise FormatError(self._path, f"over {MAX_ELEMENTS} elements before a frame")
 
     def empty(self) -> None:
         """Drop what is in them, of the outer ones."""
         for element in self._elements:
-            if element.tag in KEPT:
+            if element.tag in READ_ELEMENTS:
                 return
             del element[:]
 

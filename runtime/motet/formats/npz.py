@@ -73,7 +73,7 @@ AMASS_JOINTS = tuple(_joints_of_table())
 ROTATIONS = (("poses",), ("root_orient", "pose_body"), ("global_orient", "body_pose"))
 """Arrays that hold the rotations of SMPL's joints, one kind or another."""
 
-RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
+RATE_ARRAYS = ("mocap_framerate", "mocap_frame_rate", "fps")
 """Arrays that hold the frame rate of SMPL's, one or another."""
 
 
@@ -138,7 +138,7 @@ def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 ARRAYS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
 """motet's arrays, and of each the kinds of dtypes that it may have."""
 
-OTHERS = {
+UNSUPPORTED_ARRAYS = {
     "posed_joints": "Kimodo's npz, which has no skeleton: convert it to BVH with its own kimodo_convert",
     "body_pos_w": "a robot's motion for training controllers, not a human's",
     "dof_pos": "the motor angles of a robot, not a human's motion",
@@ -150,7 +150,7 @@ OTHERS = {
 
 
 def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
-    for name, kind in OTHERS.items():
+    for name, kind in UNSUPPORTED_ARRAYS.items():
         if name in names and not names >= ARRAYS.keys():
             raise FormatError(path, f"this is {kind}; expected a motion from motet, AMASS or other SMPL bodies")
     values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in ARRAYS.items())
@@ -209,13 +209,15 @@ def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames:
 
 def _rate(path: Path, archive: zipfile.ZipFile, names: set[str], fps: float | None) -> float:
     """The frame rate that a file states, or else the one that was given."""
-    name = next(filter(names.__contains__, RATES), None)
+    name = next(filter(names.__contains__, RATE_ARRAYS), None)
     if name is not None:
         stated = frame_rate(float(array(archive, name, "fiu")), path)
         check_rate(path, stated, fps)
         return stated
     if fps is None:
-        raise FormatError(path, f"no frame rate, as an array {' or '.join(RATES)}: give it by --fps-in, in Python fps=")
+        raise FormatError(
+            path, f"no frame rate, as an array {' or '.join(RATE_ARRAYS)}: give it by --fps-in, in Python fps="
+        )
     return frame_rate(fps, path)
 
 

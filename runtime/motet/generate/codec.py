@@ -18,7 +18,7 @@ from motet.decode.loop import Ids
 from motet.motion.rotations import Array
 from motet.motion.springs import Inertializer
 
-REACH = 0.5
+RADIAN_METRES = 0.5
 """Metres that count as much as a radian where moves are compared."""
 
 
@@ -67,7 +67,7 @@ def nearest_moves(poses: Array, book: Array) -> tuple[NDArray[np.int64], Array]:
 
     The way starts at the first pose; each entry is the one that leads nearest to the next pose from where the way is.
     """
-    scale = np.array([1.0, 1.0, REACH])
+    scale = np.array([1.0, 1.0, RADIAN_METRES])
     way = [poses[..., 0, :]]
     entries = []
     for place in range(1, poses.shape[-2]):
@@ -79,7 +79,7 @@ def nearest_moves(poses: Array, book: Array) -> tuple[NDArray[np.int64], Array]:
     return np.stack(entries, axis=-1), np.stack(way, axis=-2)
 
 
-PATH = 3
+PATH_CHANNELS = 3
 """Of the decoder's channels the first: the root's forward, left and turn, seen from where the moves have led."""
 
 
@@ -131,7 +131,9 @@ class Codec:
         """Steps of codes (N, P) int64 of frames (T, D) in the contract's units; T is a multiple of a step's frames."""
         steps = frames.reshape(-1, self.field.hop, frames.shape[1]).astype(np.float32)
         body = self.tokens({"frames": np.stack([steps, steps])})["codes"][0]
-        poses = way_of(np.zeros(PATH), np.concatenate([frames[:, :PATH], frames[-1:, :PATH]]) / self.fps)[1:]
+        poses = way_of(
+            np.zeros(PATH_CHANNELS), np.concatenate([frames[:, :PATH_CHANNELS], frames[-1:, :PATH_CHANNELS]]) / self.fps
+        )[1:]
         moves, _ = nearest_moves(poses[:: self.field.hop], self.book)
         return np.concatenate([moves[:, None], body], axis=1)
 
@@ -160,7 +162,7 @@ class Inertialization:
         self.inertializer = Inertializer(half_life)
         offset_before, self.offset = last_frames - decoded
         self.offset_rate = (self.offset - offset_before) * fps
-        self.offset_rate[:PATH] = 0
+        self.offset_rate[:PATH_CHANNELS] = 0
 
     def __call__(self, frames: Array) -> Array:
         """The next frames (T, D), with the offset."""
@@ -184,7 +186,7 @@ class StreamingDecoder:
         self.last_frames = None if context is None else context.frames[-2:]  # of the motion to be joined
         self.count = max(0, len(self.codes) - 1)  # steps whose frames are out; the context's last is joined
         self.way = np.zeros((1, 3))
-        self.pose = np.zeros((0, PATH))
+        self.pose = np.zeros((0, PATH_CHANNELS))
         self.join: Inertialization | None = None
 
     def push(self, steps: Ids) -> Array:
@@ -212,8 +214,8 @@ class StreamingDecoder:
         self.count = until
         # The root, which the decoder gives as seen from the way, as rates.
         frames = frames[new]
-        rates = self._rates(moves[new], frames[..., :PATH])
-        body = frames.reshape(len(rates), -1)[:, PATH:]
+        rates = self._rates(moves[new], frames[..., :PATH_CHANNELS])
+        body = frames.reshape(len(rates), -1)[:, PATH_CHANNELS:]
         return self._joined(np.concatenate([rates, body], axis=1))
 
     def _joined(self, frames: Array) -> Array:
@@ -230,7 +232,7 @@ class StreamingDecoder:
         """The root's rates (T, 3) a second in frames (N, T / N, 3) seen from the way by moves (N, 3)."""
         way = way_of(self.way[-1], moves)
         self.way = way[-1:]
-        poses = moved(way[:-1, None], root).reshape(-1, PATH)
+        poses = moved(way[:-1, None], root).reshape(-1, PATH_CHANNELS)
         earlier = self.pose if len(self.pose) else poses[:1]
         rates = seen_from(np.concatenate([earlier, poses[:-1]]), poses) * self.codec.fps
         if not len(self.pose):

@@ -26,7 +26,7 @@ from motet.representation.root_block import last_place
 from motet.representation.root_sixd import facing, in_world
 from motet.settings import Progress, silent
 
-RATES = 3  # channels of the root that scale with the tempo
+VELOCITY_CHANNELS = 3  # channels of the root that scale with the tempo
 
 
 class Continuation:
@@ -54,7 +54,7 @@ class Continuation:
         x, _, z = last_place(self.figure)
         self.pose = np.array([x, z, facing(figure)[end - 1]])
         # The pace of the last recorded seconds.
-        recent = self.context.frames[: self.recorded, :RATES][-round(self.rules.pace_seen * model.fps) :]
+        recent = self.context.frames[: self.recorded, :VELOCITY_CHANNELS][-round(self.rules.pace_seen * model.fps) :]
         self.pace = Pace.of(recent, model.fps, self.rules)
 
     def follow(self, count: int, seed: int) -> tuple[Motion, Motion]:
@@ -147,13 +147,13 @@ def paced(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) ->
     played = np.column_stack([np.interp(at, times, column) for column in frames.T])
     # What is played faster is faster over the ground.
     if last:
-        played[:, :RATES] *= np.interp(at, times[1:], rate)[:, None]
+        played[:, :VELOCITY_CHANNELS] *= np.interp(at, times[1:], rate)[:, None]
     return played
 
 
 def _playback_rate(frames: Array, pace: Pace, fps: float, rules: ContinuationSettings) -> Array:
     """The rate (T - 1,) at which frames (T, D) after the first are played to keep a pace, from 1 at the seam."""
-    speed = averaged(np.linalg.norm(frames[:, : RATES - 1], axis=1), round(rules.tempo_reach * fps))
+    speed = averaged(np.linalg.norm(frames[:, : VELOCITY_CHANNELS - 1], axis=1), round(rules.tempo_reach * fps))
     wanted_rate = np.clip(pace.speed / np.maximum(speed, 1e-3), 1 / rules.tempo, rules.tempo)
     settled = np.minimum(np.arange(len(frames) - 1) / (SETTLED * fps), 1.0)
     rate: Array = 1 + (wanted_rate[1:] - 1) * settled

@@ -8,25 +8,25 @@ from functools import cache
 import numpy as np
 
 from motet.keyed import KeyedAct, ours
-from motet.keyed.acts import FPS
+from motet.keyed.acts import ACT_FPS
 from motet.keyed.keys import mirrored_keys
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, stem
 
-STANDING = "a person stands still"
+BASE_SENTENCE = "a person stands still"
 """The sentence of what they are laid over."""
 
-IDLE = frozenset(map(stem, (*FUNCTION_WORDS, "does", "makes", "gives", "human", "subject", "please")))
+IDLE_STEMS = frozenset(map(stem, (*FUNCTION_WORDS, "does", "makes", "gives", "human", "subject", "please")))
 """Stems of words that name no act."""
 
-BODY = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
+BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
 """Stems of words that orders may begin with, and that are no verbs: "hands on hips"."""
 
 MOST_HURRIED = 2.0
 """How many times as fast an act is played at most."""
 
-SIDES = frozenset(("left", "right"))
+BOTH_SIDES = frozenset(("left", "right"))
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class NamedAct:
 
     def within(self, seconds: float, seed: int) -> "NamedAct":
         """The act played up to twice as fast, if it lasts longer than some seconds."""
-        faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / FPS, 1 / FPS), 1, MOST_HURRIED)
+        faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / ACT_FPS, 1 / ACT_FPS), 1, MOST_HURRIED)
         slowest, fastest = faster * np.array(self.act.speed)
         return replace(self, act=replace(self.act, speed=(slowest, fastest)))
 
@@ -71,7 +71,7 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
     _, name, sentence = max(matches)
     act = ours()[name]
     # acts of either hand are written for the right one
-    sides = stems & SIDES - stems_of(sentence.split())
+    sides = stems & BOTH_SIDES - stems_of(sentence.split())
     if act.mirrored and len(sides) == 1:
         act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
     if times is not None and act.repeat is not None:
@@ -83,7 +83,7 @@ def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozens
     """The acts that have all of some stems, but for a side, by name; each with its sentences that have no others, and
     their stems."""
     for name, sentences in _sentences().items():
-        sides = stems & SIDES if ours()[name].mirrored else frozenset()
+        sides = stems & BOTH_SIDES if ours()[name].mirrored else frozenset()
         if not stems - sides <= frozenset[str]().union(*sentences.values()):
             continue
         for sentence, of_sentence in sentences.items():
@@ -93,7 +93,7 @@ def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozens
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
     """The stems of words that name an act."""
-    return frozenset(map(stem, words)) - IDLE
+    return frozenset(map(stem, words)) - IDLE_STEMS
 
 
 @cache
@@ -102,7 +102,7 @@ def verbs() -> frozenset[str]:
     first_words = []
     for act in ours().values():
         first_words += [sentence.split()[0] for sentence in act.says]
-    return stems_of(first_words) - BODY
+    return stems_of(first_words) - BODY_STEMS
 
 
 @cache

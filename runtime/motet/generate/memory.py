@@ -17,7 +17,7 @@ from motet.decode.loop import Flags, Ids, Scores
 from motet.errors import BundleError
 from motet.settings import Range, Settings
 
-FAR = 1 << 20
+FORGOTTEN_AGE = 1 << 20
 """The age of steps that an act leaves out."""
 
 Share = Annotated[float, Range(0, 1)]
@@ -256,7 +256,7 @@ class Memory:
             age = self.ages[rows[of_recording]] - self.ages[rows[places[first]]]
             share = age / (last - first)
             inside = (share >= 0) & (share <= 1)
-            ages[of_recording] = np.where(inside, age, FAR)
+            ages[of_recording] = np.where(inside, age, FORGOTTEN_AGE)
             over[of_recording] = np.where(inside, share, np.inf)
         return ages, over
 

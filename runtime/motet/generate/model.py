@@ -29,7 +29,7 @@ from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecode
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
-from motet.generate.keyed_acts import STANDING, NamedAct, act_named, stems_of
+from motet.generate.keyed_acts import BASE_SENTENCE, NamedAct, act_named, stems_of
 from motet.generate.keyed_acts import verbs as keyed_verbs
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
@@ -41,8 +41,8 @@ from motet.representation.root_sixd import in_world
 from motet.settings import Range, Seed, Settings
 from motet.text.clauses import (
     FUNCTION_WORDS,
-    OPENING,
     OWN,
+    SUBJECT,
     Passage,
     Shown,
     at_odds,
@@ -51,7 +51,7 @@ from motet.text.clauses import (
     stem,
     verbs_of,
 )
-from motet.text.numeric_phrases import PACES, Quantities, known_turns, quantities_of
+from motet.text.numeric_phrases import PACE_PHRASES, Quantities, known_turns, quantities_of
 
 DONE = re.compile(r"(?:ing|ed|[^s]s)$")
 """The ending of a word for an action."""
@@ -59,7 +59,7 @@ DONE = re.compile(r"(?:ing|ed|[^s]s)$")
 STANDING_SECONDS = 0.8
 """Duration of standing there."""
 
-TOGETHER = 64
+DECODED_AT_ONCE = 64
 """Steps of a story that are decoded at once."""
 
 NEVER = -1e9
@@ -321,7 +321,7 @@ class CodesModel(GenerateModel):
         if self.contract.skeleton != HUMANOID:
             return Quantities(sentence)
         if self._keyed(sentence):
-            return Quantities(STANDING)
+            return Quantities(BASE_SENTENCE)
         if self._commands.act(sentence) is not None:
             return Quantities(sentence)
         quantities = self._on_the_spot(quantities_of(sentence))
@@ -335,7 +335,7 @@ class CodesModel(GenerateModel):
                 if not (self.unknown(text) or self.lacking(text)):
                     quantities = replace(quantities, text=text)
                     break
-        if "pace" in quantities.amounts and not any(map(PACES.fullmatch, self.lacking(quantities.text))):
+        if "pace" in quantities.amounts and not any(map(PACE_PHRASES.fullmatch, self.lacking(quantities.text))):
             amounts = dict(quantities.amounts)
             del amounts["pace"]
             quantities = replace(quantities, amounts=amounts)
@@ -345,7 +345,7 @@ class CodesModel(GenerateModel):
         """Quantities whose text is a turn on the spot, where that is a command, whoever turns; else as they are."""
         if "degrees" not in quantities.amounts:
             return quantities
-        opening = OPENING.match(quantities.spot)
+        opening = SUBJECT.match(quantities.spot)
         for turn in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
             if self._commands.act(turn) is not None:
                 return replace(quantities, text=turn)
@@ -388,7 +388,7 @@ class CodesModel(GenerateModel):
         """A request to show a text. seconds: 0 where the text says them, or it ends by itself. paced: whether it is
         played faster or slower to last as long."""
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
-        if quantities.text == STANDING and (act := self._keyed(text)):
+        if quantities.text == BASE_SENTENCE and (act := self._keyed(text)):
             return replace(request, keyed=act)
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
@@ -546,7 +546,7 @@ class CodesModel(GenerateModel):
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
-        requests, after, drawn = self._telling(sentences, together=TOGETHER, **settings)
+        requests, after, drawn = self._telling(sentences, together=DECODED_AT_ONCE, **settings)
         pieces = list(drawn)
         frames = np.concatenate([piece.frames for piece in pieces])
         passages = self._passages(requests, pieces, frames)
@@ -654,9 +654,9 @@ class CodesModel(GenerateModel):
         # Texts in the order in which they are shown, and what each is read as.
         timed = self._timed_texts(sentences, seconds, whole)
         if stand in ("start", "both"):
-            timed.insert(0, (STANDING, STANDING_SECONDS))
+            timed.insert(0, (BASE_SENTENCE, STANDING_SECONDS))
         if stand in ("end", "both"):
-            timed.append((STANDING, STANDING_SECONDS))
+            timed.append((BASE_SENTENCE, STANDING_SECONDS))
         requests, noise, chosen = self._requests(timed, numbers, seed, strict, loop_settings)
 
         # They are drawn after the end of the motion before.

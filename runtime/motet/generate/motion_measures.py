@@ -19,7 +19,7 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.numeric_phrases import Kind, Quantities
 
-TOLERANCE: Mapping[Kind, tuple[float, float]] = {
+NUMBER_TOLERANCES: Mapping[Kind, tuple[float, float]] = {
     "degrees": (0.1, 0.0),
     "metres": (0.1, 0.0),
     "steps": (0.0, 1.0),
@@ -31,10 +31,10 @@ TOLERANCE: Mapping[Kind, tuple[float, float]] = {
 QUICKEST = 1.5
 """Largest factor by which a motion is played faster or slower."""
 
-STEEPEST = 100.0
+LARGEST_TURN_RATE = 100.0
 """Largest correction of a turn, degrees per second."""
 
-STRETCH = 1.4
+LARGEST_STRETCH = 1.4
 """Largest factor by which a motion is made to go farther than drawn."""
 
 Spans = list[tuple[int, int]]
@@ -122,7 +122,7 @@ class Seen:
         return sorted(steps, key=lambda span: span[1])
 
     def done(self, act: str) -> Spans:
-        """When an act is done, a value of :data:`motet.text.numeric_phrases.ACTS`."""
+        """When an act is done, a value of :data:`motet.text.numeric_phrases.COUNTED_ACTS`."""
         to_and_fro = {"waves": self._waves, "nods": self._nods, "claps": self._claps, "pushups": self._pushups}
         if act in to_and_fro:
             return sorted(to_and_fro[act](), key=lambda span: span[1])
@@ -269,10 +269,10 @@ def enough(seen: Seen, numbers: Quantities) -> bool:
     amounts = numbers.amounts
     seconds = len(seen.points) / seen.fps
     turn = abs(amounts.get("degrees", 0.0))
-    if turn > max(STRETCH * abs(seen.measured("degrees")), STEEPEST * (seconds - 0.6)):
+    if turn > max(LARGEST_STRETCH * abs(seen.measured("degrees")), LARGEST_TURN_RATE * (seconds - 0.6)):
         return False
     # A jump can be stretched.
-    stretch = STRETCH if "jumps" in numbers.act else 1.0
+    stretch = LARGEST_STRETCH if "jumps" in numbers.act else 1.0
     if float(seen.away.max()) < amounts.get("metres", 0.0) / stretch:
         return False
     if len(seen.steps) < amounts.get("steps", 0.0):
@@ -368,9 +368,10 @@ def played(frames: Array, pace: float) -> Array:
 
 
 def short(wanted: Mapping[str, float], measured: Mapping[str, float], either: bool) -> list[Kind]:
-    """The kinds whose measured amount is off by more than :data:`TOLERANCE`. either: a turn may go either way."""
+    """The kinds whose measured amount is off by more than :data:`NUMBER_TOLERANCES`. either: a turn may go either
+    way."""
     kinds: list[Kind] = []
-    for kind, (share, amount) in TOLERANCE.items():
+    for kind, (share, amount) in NUMBER_TOLERANCES.items():
         if kind not in measured:
             continue
         has = abs(measured[kind]) if either and kind == "degrees" else measured[kind]

@@ -18,13 +18,13 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.numeric_phrases import Kind, Quantities
 
-LONGEST = 300.0
+LONGEST_REQUEST = 300.0
 """Seconds that a request with a number lasts at most."""
 
-STRETCH = 20.0
+STRETCH_SECONDS = 20.0
 """Seconds, at most, of the stretches in which a request is drawn whose length comes first."""
 
-SLOWEST: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
+LEAST_PROGRESS: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
 """Least progress per second, after ten seconds of grace: a motion that is slower is not continued."""
 
 
@@ -226,7 +226,7 @@ class Teller:
         drawn = drawn_steps(self._writer(context), actions, steps, exactly=True)
         decoder = OnDemand(StreamingDecoder(self.codec, context), drawn, steps, self._no_frames)
         length = max(1, round(request.seconds * self.contract.fps))
-        edges = np.linspace(0, length, math.ceil(request.seconds / STRETCH) + 1).round().astype(int).tolist()
+        edges = np.linspace(0, length, math.ceil(request.seconds / STRETCH_SECONDS) + 1).round().astype(int).tolist()
         lead = self._no_frames  # the last frame before a stretch
         degrees = 0.0
         for start, stop in pairwise(edges):
@@ -310,8 +310,8 @@ class Teller:
 
     def _most_steps(self, quantities: Quantities) -> int:
         """Steps after which a motion is not continued, by the slowest progress towards its numbers."""
-        seconds = sum(abs(quantities.amounts.get(kind, 0)) / slowest for kind, slowest in SLOWEST.items())
-        return self.codec.steps(min(LONGEST, 10 + seconds))
+        seconds = sum(abs(quantities.amounts.get(kind, 0)) / slowest for kind, slowest in LEAST_PROGRESS.items())
+        return self.codec.steps(min(LONGEST_REQUEST, 10 + seconds))
 
 
 def _grouped(drawn: Iterator[tuple[Ids, Ids]], count: int) -> Iterator[Ids]:

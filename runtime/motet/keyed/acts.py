@@ -15,7 +15,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import axis_to_rotmat
 from motet.settings import Seed, seeds_of
 
-FPS = 30.0
+ACT_FPS = 30.0
 """Frames a second of what acts give, as of everything on the humanoid."""
 
 
@@ -47,21 +47,21 @@ class KeyedAct:
         for a negative seed.
         """
         (number,) = seeds_of(seed, 1, DecodingError)
-        return laid_over(base, drawn(self, np.random.default_rng(number), FPS), self.name)
+        return laid_over(base, drawn(self, np.random.default_rng(number), ACT_FPS), self.name)
 
     def seconds(self, seed: Seed = 0) -> float:
         """How long the motion of a seed lasts."""
         (number,) = seeds_of(seed, 1, DecodingError)
-        return drawn(self, np.random.default_rng(number), FPS).frames / FPS
+        return drawn(self, np.random.default_rng(number), ACT_FPS).frames / ACT_FPS
 
 
 def laid_over(base: Motion, act: Drawn, name: str) -> Motion:
     """A drawn act over the begin of a base; MotionError as of :meth:`KeyedAct.motion`."""
-    motion = on_humanoid(base).continuous().resample(FPS)
+    motion = on_humanoid(base).continuous().resample(ACT_FPS)
     if len(motion) < act.frames:
         raise MotionError(
-            f"{name} lasts {act.frames / FPS:.1f} s, the motion that it is laid over {len(motion) / FPS:.1f} s: "
-            "give a longer one"
+            f"{name} lasts {act.frames / ACT_FPS:.1f} s, the motion that it is laid over "
+            f"{len(motion) / ACT_FPS:.1f} s: give a longer one"
         )
     motion = motion[: act.frames]
     figure = _figure_of(motion)

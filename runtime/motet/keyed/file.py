@@ -11,7 +11,7 @@ from typing import Any
 from motet.errors import FormatError, quoted
 from motet.keyed.acts import KeyedAct
 from motet.keyed.keys import HandKey, Key, Repeat, Span
-from motet.keyed.parts import DIRECTIONS, FLOOR, HAND, HANDS, NUMBERS, OTHER_HAND, PLACES, TOUCHES
+from motet.keyed.parts import DIRECTION_WORDS, FLOOR, HAND, HAND_PARTS, OTHER_HAND, PART_NUMBERS, PLACES, TOUCHES
 from motet.settings import Range, is_number
 
 LARGEST_FILE = 1_000_000
@@ -19,7 +19,7 @@ LARGEST_FILE = 1_000_000
 
 MOST_ACTS = 1_000
 MOST_KEYS = 100
-MOST_TIMES = 50
+MOST_KEY_TIMES = 50
 
 TIME = Range(0, 60, "s")
 EASE = Range(0.05, 5, "s")
@@ -27,7 +27,7 @@ SPEED = Range(0.3, 3)
 AMPLITUDE = Range(0.1, 2)
 
 ACT_FIELDS = ("says", "ease", "speed", "amplitude", "mirrored", "repeat", "key")
-KEY_FIELDS = ("at", "hold", *NUMBERS, *HANDS)
+KEY_FIELDS = ("at", "hold", *PART_NUMBERS, *HAND_PARTS)
 HAND_FIELDS = ("to", "palm", "fingers", "touch", *HAND)
 REPEAT_FIELDS = ("keys", "every", "times")
 
@@ -133,11 +133,11 @@ def _key(table: Any) -> Key:
     if "at" not in table:
         raise _EntryError("at: is missing: expected seconds")
     numbers = {}
-    for part, ranges in NUMBERS.items():
+    for part, ranges in PART_NUMBERS.items():
         if part in table:
             _check_fields(table[part], tuple(ranges), part)
             numbers[part] = {name: _span(value, ranges[name], f"{part}.{name}") for name, value in table[part].items()}
-    hands = {hand: _hand(table[hand], hand) for hand in HANDS if hand in table}
+    hands = {hand: _hand(table[hand], hand) for hand in HAND_PARTS if hand in table}
     return Key(_span(table["at"], TIME, "at"), _span(table.get("hold", 0), TIME, "hold"), numbers, hands)
 
 
@@ -157,8 +157,8 @@ def _hand(table: Any, hand: str) -> HandKey:
 
 
 def _direction(words: Any, name: str) -> str:
-    if not isinstance(words, str) or any(word not in DIRECTIONS for word in words.split()):
-        raise _EntryError(f"{name}: expected words out of {', '.join(DIRECTIONS)}, not {quoted(str(words))}")
+    if not isinstance(words, str) or any(word not in DIRECTION_WORDS for word in words.split()):
+        raise _EntryError(f"{name}: expected words out of {', '.join(DIRECTION_WORDS)}, not {quoted(str(words))}")
     return words
 
 
@@ -171,7 +171,7 @@ def _repeat(table: Any, keys: int) -> Repeat:
         first - 1,
         last - 1,
         _span(table["every"], Range(0.05, 60, "s"), "repeat.every"),
-        _whole_pair(table["times"], MOST_TIMES, "repeat.times"),
+        _whole_pair(table["times"], MOST_KEY_TIMES, "repeat.times"),
     )
 
 

@@ -26,12 +26,12 @@ from motet.motion.rotations import (
     unit,
 )
 
-TRUNK = ("hips", *SPINE)
+TRUNK_CHAIN = ("hips", *SPINE)
 
 UPPER_ARM = float(np.linalg.norm(HUMANOID.offsets[HUMANOID.index("leftLowerArm")]))
 FOREARM = float(np.linalg.norm(HUMANOID.offsets[HUMANOID.index("leftHand")]))
 
-STRAIGHT = 0.999
+STRAIGHT_SHARE = 0.999
 """Share of its length to which an arm stretches."""
 
 BEYOND = 0.08
@@ -70,7 +70,7 @@ def with_hands(figure: Figure, act: Drawn, name: str) -> Figure:
 def _with_shoulder(figure: Figure, track: HandTrack, side: str, sign: float) -> Figure:
     """The figure with a shoulder that rises for a hand above it."""
     bone = sided(side, ARM[0])
-    _, places = figure.chain((*TRUNK, *limb_of(side, ARM[:2])))
+    _, places = figure.chain((*TRUNK_CHAIN, *limb_of(side, ARM[:2])))
     shoulder = places[:, 5]
     heights = np.stack([(_place(figure, pose, side, sign) - shoulder)[:, 1] for pose in track.poses])
     height = track.mixed(heights)
@@ -80,7 +80,7 @@ def _with_shoulder(figure: Figure, track: HandTrack, side: str, sign: float) -> 
 
 
 def _with_hand(figure: Figure, track: HandTrack, side: str, sign: float, name: str) -> Figure:
-    bones = (*TRUNK, *limb_of(side, ARM))
+    bones = (*TRUNK_CHAIN, *limb_of(side, ARM))
     rotations, places = figure.chain(bones)
     chest, parent, *arm = (rotations[:, joint] for joint in range(3, len(bones)))
     shoulder = places[:, 5]
@@ -122,7 +122,7 @@ def _place(figure: Figure, pose: HandPose, side: str, sign: float) -> Array:
 
 def _palm(figure: Figure, side: str, sign: float, offset: Array) -> Array:
     """The middle of a palm (T, 3), and from there an offset seen from the upper chest."""
-    rotations, places = figure.chain((*TRUNK, *limb_of(side, ARM)))
+    rotations, places = figure.chain((*TRUNK_CHAIN, *limb_of(side, ARM)))
     from_wrist = np.array([sign * TOUCHES["palm"], -0.02, 0.0])
     return places[:, -1] + rotated(rotations[:, -1], from_wrist) + rotated(rotations[:, 3], offset)
 
@@ -132,7 +132,7 @@ def _way_to(place: Place, side: str) -> tuple[str, ...]:
     if place.sided:
         leg = limb_of(side, LEG)
         return ("hips", *leg[: leg.index(sided(side, place.bone)) + 1])
-    trunk = (*TRUNK, *NECK)
+    trunk = (*TRUNK_CHAIN, *NECK)
     return trunk[: trunk.index(place.bone) + 1]
 
 
@@ -164,7 +164,7 @@ def _arm_to(wrist: Array, shoulder: Array, elbow: Array, chest: Array, sign: flo
     elbow: degrees (T,) that it is raised to the side.
     """
     away = wrist - shoulder
-    longest = STRAIGHT * (UPPER_ARM + FOREARM)
+    longest = STRAIGHT_SHARE * (UPPER_ARM + FOREARM)
     distance = np.linalg.norm(away, axis=1).clip(abs(UPPER_ARM - FOREARM) + 0.05, longest)
     along = unit(away)
 

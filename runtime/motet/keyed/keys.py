@@ -32,7 +32,7 @@ class Key:
     """A key pose.
 
     at: seconds from the begin of the act. hold: seconds that it stays. numbers: part -> its numbers, such as "head" ->
-    {"nod": ...} (:data:`motet.keyed.parts.NUMBERS`). hands: "left_hand", "right_hand" -> where each goes.
+    {"nod": ...} (:data:`motet.keyed.parts.PART_NUMBERS`). hands: "left_hand", "right_hand" -> where each goes.
     """
 
     at: Span
@@ -58,14 +58,14 @@ def mirrored_keys(keys: Iterable[Key]) -> tuple[Key, ...]:
         numbers = {}
         for part, values in key.numbers.items():
             numbers[_other_side(part)] = {
-                name: _negated(span) if (part, name) in SIDED else span for name, span in values.items()
+                name: _negated(span) if (part, name) in SIDED_NUMBERS else span for name, span in values.items()
             }
         hands = {_other_side(hand): where for hand, where in key.hands.items()}
         swapped.append(replace(key, numbers=numbers, hands=hands))
     return tuple(swapped)
 
 
-SIDED = {("head", "turn"), ("head", "tilt"), ("chest", "turn"), ("chest", "lean")} | {
+SIDED_NUMBERS = {("head", "turn"), ("head", "tilt"), ("chest", "turn"), ("chest", "lean")} | {
     ("hips", "left"),
     ("hips", "turn"),
     ("hips", "lean"),

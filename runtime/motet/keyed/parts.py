@@ -12,7 +12,7 @@ from motet.motion.rotations import Array, unit
 from motet.settings import Range
 
 DEGREES = "degrees"
-METRES = "m"
+LENGTH_UNIT = "m"
 
 
 def _degrees(low: float, high: float) -> Range:
@@ -20,7 +20,7 @@ def _degrees(low: float, high: float) -> Range:
 
 
 def _metres(low: float, high: float) -> Range:
-    return Range(low, high, METRES)
+    return Range(low, high, LENGTH_UNIT)
 
 
 _FOOT = {
@@ -31,7 +31,7 @@ _FOOT = {
     "point": _degrees(-60, 80),
 }
 
-NUMBERS: Mapping[str, Mapping[str, Range]] = {
+PART_NUMBERS: Mapping[str, Mapping[str, Range]] = {
     "head": {"nod": _degrees(-60, 60), "turn": _degrees(-85, 85), "tilt": _degrees(-45, 45)},
     "chest": {"bend": _degrees(-40, 100), "turn": _degrees(-70, 70), "lean": _degrees(-45, 45)},
     "hips": {
@@ -57,7 +57,7 @@ HAND: Mapping[str, Range] = {
 """The numbers of a hand: how far from the place that it goes to, away from the middle, up and forward, and how far the
 elbow is raised to the side from hanging down."""
 
-HANDS = ("left_hand", "right_hand")
+HAND_PARTS = ("left_hand", "right_hand")
 
 SIDE_OF_HAND: Mapping[str, float] = {"left_hand": 1.0, "right_hand": -1.0}
 """The sign of x on a hand's side."""
@@ -65,7 +65,7 @@ SIDE_OF_HAND: Mapping[str, float] = {"left_hand": 1.0, "right_hand": -1.0}
 TOUCHES: Mapping[str, float] = {"wrist": 0.0, "palm": 0.09, "fingers": 0.17}
 """Part of a hand that is brought to a place -> metres from the wrist."""
 
-DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
+DIRECTION_WORDS: Mapping[str, tuple[float, float, float]] = {
     "out": (1, 0, 0),
     "in": (-1, 0, 0),
     "up": (0, 1, 0),
@@ -132,5 +132,5 @@ def direction(words: str, side: float) -> Array:
     KeyError for another word; a zero vector where they cancel out."""
     total = np.zeros(3)
     for word in words.split():
-        total += DIRECTIONS[word]
+        total += DIRECTION_WORDS[word]
     return unit(total * [side, 1.0, 1.0])

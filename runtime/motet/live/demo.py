@@ -23,7 +23,7 @@ FUTURE = 5.0
 """Seconds of the walk that is given, and of its prediction."""
 
 
-SHORT = 120
+MOST_JOINED_FRAMES = 120
 """At most how many frames of motions are joined."""
 
 
@@ -58,7 +58,7 @@ def _pages(place: Path) -> Iterator[Card]:
     write_many(place / "generate.html", made, PROMPTS, "motet generate")
     yield Card("generate.html", "Generate", "Motions from sentences, such as “a person kicks”.", made[1])
     yield _predicted(place, walk, writer)
-    yield _joined(place, made[0][:SHORT], made[2][:SHORT])
+    yield _joined(place, made[0][:MOST_JOINED_FRAMES], made[2][:MOST_JOINED_FRAMES])
     yield _described(place, [walk[:90], walk[-60:], *made[1:3]])
 
 

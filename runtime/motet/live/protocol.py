@@ -40,10 +40,10 @@ KEYS = {
 }
 """Type of a client's message -> what may stand in it."""
 
-NUMBERS = ("speed", "direction", "facing", "velocity", "places", "points", "here")
+NUMBER_FIELDS = ("speed", "direction", "facing", "velocity", "places", "points", "here")
 """What may stand in a message as numbers, or lists of them."""
 
-NEEDED = {"put": "places", "push": "velocity", "reach": "hand", "say": "text"}
+REQUIRED_FIELDS = {"put": "places", "push": "velocity", "reach": "hand", "say": "text"}
 """What a message needs."""
 
 
@@ -154,8 +154,8 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
             raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
         if wanted := _unfit(kind, name, value):
             raise ProtocolError(f"{kind}, {name}: expected {wanted}")
-    if kind in NEEDED and NEEDED[kind] not in arguments:
-        raise ProtocolError(f"{kind}: expected {NEEDED[kind]}")
+    if kind in REQUIRED_FIELDS and REQUIRED_FIELDS[kind] not in arguments:
+        raise ProtocolError(f"{kind}: expected {REQUIRED_FIELDS[kind]}")
     return kind, arguments
 
 

@@ -28,7 +28,7 @@ except ImportError as error:
 Message = tuple[str, list[str | int | float]]
 """An address and its values."""
 
-OFFSETS = HUMANOID.offsets[[HUMANOID.index(bone) for bone in BONES]].astype(np.float32)
+BONE_OFFSETS = HUMANOID.offsets[[HUMANOID.index(bone) for bone in BONES]].astype(np.float32)
 """Where the bones are (J, 3) in their parents' frames; that of the hips depends on the pose."""
 
 
@@ -40,7 +40,7 @@ def messages(pose: Pose, seconds: float) -> list[Message]:
         ("/VMC/Ext/T", [float(seconds)]),
         ("/VMC/Ext/Root/Pos", root),
     ]
-    places = [np.array([0, pose.height[0], 0], dtype=np.float32), *OFFSETS[1:]]  # the hips are the first bone
+    places = [np.array([0, pose.height[0], 0], dtype=np.float32), *BONE_OFFSETS[1:]]  # the hips are the first bone
     for bone, place, quat in zip(BONES, places, pose.rotations[0], strict=True):
         name = bone[0].upper() + bone[1:]  # as Unity calls it (HumanBodyBones)
         messages_of_pose.append(("/VMC/Ext/Bone/Pos", [name, *_place(place), *_turn(quat)]))

@@ -28,10 +28,10 @@ from motet.text.vocabulary import EOS, PAD, SOS, UNK
 Decoding = Literal["known", "beam", "consensus"]
 """How descriptions are found."""
 
-AT_ONCE = 256
+COMPARED_AT_ONCE = 256
 """Motions that are compared with all known ones at once."""
 
-LEAST = 1e-6
+LEAST_PROBABILITY = 1e-6
 """The probability below which none is told."""
 
 EVENLY = 16
@@ -217,11 +217,13 @@ class DescribeModel(LanguageModel):
         count = int(beam.settled(beam.defaults(self.manifest.defaults), {"beams": beams})["beams"])
         least = self.known.settings.sure
         answers = list[list[Description]]()
-        for start in range(0, len(motions), AT_ONCE):
-            for row in self.known.answers(self._seen(motions[start : start + AT_ONCE]), count):
+        for start in range(0, len(motions), COMPARED_AT_ONCE):
+            for row in self.known.answers(self._seen(motions[start : start + COMPARED_AT_ONCE]), count):
                 descriptions = []
                 for text, chance in row:
-                    descriptions.append(Description(text, math.log(max(chance, LEAST)), chance, chance >= least))
+                    descriptions.append(
+                        Description(text, math.log(max(chance, LEAST_PROBABILITY)), chance, chance >= least)
+                    )
                 answers.append(descriptions)
             progress(len(answers), len(motions))
         return answers
@@ -274,8 +276,8 @@ class DescribeModel(LanguageModel):
     def _kinds(self, motion: Motion, spans: Sequence[tuple[int, int]], progress: Progress) -> Iterator[Array]:
         """Of each window in turn the log-probabilities (Q,) of the sets of kinds of action."""
         assert self.known is not None
-        for start in range(0, len(spans), AT_ONCE):
-            frames = [self.frames(motion[a:b]) for a, b in spans[start : start + AT_ONCE]]
+        for start in range(0, len(spans), COMPARED_AT_ONCE):
+            frames = [self.frames(motion[a:b]) for a, b in spans[start : start + COMPARED_AT_ONCE]]
             counted, _ = self.known.near(self.contexts(frames, "space"))
             yield from np.log(0.02 + self.known.shares(counted))
             progress(start + len(frames), len(spans))
@@ -416,7 +418,7 @@ def _near_pairs(sentence_of_row: Ids, near: int) -> tuple[Ids, Ids]:
     return np.repeat(np.arange(len(nearby)), counts), np.concatenate(nearby)
 
 
-def best_path(scores: Iterable[Array], change: float, at_once: int = AT_ONCE) -> list[int]:
+def best_path(scores: Iterable[Array], change: float, at_once: int = COMPARED_AT_ONCE) -> list[int]:
     """For each window (S,) the column such that the sum, less ``change`` for each change of column, is largest.
 
     at_once: windows after which what is behind them is decided as far as all paths agree on it, so that memory does not

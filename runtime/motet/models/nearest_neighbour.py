@@ -23,9 +23,9 @@ from motet.settings import Range, Settings
 NOTHING = "no human motion that it knows"
 """What is said of a motion that is like none of those that are known, or too short to tell."""
 
-LEFT = 1
-RIGHT = -1
-STRAIGHT = 2
+GOES_LEFT = 1
+GOES_RIGHT = -1
+GOES_STRAIGHT = 2
 """Where a sentence says that somebody goes; 0 if it does not say."""
 
 TILE = 8192
@@ -201,7 +201,7 @@ class Known:
         if going and seen.ahead <= -self.settings.backwards and not BACKWARDS.search(text):
             text += ", backwards"
         if going and side and way != side:
-            text += f", turning {'left' if side == LEFT else 'right'}"
+            text += f", turning {'left' if side == GOES_LEFT else 'right'}"
         return text
 
     def _fits(self, rows: NDArray[np.intp], turn: float | None) -> tuple[Array, int]:
@@ -209,15 +209,15 @@ class Known:
         fits = np.zeros(len(rows))
         if turn is None:
             return fits, 0
-        side = LEFT if turn > 0 else RIGHT
+        side = GOES_LEFT if turn > 0 else GOES_RIGHT
         turned = abs(turn) >= self.settings.turned
         ways, degrees, _ = self.ways[rows].T
         if turned:
             fits[ways == side] = 1
-            fits[(ways == -side) | (ways == STRAIGHT)] = -1
+            fits[(ways == -side) | (ways == GOES_STRAIGHT)] = -1
         elif abs(turn) <= self.settings.straight:
-            fits[ways == STRAIGHT] = 0.5
-            fits[(ways == LEFT) | (ways == RIGHT)] = -1
+            fits[ways == GOES_STRAIGHT] = 0.5
+            fits[(ways == GOES_LEFT) | (ways == GOES_RIGHT)] = -1
         else:  # neither is certain, but the other side is wrong
             fits[ways == -side] = -1
         fits[(degrees > 0) & (np.abs(degrees - abs(turn)) > 30)] = -1

@@ -19,6 +19,8 @@ Part = Any
 Vector = tuple[Part, Part, Part]
 Quaternion = tuple[Part, Part, Part, Part]
 
+NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
 
 def parts(values: NDArray[Any]) -> tuple[Part, ...]:
     """The parts of vectors (n, k): floats of one, arrays (n,) of more."""

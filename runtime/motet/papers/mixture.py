@@ -10,7 +10,7 @@ from motet.bundle.graph import Arrays, Floats, Graph
 from motet.decode.loop import Flags, Ids, Loop, Noise, Sample, Scores, advance, two_rows, zero_state
 from motet.settings import Range, Settings
 
-SMALLEST = 2.0**-24
+SMALLEST_PROBABILITY = 2.0**-24
 """A probability of the flag below this counts as this, where a logarithm is taken."""
 
 
@@ -177,7 +177,7 @@ def draw(
 
     flags = uniform[:, :, 1] < active if forced is None else np.full(uniform.shape[:2], forced)
     probability = np.where(flags, active, 1 - active)
-    gains = np.log(np.maximum(probability, SMALLEST), dtype=np.float64)
+    gains = np.log(np.maximum(probability, SMALLEST_PROBABILITY), dtype=np.float64)
     gains[flags] += log_density(frames, log_weights, means, stds)[flags]
     # a second end would be the same motion again
     ends_before = np.cumsum(~flags, axis=1) > 1
@@ -225,7 +225,7 @@ def score_frames(step: Graph, context: Floats, frames: Floats) -> float:
         outputs, state = advance(step, state, {"frame": frame_and_flag, "context": contexts})
         steps.append({name: outputs[name][0] for name in ("active", "log_weights", "means", "stds")})
     active = np.stack([output["active"] for output in steps])
-    probabilities = np.maximum(np.append(active[:-1], 1 - active[-1]), SMALLEST)
+    probabilities = np.maximum(np.append(active[:-1], 1 - active[-1]), SMALLEST_PROBABILITY)
 
     # after the last frame only the flag counts
     log_weights = np.stack([output["log_weights"] for output in steps[:-1]])

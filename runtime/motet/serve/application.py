@@ -38,7 +38,7 @@ from motet.serve.limits import Gate, Limits, Visitors
 from motet.serve.live import LiveDoor
 from motet.serve.protocol import OPTIONS, quieter
 
-KINDS: dict[str, type[BundleModel]] = {
+MODEL_OF_VERB: dict[str, type[BundleModel]] = {
     "generate": CodesModel,
     "describe": DescribeModel,
     "predict": PredictModel,
@@ -65,7 +65,7 @@ def app(
     (:mod:`motet.serve.mmcp`).
     BundleError for a bundle that cannot be used; ImportError with the remedy where the extra mmcp is missing.
     """
-    models = _models(bundles, KINDS | ({"fill": FillModel} if mmcp else {}), session)
+    models = _models(bundles, MODEL_OF_VERB | ({"fill": FillModel} if mmcp else {}), session)
     doors = _mmcp(models["generate"], models.pop("fill"), models["control"]) if mmcp else []
     live = LiveDoor(models.pop("control"), origins)
     answers = Answers(**models, limits=limits or Limits())

@@ -15,7 +15,7 @@ from motet.live.protocol import LOCAL
 from motet.live.server import Connection, LiveClients, connection_options, log
 from motet.steering.model import SteerModel
 
-OPENING = 10.0
+OPENING_SECONDS = 10.0
 """Seconds in which a connection is opened."""
 
 
@@ -63,7 +63,7 @@ class LiveDoor:
 
     async def _served(self, connection: Upgraded) -> None:
         try:
-            async with asyncio.timeout(OPENING):
+            async with asyncio.timeout(OPENING_SECONDS):
                 await connection.handshake(server_header=None)
             if connection.protocol.state is State.OPEN:
                 connection.start_keepalive()

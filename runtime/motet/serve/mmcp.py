@@ -15,9 +15,9 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from motet.composition.compose import GROUND, compose
+from motet.composition.compose import GROUND, KEY_POSE_SECONDS, compose
 from motet.composition.keys import Key, Moves
-from motet.composition.plans import APART, Moment
+from motet.composition.plans import MOMENT_SECONDS, Moment
 from motet.errors import DecodingError, MotetError, MotionError
 from motet.figures.humanoid import HUMANOID, Figure, from_humanoid, leg_length
 from motet.generate.model import CodesModel
@@ -39,17 +39,14 @@ try:
 except ImportError as error:
     raise ImportError("motet.serve.mmcp needs motionmcp: install the extra with  pip install 'motet[mmcp]'") from error
 
-IDLE = "a person stands still"
+IDLE_PROMPT = "a person stands still"
 """What is shown where a segment has no prompt."""
 
-REACH = 0.5
-"""Seconds within which a figure comes to a key pose and leaves it."""
-
-SLOWEST = 1.0
-FASTEST = 240.0
+LEAST_FPS = 1.0
+LARGEST_FPS = 240.0
 """Frames a second."""
 
-LARGEST = 4_000_000
+MOST_ROTATIONS = 4_000_000
 """Rotations of a response: frames, times joints, times samples."""
 
 Keys = Mapping[int, Key]
@@ -129,12 +126,12 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
             motion = self._loop(request.segments[0], request.total_frames, fps, seed)
         else:
             motion = self._shown(request, fps, _steps(keys, figure), seed)
-        moves = _on_figure(motion, figure).through(keys, round(REACH * fps))
+        moves = _on_figure(motion, figure).through(keys, round(KEY_POSE_SECONDS * fps))
         return moves.turns, moves.root
 
     def _shown(self, request: GenerateRequest, fps: float, steps: Mapping[int, Moment], seed: int) -> Motion:
         """The prompts as a story; with places on the way as a composition, whose walks are steered there."""
-        texts = [getattr(segment, "prompt", IDLE) for segment in request.segments]
+        texts = [getattr(segment, "prompt", IDLE_PROMPT) for segment in request.segments]
         seconds = [segment.duration_frames / fps for segment in request.segments]
         seconds[-1] += 2 / self.model.fps  # what the last frame is interpolated from
         if steps.keys() - {0}:
@@ -152,7 +149,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         whole = max(2, round((frames - 1) / fps * self.fill.fps))
         gap = min(round(LOOP_SECONDS * self.fill.fps), whole // 3)
         drawn = whole - gap
-        prompt = getattr(segment, "prompt", IDLE)
+        prompt = getattr(segment, "prompt", IDLE_PROMPT)
         seconds = (drawn + 2) / self.fill.fps
         motion = self.model.story(prompt, seconds=seconds, seed=seed).playable(self.fill.fps)[:drawn]
         known = placed(motion)
@@ -190,7 +187,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
     def _notes(self, request: GenerateRequest, seed: int) -> list[dict[str, str]]:
         """What the client cannot see: the seed that was drawn, and what was not understood."""
         notes = [("seed", "info", f"drawn with the seed {seed}")]
-        for text in dict.fromkeys(getattr(segment, "prompt", IDLE) for segment in request.segments):
+        for text in dict.fromkeys(getattr(segment, "prompt", IDLE_PROMPT) for segment in request.segments):
             understood = self.model.understood(text)
             unknown = self.model.unknown(text)
             shown = self.model.likeliest(text)
@@ -219,15 +216,23 @@ def _check(request: GenerateRequest, fps: float, options: schemas.Options) -> No
     """ProtocolError for what the SDK does not check."""
     size = request.total_frames * len(request.skeleton.joints) * options.num_samples
     for wrong, code, message in (
-        (not SLOWEST <= fps <= FASTEST, "invalid_options", f"timing.fps must be from {SLOWEST:g} to {FASTEST:g}"),
-        (size > LARGEST, "invalid_options", f"frames x joints x samples must be at most {LARGEST:,}, not {size:,}"),
+        (
+            not LEAST_FPS <= fps <= LARGEST_FPS,
+            "invalid_options",
+            f"timing.fps must be from {LEAST_FPS:g} to {LARGEST_FPS:g}",
+        ),
+        (
+            size > MOST_ROTATIONS,
+            "invalid_options",
+            f"frames x joints x samples must be at most {MOST_ROTATIONS:,}, not {size:,}",
+        ),
         (
             any(segment.seed is not None for segment in request.segments),
             "invalid_options",
             "a time line is drawn from one seed: give options.seed, and none to segments",
         ),
         (
-            options.loop and (bool(request.constraints) or request.total_frames < SLOWEST * fps),
+            options.loop and (bool(request.constraints) or request.total_frames < LEAST_FPS * fps),
             "invalid_options",
             "a loop takes a second or more, and no constraints",
         ),
@@ -316,7 +321,7 @@ def _line(prompts: Sequence[Moment], steps: Mapping[int, Moment], fps: float, ra
     line = {moment.at: moment for moment in prompts}
     for frame, step in sorted(steps.items()):
         at = frame / fps + 1 / rate if frame else 0.0  # a moment's frame is the last one before it
-        at = next((time for time in line if abs(time - at) < APART), at)
+        at = next((time for time in line if abs(time - at) < MOMENT_SECONDS), at)
         moment = line.get(at, Moment(at))
         line[at] = moment if moment.place else replace(moment, place=step.place, facing=step.facing)
     return [line[at] for at in sorted(line)]

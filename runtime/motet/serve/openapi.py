@@ -6,9 +6,9 @@ from typing import Any
 from motet.draw.page import source
 from motet.serve.content import MEDIA
 from motet.serve.request import MOST_TEXTS, Parameter
-from motet.serve.routes import DOORS, FILES, Door
+from motet.serve.routes import DOORS, FILE_PARAMETERS, Door
 
-TYPES: dict[str, dict[str, Any]] = {
+JSON_TYPES: dict[str, dict[str, Any]] = {
     "text": {"type": "string"},
     "number": {"type": "number"},
     "whole": {"type": "integer"},
@@ -26,7 +26,7 @@ REFUSALS = {
 
 def schema(parameter: Parameter) -> dict[str, Any]:
     """The JSON schema of a setting."""
-    entry = {**TYPES[parameter.kind], "description": parameter.help}
+    entry = {**JSON_TYPES[parameter.kind], "description": parameter.help}
     return {**entry, "enum": list(parameter.choices)} if parameter.choices else entry
 
 
@@ -74,7 +74,7 @@ def _media(door: Door) -> str:
 def _bodies(door: Door) -> dict[str, Any]:
     settings = {name: schema(parameter) for name, parameter in door.parameters.items()}
     binary = {"type": "string", "contentMediaType": "application/octet-stream"}
-    files = {name: {**binary, "description": FILES[name]} for name in door.files}
+    files = {name: {**binary, "description": FILE_PARAMETERS[name]} for name in door.files}
     both = {"multipart/form-data": {"schema": {"type": "object", "properties": {**settings, **files}}}}
     if "file" in door.files:
         return {**both, "application/octet-stream": {"schema": {}}}
@@ -93,7 +93,7 @@ def _section(door: Door) -> str:
     settings = "".join(
         _row(name, parameter.kind, parameter.help, parameter.choices) for name, parameter in door.parameters.items()
     )
-    files = "".join(_row(name, "file", FILES[name], ()) for name in door.files)
+    files = "".join(_row(name, "file", FILE_PARAMETERS[name], ()) for name in door.files)
     title = f"{' or '.join(door.methods)} <code>{escape(door.path)}</code>"
     return f"<h2>{title}</h2><p>{escape(door.help)}</p>{form}<table>{settings}{files}</table>"
 

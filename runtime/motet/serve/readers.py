@@ -18,7 +18,7 @@ from motet.serve.content import Order
 from motet.serve.reader import Head, MessageError, packed, receive, send, unpacked
 from motet.serve.uploads import Bounds, RequestError, Upload
 
-PROGRAM = ("-P", "-m", "motet.serve.reader")
+READER_PROGRAM = ("-P", "-m", "motet.serve.reader")
 
 READERS = 2
 """Files that are read at once; the others wait."""
@@ -36,7 +36,7 @@ class _Reader:
     """A process. It leads a group of its own, to which processes that it starts belong."""
 
     def __init__(self, memory: int) -> None:
-        command = [sys.executable, "-W", "ignore", *PROGRAM, str(memory)]
+        command = [sys.executable, "-W", "ignore", *READER_PROGRAM, str(memory)]
         try:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True

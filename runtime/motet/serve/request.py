@@ -21,8 +21,14 @@ MOST_TEXTS = 100
 
 Kind = Literal["text", "texts", "number", "numbers", "whole", "flag"]
 
-WORDS = {"text": "a text", "texts": "a text or a list of texts", "number": "a number", "whole": "a whole number"}
-WORDS |= {"numbers": "a number or a list of numbers", "flag": "true or false"}
+KIND_NAMES = {
+    "text": "a text",
+    "texts": "a text or a list of texts",
+    "number": "a number",
+    "numbers": "a number or a list of numbers",
+    "whole": "a whole number",
+    "flag": "true or false",
+}
 FLAGS = {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}
 
 
@@ -45,7 +51,7 @@ class Parameter:
         """A value of JSON, one text or number as a list where several may be; RequestError for another type."""
         many = self.kind in ("texts", "numbers") and isinstance(value, list)
         if not all(map(self._fits, value if many else [value])) or (many and not 0 < len(value) <= MOST_TEXTS):
-            wanted = f"one of {', '.join(self.choices)}" if self.choices else WORDS[self.kind]
+            wanted = f"one of {', '.join(self.choices)}" if self.choices else KIND_NAMES[self.kind]
             raise RequestError(f"{name}: expected {wanted}, not {quoted(json.dumps(value))}")
         return [value] if self.kind == "texts" and not many else value
 

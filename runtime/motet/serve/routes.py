@@ -9,7 +9,7 @@ from motet.motion.skeleton import METRES
 from motet.serve.request import Parameter
 from motet.serve.uploads import TAKES
 
-DRAWING = {
+DRAWING_PARAMETERS = {
     "text": Parameter("texts", "A sentence, such as 'a person walks and turns left'; of a story, one after the other."),
     "seed": Parameter("whole", "Seed, 0 by default: the same seed gives the same motion."),
     "seconds": Parameter(
@@ -38,7 +38,7 @@ READING = {
     "unit_in": Parameter("text", "Length unit of a file that does not state it.", tuple(METRES)),
     "partial": Parameter("flag", "Take the complete frames of a truncated file."),
 }
-FILES = {
+FILE_PARAMETERS = {
     "file": f"A motion of any human figure ({' '.join(TAKES)}).",
     "after": "A motion to continue.",
     "like": "A character whose skeleton takes the motion.",
@@ -66,7 +66,7 @@ DOORS = (
         "generate",
         "The motion of a sentence, like `motet generate`.",
         {
-            **DRAWING,
+            **DRAWING_PARAMETERS,
             "story": Parameter("flag", "Several sentences become one motion, in their order."),
             "loop": Parameter("flag", "Only a seamless loop."),
             "no_plant": Parameter("flag", "Skip foot planting: the figure moves as drawn."),
@@ -79,7 +79,7 @@ DOORS = (
         "/stream",
         "stream",
         "The same as lines of JSON while it is drawn, feet not planted: the figure first, then its frames.",
-        DRAWING,
+        DRAWING_PARAMETERS,
         ("after",),
     ),
     Door(

@@ -31,9 +31,9 @@ UPPER = np.array([bone not in _LOWER for bone in BONES])
 BELOW = np.append(np.repeat(~UPPER, 3), True)
 """Which numbers (3 J + 1) of a pose's offset are of the lower body."""
 
-SPINE = BONES.index("spine")
+SPINE_BONE = BONES.index("spine")
 
-HANDS = slice(-6, None)
+HAND_FEATURES = slice(-6, None)
 """The last features, the places of the hands: how the upper body is."""
 
 FADED = 1e-4
@@ -362,8 +362,8 @@ class ActionLayer:
             else:
                 rotations[n, UPPER] = acted[UPPER]
                 # the spine as it is seen from the facing, whatever the hips do
-                spine_from_facing = quat_product(acted[0], acted[SPINE])
-                rotations[n, SPINE] = quat_product(conjugate(rotations[n, 0]), spine_from_facing)
+                spine_from_facing = quat_product(acted[0], acted[SPINE_BONE])
+                rotations[n, SPINE_BONE] = quat_product(conjugate(rotations[n, 0]), spine_from_facing)
         return bodies
 
 
@@ -402,7 +402,7 @@ def _entered(
     most_skipped = min(round(settings.entry * matcher.fps), (len(act) - 1) // 3)
     entries = _scaled(matcher.table, act.features[: most_skipped + 1])
     difference = entries - _pose_features(matcher.table, playback, figure, before)
-    cost = (difference[:, slice(None) if whole else HANDS] ** 2).sum(axis=1)
+    cost = (difference[:, slice(None) if whole else HAND_FEATURES] ** 2).sum(axis=1)
     return Playing(act, int(cost.argmin()) + 1, 0, whole, upper is None and not keeps_moving)
 
 
@@ -419,7 +419,7 @@ def _pose_features(table: Table, playback: Playback, figure: int, playing: Playi
     row = playback.mirror[figure], playback.row[figure]
     features: Array = table.features[row][TRAJECTORY:].astype(np.float64)
     if playing is not None:
-        acted = slice(None) if playing.whole else HANDS
+        acted = slice(None) if playing.whole else HAND_FEATURES
         features[acted] = _scaled(table, playing.act.features[playing.frame])[acted]
     return features
 

@@ -46,17 +46,17 @@ class ActSettings(Settings):
     """or the figure turns by more than this."""
 
 
-SHORTEST = 3
+LEAST_ACT_FRAMES = 3
 """Frames of an act."""
 
-STANDS = float(HUMANOID.offsets[0, 1])
+STANDING_HIPS = float(HUMANOID.offsets[0, 1])
 """Height of the hips of a figure that stands straight."""
 
 WIDTH = 4 * len(BONES) + 4
 """Numbers of a frame: quaternions (x, y, z, w) of the bones, the hips' in the frame of the facing; x and z of the root
 in metres, its facing in radians, and the height of the hips in metres."""
 
-LARGEST = 1e4  # of these numbers
+LARGEST_COORDINATE = 1e4  # of these numbers
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,7 +80,7 @@ class Act:
     @staticmethod
     def of(name: str, numbers: Floats | Array, fps: float, settings: ActSettings) -> "Act":
         """The act of frames (T, :data:`WIDTH`), without the rest at both ends. ControlError for fewer than
-        :data:`SHORTEST` frames, and for numbers that are not finite or too large."""
+        :data:`LEAST_ACT_FRAMES` frames, and for numbers that are not finite or too large."""
         values = _checked(numbers)
         quats = values[:, :-4].reshape(len(values), -1, 4)
         quats = quats / np.maximum(np.linalg.norm(quats, axis=2, keepdims=True), 1e-6)
@@ -122,10 +122,10 @@ class Act:
 
 def _checked(numbers: Floats | Array) -> Array:
     """Frames (T, :data:`WIDTH`) in float64; ControlError if they are no act."""
-    if numbers.ndim != 2 or numbers.shape[1] != WIDTH or len(numbers) < SHORTEST:
-        raise ControlError(f"an act needs {SHORTEST} or more frames of {WIDTH} numbers, not {numbers.shape}")
-    if not (np.abs(numbers) <= LARGEST).all():
-        raise ControlError(f"an act must be finite numbers, no larger than {LARGEST:g}")
+    if numbers.ndim != 2 or numbers.shape[1] != WIDTH or len(numbers) < LEAST_ACT_FRAMES:
+        raise ControlError(f"an act needs {LEAST_ACT_FRAMES} or more frames of {WIDTH} numbers, not {numbers.shape}")
+    if not (np.abs(numbers) <= LARGEST_COORDINATE).all():
+        raise ControlError(f"an act must be finite numbers, no larger than {LARGEST_COORDINATE:g}")
     return numbers.astype(np.float64)
 
 
@@ -151,7 +151,7 @@ def _moving_part(places: Array, fps: float, settings: ActSettings) -> slice:
 
 def _uses_legs(height: Array, ground: Array, features: Array, settings: ActSettings) -> bool:
     """Whether an act bends the legs, jumps, raises a foot, or turns around."""
-    bends = np.ptp([STANDS, *height]) > settings.bent
+    bends = np.ptp([STANDING_HIPS, *height]) > settings.bent
     raises = features[:, [1, 4]].max() > settings.raised
     turns = np.ptp(np.unwrap(ground[:, 2])) > settings.turned
     return bool(bends or raises or turns)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 Happening = Literal["left foot", "right foot", "take-off", "landing", "gait", "arrived", "act ended", "act begun"]
 
-DOWN = 0.5
+DOWN_CONTACT = 0.5
 """A foot comes down where its contact rises above this, once it has been below UP."""
 
-UP = 0.2
+UP_CONTACT = 0.2
 """A foot is up where its contact is below this."""
 
 FLIES = 2
@@ -73,8 +73,8 @@ class Happenings:
     ) -> "Happenings":
         """A tick later, with contacts (B, 2), ordered gaits (B,), and whether these are played (B,)."""
         # a foot that is down stays down until it is clearly up
-        down = contacts > DOWN
-        down |= self.down & (contacts >= UP)
+        down = contacts > DOWN_CONTACT
+        down |= self.down & (contacts >= UP_CONTACT)
         # without a foot on the ground in its first tick, a figure flies already
         begins = self.air < 0
         air = np.where(down[:, 0] | down[:, 1], 0, np.where(begins, FLIES, self.air + 1))

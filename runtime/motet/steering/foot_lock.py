@@ -62,7 +62,7 @@ class FootLockSettings(Settings):
 
 HEEL, BALL = SOLE[LEG[2]]
 (TIP,) = SOLE[LEG[3]]
-POINTS = [(2, HEEL), (2, BALL), (3, TIP)]
+SOLE_POINTS = [(2, HEEL), (2, BALL), (3, TIP)]
 """Points of a sole, heel, ball and tip, and which joint of a leg carries each."""
 
 
@@ -194,7 +194,7 @@ def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float
 
 def _sole(turned: Sequence[Quaternion], places: Sequence[Vector]) -> list[Vector]:
     """Where the points of a sole are, of rotations and places of a leg's joints."""
-    return [plus(places[joint], rotated(turned[joint], point)) for joint, point in POINTS]
+    return [plus(places[joint], rotated(turned[joint], point)) for joint, point in SOLE_POINTS]
 
 
 def _lowest(sole: Sequence[Vector]) -> Part:

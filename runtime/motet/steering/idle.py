@@ -15,6 +15,7 @@ import numpy as np
 from motet.figures.humanoid import BONES, SPINE
 from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import (
+    NO_ROTATION,
     Part,
     Quaternion,
     computed,
@@ -57,15 +58,13 @@ class IdleSettings(Settings):
     """Phase by which the breaths of figures differ along z."""
 
 
-TRUNK = [BONES.index(bone) for bone in SPINE]
-CARRIED = [BONES.index(bone) for bone in ("neck", "leftShoulder", "rightShoulder")]
-TURNS = dict(zip(TRUNK, (1.0, 0.0, -2.0), strict=True)) | dict.fromkeys(CARRIED, 1.0)
+TRUNK_BONES = [BONES.index(bone) for bone in SPINE]
+CARRIED_BONES = [BONES.index(bone) for bone in ("neck", "leftShoulder", "rightShoulder")]
+BREATH_TURNS = dict(zip(TRUNK_BONES, (1.0, 0.0, -2.0), strict=True)) | dict.fromkeys(CARRIED_BONES, 1.0)
 """Bones that a breath turns about the x axis of the hips, and by how many times its depth: those of the trunk, and what
 the last of them carries."""
 
-STILL: Quaternion = (0.0, 0.0, 0.0, 1.0)
-
-LEAST = 1e-3
+LEAST_BREATH = 1e-3
 """Share below which a breath is invisible."""
 
 
@@ -115,7 +114,7 @@ class IdleLayer:
 
     def breathe(self, pose: Pose, settings: IdleSettings, seconds: float) -> Pose:
         """A pose of the present tick, of ``seconds``, with its breath."""
-        (figures,) = (self.share > LEAST).nonzero()
+        (figures,) = (self.share > LEAST_BREATH).nonzero()
         if not len(figures):
             return pose
         x, z, _ = parts(pose.ground[figures])
@@ -128,14 +127,14 @@ class IdleLayer:
 def _breathed(rotations: Floats, figures: Rows, half_angle: Part) -> Floats:
     """Local quaternions (B, J, 4) with the breath of figures (n,). half_angle: half the turn of the spine."""
     breathed = rotations.copy("K")
-    above = STILL
-    for bone, times_depth in TURNS.items():
+    above = NO_ROTATION
+    for bone, times_depth in BREATH_TURNS.items():
         local: Quaternion = parts(rotations[figures, bone])
         if times_depth:
             x_axis = rotated_axis(inverse(above), 0)  # of the hips, as the parent has it
             half = times_depth * half_angle
             turn = (*times(x_axis, computed(np.sin, half)), computed(np.cos, half))
             breathed[figures, bone] = joined(product(turn, local))
-        if bone in TRUNK:
+        if bone in TRUNK_BONES:
             above = product(above, local)
     return breathed

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array
-from motet.motion.scalar_or_batch import Quaternion, Vector, inverse, minus, parts, plus, product, rotated
+from motet.motion.scalar_or_batch import NO_ROTATION, Quaternion, Vector, inverse, minus, parts, plus, product, rotated
 from motet.settings import Settings
 from motet.steering.follower import Follower
 from motet.steering.matching import Flags
@@ -48,15 +48,13 @@ class LookSettings(Settings):
 SHARES = {"chest": 0.1, "upperChest": 0.25, "neck": 0.55, "head": 1.0}
 """Bones that turn -> the share of the turn that each and those below it make together."""
 
-OFFSETS = {joint.name: joint.offset for joint in HUMANOID.joints}
+JOINT_OFFSETS = {joint.name: joint.offset for joint in HUMANOID.joints}
 
-EYES = (0.0, 0.07, 0.08)
+EYES_OFFSET = (0.0, 0.07, 0.08)
 """The middle of the eyes, from the head's joint, metres."""
 
-LEAST = 1e-4
+LEAST_TURN = 1e-4
 """Radians below which nothing is turned."""
-
-STILL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +74,7 @@ class LookLayer:
     @cached_property
     def _turning(self) -> Flags | None:
         """Which heads (B,) are turned, or about to be; None for none."""
-        turning = ~np.isnan(self.points[:, 0]) | (np.abs(self.turn.shown) > LEAST).any(axis=1)
+        turning = ~np.isnan(self.points[:, 0]) | (np.abs(self.turn.shown) > LEAST_TURN).any(axis=1)
         return turning if turning.any() else None
 
     def update(self, pose: Pose, settings: LookSettings, seconds: float) -> tuple["LookLayer", Pose]:
@@ -91,7 +89,7 @@ class LookLayer:
         # turn towards it
         turn = self.turn.after(wanted, settings.leap, settings.half_life, seconds)
         rotations = pose.rotations.copy()
-        above = STILL
+        above = NO_ROTATION
         for name, bone in zip(SHARES, _turned(bones, played_gaze[:, 0], turn.shown), strict=True):
             local = np.transpose(product(inverse(above), bone)).reshape(-1, 4)
             rotations[turning, BONES.index(name)] = local[turning]
@@ -122,7 +120,7 @@ class LookLayer:
 def _in_spine(pose: Pose, points: Array) -> tuple[list[Quaternion], Vector]:
     """In the frame of the lower spine: rotations of the bones of :data:`SHARES`, and points (B, 3)."""
     place, above = frame_of(pose, ("spine",))
-    turned = STILL
+    turned = NO_ROTATION
     bones = list[Quaternion]()
     for bone in SHARES:
         turned = product(turned, parts(pose.rotations[:, BONES.index(bone)]))
@@ -133,11 +131,11 @@ def _in_spine(pose: Pose, points: Array) -> tuple[list[Quaternion], Vector]:
 def _eyes(bones: Sequence[Quaternion]) -> Vector:
     """Where the eyes are in the frame of the lower spine, of rotations in it."""
     place: Vector = (0.0, 0.0, 0.0)
-    above = STILL
+    above = NO_ROTATION
     for name, bone in zip(SHARES, bones, strict=True):
-        place = plus(place, rotated(above, OFFSETS[name]))
+        place = plus(place, rotated(above, JOINT_OFFSETS[name]))
         above = bone
-    return plus(place, rotated(above, EYES))
+    return plus(place, rotated(above, EYES_OFFSET))
 
 
 def _angles(way: Vector) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from motet.bundle.fields import LARGEST, Fields
+from motet.bundle.fields import LARGEST_NUMBER, Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
 from motet.errors import ArgumentError, BundleError, ControlError, quoted
@@ -43,7 +43,7 @@ from motet.text.clauses import Shown
 SPREAD_FROM = 32
 """Number of characters from which the searches of a session are spread over the ticks."""
 
-CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone, kind in product(BONES, SIXD_KINDS)))
+POSE_CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone, kind in product(BONES, SIXD_KINDS)))
 
 FEATURE_STEPS = 16
 """Steps of a scaled unit of a feature in a table, whose features have 8 bits."""
@@ -80,7 +80,7 @@ class SteerModel(ControlModel):
         low, usual, high = (column.tolist() for column in self.abilities.speeds.T[:3])
         self.speeds = dict(zip(self.gaits, zip(low, high, strict=True), strict=True))
         self.usual = dict(zip(self.gaits, usual, strict=True))
-        if self.contract.channels != CHANNELS:
+        if self.contract.channels != POSE_CHANNELS:
             raise BundleError("manifest, motion.channels: must be those of the humanoid, in its order")
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
         self.matcher = self._matcher(config, settings)
@@ -114,7 +114,7 @@ class SteerModel(ControlModel):
         )
 
     def _bounded(
-        self, name: str, shape: str, dtype: str, low: float = -LARGEST, high: ArrayLike = LARGEST
+        self, name: str, shape: str, dtype: str, low: float = -LARGEST_NUMBER, high: ArrayLike = LARGEST_NUMBER
     ) -> NDArray[Any]:
         """A table whose numbers are within limits, one for all or one for each; BundleError where one is not."""
         table = self.table(name, shape, dtype)

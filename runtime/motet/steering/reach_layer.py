@@ -67,15 +67,15 @@ class ReachSettings(Settings):
     """Half-life in which a hand gets to a new point, and back."""
 
 
-PARTS = ("Shoulder", "UpperArm", "LowerArm", "Hand")
+ARM_BONES = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 
 PALM = 0.09
 """Metres from the wrist to the middle of the hand, which is brought to the point."""
 
-AROUND = -0.7
+WRAP_COSINE = -0.7
 """The cosine of half the turn, 270 degrees, beyond which an arm goes back the other way."""
 
-LEAST = 1e-3
+LEAST_WEIGHT = 1e-3
 """The weight below which an arm is as it is played."""
 
 
@@ -111,14 +111,14 @@ class ReachLayer:
     @cached_property
     def _rests(self) -> bool:
         """Whether no hand reaches for anything, or is still on its way back."""
-        return bool(np.isnan(self.points[:, 0]).all() and (self.weight.shown < LEAST).all())
+        return bool(np.isnan(self.points[:, 0]).all() and (self.weight.shown < LEAST_WEIGHT).all())
 
     def update(self, pose: Pose, settings: ReachSettings, seconds: float) -> tuple["ReachLayer", Pose]:
         """A tick later, and the pose of that tick with the hands at their points."""
         if self._rests:
             return self, pose
         has_point = ~np.isnan(self.points[:, 0])
-        rests = self.weight.shown < LEAST
+        rests = self.weight.shown < LEAST_WEIGHT
         # where the hand can be for its point, and whether that can be held
         arm = _Arm.of(pose, self.side)
         reachable, holds, beyond = arm.within_reach(self.points, settings)
@@ -134,7 +134,7 @@ class ReachLayer:
     def _with_arms(self, rotations: Floats, arms: tuple[Quaternion, Quaternion], moves: Flags) -> Floats:
         """Local quaternions (B, J, 4) with upper arms and forearms of the figures that move theirs (B,)."""
         rotations = rotations.copy()
-        for part, quats in zip(PARTS[1:3], arms, strict=True):
+        for part, quats in zip(ARM_BONES[1:3], arms, strict=True):
             bone = BONES.index(sided(LEFT_RIGHT[self.side], part))
             rotations[moves, bone] = np.transpose(quats).reshape(-1, 4)[moves]
         return rotations
@@ -169,7 +169,7 @@ class _Arm(NamedTuple):
     @staticmethod
     def of(pose: Pose, side: int) -> "_Arm":
         """Those of a pose."""
-        bones = [sided(LEFT_RIGHT[side], part) for part in PARTS]
+        bones = [sided(LEFT_RIGHT[side], part) for part in ARM_BONES]
         offsets = [HUMANOID.joints[HUMANOID.index(bone)].offset for bone in bones]
         shoulder, upper, lower, hand = (parts(pose.rotations[:, BONES.index(bone)]) for bone in bones)
         place, chest = frame_of(pose, SPINE)
@@ -284,7 +284,7 @@ def _sign(first: Quaternion, second: Quaternion, before: Part) -> Part:
     tick, unless this way has become too far around."""
     cosine = sum(a * b for a, b in zip(first, second, strict=True))
     nearer = where(cosine < 0, -1.0, 1.0)
-    return where((before == 0) | (cosine * before < AROUND), nearer, before)
+    return where((before == 0) | (cosine * before < WRAP_COSINE), nearer, before)
 
 
 def _mixed(first: Quaternion, second: Quaternion, share: Part, sign: Part) -> Quaternion:

@@ -1,8 +1,7 @@
 """The acts that a figure knows by name: ``repertoire.json``, made once by ``motet_train.recipes.repertoire``.
 
-Every other frame is kept, in whole numbers of :data:`STEPS` in a unit; each row is the difference from the row before.
-Letters in shapes: T frames, W numbers of a frame (:data:`motet.steering.acts.WIDTH`).
-"""
+Every other frame is kept, in whole numbers of :data:`STEPS_OF_UNIT` in a unit; each row is the difference from the row
+before. Letters in shapes: T frames, W numbers of a frame (:data:`motet.steering.acts.WIDTH`)."""
 
 import json
 from collections.abc import Sequence
@@ -21,13 +20,13 @@ from motet.steering.acts import WIDTH, Act, ActSettings
 if TYPE_CHECKING:
     from motet.steering.model import SteerModel
 
-STEPS = 500
+STEPS_OF_UNIT = 500
 """In a unit of each number of a frame."""
 
 SEAM = 9
 """Frames in which one performance of an act goes over into the next."""
 
-KEPT = 256
+MADE_ACTS = 256
 """Acts of a model, after which the one that was made first is forgotten."""
 
 
@@ -82,7 +81,7 @@ def entry_of(act: dict[str, Any]) -> Entry:
 def _rows() -> Array:
     """The kept frames (N, W) of all acts."""
     differences = unpacked(document())["frames"].astype(np.int64)
-    rows: Array = np.cumsum(differences, axis=0) / STEPS
+    rows: Array = np.cumsum(differences, axis=0) / STEPS_OF_UNIT
     return rows
 
 
@@ -168,7 +167,7 @@ class Repertoire:
         key = name, side, tempo, count
         act = self._made.get(key)
         if act is None:
-            if len(self._made) >= KEPT:
+            if len(self._made) >= MADE_ACTS:
                 self._made.pop(next(iter(self._made)), None)
             act = self._made[key] = Act.of(name, performance(*key), self.model.fps, self.model.settings(ActSettings))
         return act

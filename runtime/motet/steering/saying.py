@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from motet.steering.model import SteerModel
     from motet.steering.session import SteerSession
 
-GOES = 3.0
+GOING_SECONDS = 3.0
 """Seconds that a figure goes before the next step."""
 
-TURNS = 1.5
+TURN_SECONDS = 1.5
 """Seconds that a turn, a change of pace or a stop lasts before the next step."""
 
-NEARER = 2.5
+NEARER_DISTANCE = 2.5
 """Metres that a figure comes towards the camera of a page."""
 
 
@@ -144,4 +144,4 @@ def _seconds(step: Step) -> float:
     """How long a step lasts before the next one."""
     if step.seconds:
         return step.seconds
-    return GOES if step.kind == "go" and step.name else TURNS
+    return GOING_SECONDS if step.kind == "go" and step.name else TURN_SECONDS

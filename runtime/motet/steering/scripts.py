@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from motet.errors import ScriptError
 from motet.models.control import LONGEST_SCRIPT
 
-OTHERS = ("turn", "stop", "act", "go")  # orders besides gaits
-WAYS = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}  # degrees from the facing to the left
+OTHER_VERBS = ("turn", "stop", "act", "go")  # orders besides gaits
+WAY_ANGLES = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}  # degrees from the facing to the left
 NUMBER = r"\d+\.?\d*|\.\d+"
 SIGNED = f"-?({NUMBER})"
 
@@ -57,7 +57,7 @@ def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
             words.append((word, place))
             continue
         if not words:
-            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, {', '.join(OTHERS)}")
+            raise ScriptError(script, place, f"expected an order here: {', '.join(gaits)}, {', '.join(OTHER_VERBS)}")
         orders.append(_Words(script, words).order(gaits))
         words = []
     if sum(order.seconds for order in orders) > LONGEST_SCRIPT:
@@ -80,8 +80,8 @@ class _Words:
             return self.act()
         if kind == "go":
             return self.go()
-        if kind not in (*gaits, *OTHERS):
-            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHERS))}")
+        if kind not in (*gaits, *OTHER_VERBS):
+            raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHER_VERBS))}")
         details = self.details(self.turn() if kind == "turn" else {})
         turn = details.get("turn", 0.0)
         seconds = details.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)
@@ -131,8 +131,8 @@ class _Words:
         word = self.take("more")
         if re.fullmatch(f"({NUMBER})s", word):
             return {"seconds": float(word[:-1])}
-        if word in WAYS:
-            return {"way": WAYS[word]}
+        if word in WAY_ANGLES:
+            return {"way": WAY_ANGLES[word]}
         if word == "speed":
             return {"speed": self.number("metres a second")}
         if word == "turn":

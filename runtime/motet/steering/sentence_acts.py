@@ -11,11 +11,11 @@ from motet.text.vocabulary import Vocabulary
 if TYPE_CHECKING:
     from motet.steering.model import SteerModel
 
-SECONDS = 3.0
+GENERATED_SECONDS = 3.0
 """Duration that is generated of a motion that lasts longer than the act of its sentence."""
 
 
-KEPT = 256
+REMEMBERED_ACTS = 256
 """Acts, after which the one that was made first is forgotten."""
 
 
@@ -57,8 +57,8 @@ class SaidActs:
         known = self._made.get(sentence)
         if known is None:
             with collected(TextWarning) as notes:
-                (made,) = self.words.generate(self._known(sentence), 1, seconds=SECONDS)
-            if len(self._made) >= KEPT:
+                (made,) = self.words.generate(self._known(sentence), 1, seconds=GENERATED_SECONDS)
+            if len(self._made) >= REMEMBERED_ACTS:
                 self._made.pop(next(iter(self._made)), None)
             act = self.model.act_of(made.motion, sentence)
             known = act, Shown(made.action, made.lacking, made.confidence), each_once(notes)

@@ -16,14 +16,14 @@ from motet.steering.repertoire import Entry, document, entries
 from motet.text.clauses import stem
 from motet.text.spelling import corrected
 
-SLOW = 0.65
-FAST = 1.4
+SLOW_FACTOR = 0.65
+FAST_FACTOR = 1.4
 """How many times as fast an act or a gait is that is to be slow or fast."""
 
 JOG = 0.8
 """Of the usual speed of a run."""
 
-MOST = 10
+MOST_TIMES = 10
 """Times that an act is done."""
 
 STEP = 0.6
@@ -35,7 +35,7 @@ CURVE = 50.0
 OFFERED = 3
 """Names that are nearest to what is not known."""
 
-SHORT = 4
+SHORTEST_MENDED = 4
 """Letters of the shortest word whose spelling is mended."""
 
 
@@ -90,12 +90,12 @@ class Step:
         return " ".join(words)
 
 
-ORDERS = {
+ORDER_PHRASES = {
     "here": Step("here"),
     "away": Step("away"),
     "around": Step("go", way=180.0),
-    "faster": Step("go", change=FAST),
-    "slower": Step("go", change=SLOW),
+    "faster": Step("go", change=FAST_FACTOR),
+    "slower": Step("go", change=SLOW_FACTOR),
 }
 """What phrases mean that are not read word by word."""
 
@@ -212,7 +212,7 @@ class Words:
 
     def _mended(self, word: str, mended: dict[str, str]) -> str:
         """A word, or the known one that it is a misspelling of."""
-        if len(word) < SHORT or not word.isalpha() or word in self.known or stem(word) in self.stems:
+        if len(word) < SHORTEST_MENDED or not word.isalpha() or word in self.known or stem(word) in self.stems:
             return word
         read_as = corrected(word, self.known)
         if read_as:
@@ -252,8 +252,8 @@ class Words:
         if order is not None:
             return {
                 "around": Step("go", way=180.0),
-                "faster": Step("go", change=FAST),
-                "slower": Step("go", change=SLOW),
+                "faster": Step("go", change=FAST_FACTOR),
+                "slower": Step("go", change=SLOW_FACTOR),
             }[order]
         act = self._act(words)
         if act is not None:
@@ -270,7 +270,7 @@ class Words:
             name = self._named(tried, side, is_sided)
             if name:
                 tempo = 1.0 if tried is words else self._tempo(words)
-                return Step("act", name, side, tempo, max(1, min(times, MOST)))
+                return Step("act", name, side, tempo, max(1, min(times, MOST_TIMES)))
         return None
 
     def _tries(self, words: Sequence[str]) -> Iterator[tuple[Sequence[str], int, bool]]:
@@ -291,8 +291,8 @@ class Words:
 
     def _tempo(self, words: Sequence[str]) -> float:
         if any(word in self.table["fast"] for word in words):
-            return FAST
-        return SLOW if any(word in self.table["slow"] for word in words) else 1.0
+            return FAST_FACTOR
+        return SLOW_FACTOR if any(word in self.table["slow"] for word in words) else 1.0
 
     def _named(self, words: Sequence[str], side: str, is_sided: bool) -> str | None:
         """The act that words name, perhaps beside its limb; it has to have a side where one is said."""
@@ -347,7 +347,7 @@ class Words:
         if not kinds and not side:
             return None if pace == 1 else Step("go", change=pace)
         if "faster" in kinds or "slower" in kinds:
-            return None if side else Step("go", change=FAST if "faster" in kinds else SLOW)
+            return None if side else Step("go", change=FAST_FACTOR if "faster" in kinds else SLOW_FACTOR)
         if kinds == ["turn"] and not side:
             return None
         return self._gone(kinds, side, numbers[0] if numbers else None, pace)
@@ -375,7 +375,7 @@ class Words:
         gait = next((kind for kind in kinds if kind in self.gaits), "run" if "jog" in kinds else "")
         steps = "step" in kinds
         degrees = 90.0 if number is None or steps else float(number)
-        if not gait and not any(kind in kinds for kind in GOING):
+        if not gait and not any(kind in kinds for kind in GOING_KINDS):
             return Step("go", way=sign * (180.0 if "around" in kinds else degrees))
         way, aside = _way(kinds, side, degrees)
         curve = sign * CURVE if "circle" in kinds else 0.0
@@ -414,7 +414,7 @@ def _way(kinds: Sequence[str], side: str, degrees: float) -> tuple[float, bool]:
     return (-degrees if side == "right" else degrees) if turns else 0.0, aside
 
 
-GOING = ("forward", "backwards", "back", "circle", "step", "sideways")
+GOING_KINDS = ("forward", "backwards", "back", "circle", "step", "sideways")
 """Kinds of words that let a figure go, beside gaits."""
 
 APOSTROPHES = str.maketrans("", "", "'`\u2019")

@@ -47,7 +47,7 @@ class TurnSettings(Settings):
     """Of the toes."""
 
 
-KINDS = {
+BONES_OF_LIMIT = {
     "trunk": ("spine", "chest", "upperChest"),
     "head": ("neck", "head"),
     "shoulder": ("leftShoulder", "rightShoulder"),
@@ -61,7 +61,7 @@ KINDS = {
 }
 """Setting -> the bones that it is about."""
 
-LIMITED = {BONES.index(bone): kind for kind, bones in KINDS.items() for bone in bones}
+LIMITED = {BONES.index(bone): kind for kind, bones in BONES_OF_LIMIT.items() for bone in bones}
 """Bone -> its setting."""
 
 

@@ -29,17 +29,17 @@ from motet.motion.scalar_or_batch import (
     yawed,
 )
 
-BACK = [BONES.index(name) for name in SPINE]
+TURNING_BONES = [BONES.index(name) for name in SPINE]
 """Bones that turn back, each by the same share."""
 
-LEAST = 1e-4
+LEAST_CHANGE = 1e-4
 """Radians, and shares of a stride, below which nothing is changed."""
 
 
 def warped(rotations: Floats, angles: Array) -> Floats:
     """Local quaternions (B, J, 4) with hips and legs turned to the left by angles (B,) in radians; all that the
     spine carries stays as it is."""
-    figures = _indices(np.abs(angles) > LEAST)
+    figures = _indices(np.abs(angles) > LEAST_CHANGE)
     if figures is None:
         return rotations
     # the hips, and the legs with them
@@ -48,10 +48,10 @@ def warped(rotations: Floats, angles: Array) -> Floats:
     above: Quaternion = parts(rotations[figures, 0])
     turned[figures, 0] = joined(yawed(above, computed(np.sin, half_angle), computed(np.cos, half_angle)))
     # the spine turns back, about the vertical as each parent has it
-    back = half_angle / -len(BACK)
+    back = half_angle / -len(TURNING_BONES)
     sine = computed(np.sin, back)
     cosine = computed(np.cos, back)
-    for bone in BACK:
+    for bone in TURNING_BONES:
         local: Quaternion = parts(rotations[figures, bone])
         vertical = rotated_axis(inverse(above), 1)
         turned[figures, bone] = joined(product((*times(vertical, sine), cosine), local))
@@ -69,7 +69,7 @@ UNDER = HUMANOID.rest_positions[HUMANOID.index("leftFoot"), 2] + BALL[2]
 def strided(rotations: Floats, contacts: Floats, strides: Array) -> Floats:
     """Local quaternions (B, J, 4) with strides relative to the recorded ones (B,), made by leading the balls of the
     feet in all directions alike: a direction that changed with the row that is played would make feet leap."""
-    figures = _indices(np.abs(strides - 1) > LEAST)
+    figures = _indices(np.abs(strides - 1) > LEAST_CHANGE)
     if figures is None:
         return rotations
     hips: Quaternion = parts(rotations[figures, 0])

@@ -12,7 +12,7 @@ THEN = re.compile(
     r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*", re.IGNORECASE
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
-OPENING = re.compile(r"^((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
+SUBJECT = re.compile(r"^((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
 """Words that may stand before the verb of a part: its subject, or an adverb."""
 
 # fmt: off
@@ -33,7 +33,7 @@ POLITE_WORDS = frozenset((
 """Words that make no difference to a command."""
 # fmt: on
 
-AT_ONCE = re.compile(
+SIMULTANEOUS = re.compile(
     r"\b(?:while|whilst|simultaneously|without|as (?:he|she|they|it)|(?:and )?at the same time(?: as)?)\b",
     re.IGNORECASE,
 )
@@ -107,7 +107,7 @@ def verbs_of(words: Iterable[str]) -> frozenset[str]:
 def at_odds(sentence: str) -> tuple[str, str] | None:
     """Two things in a sentence that exclude each other at the same time: "stands still while running"."""
     postures: list[tuple[str, str]] = []
-    for clause in AT_ONCE.split(sentence.lower()):
+    for clause in SIMULTANEOUS.split(sentence.lower()):
         for posture, words in POSTURES.items():
             match = re.search(rf"\b(?:{words})\b", clause)
             if match:
@@ -145,7 +145,7 @@ def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:
     start = 0
     for match in ALSO.finditer(text):
         done = re.findall(r"\w+", text[start : match.start()].lower())
-        opened = re.match(r"\w+", OPENING.sub("", text[match.end() :], count=1).lower())
+        opened = re.match(r"\w+", SUBJECT.sub("", text[match.end() :], count=1).lower())
         if opened and stem(opened[0]) in verbs and any(stem(word) in verbs for word in done):
             yield text[start : match.start()]
             start = match.end()

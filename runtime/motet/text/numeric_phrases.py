@@ -11,19 +11,19 @@ from typing import Literal, NamedTuple
 
 from motet.errors import TextError
 from motet.text.clauses import stem
-from motet.text.vocabulary import NUMBER_WORDS, RULES
+from motet.text.vocabulary import NEW_MODEL_RULES, NUMBER_WORDS
 
 Kind = Literal["degrees", "metres", "steps", "times", "seconds", "pace"]
 """degrees: of a turn of the whole figure, to the left; negative to the right. pace: relative to the usual speed."""
 
-MOST: Mapping[Kind, float] = {"degrees": 3600, "metres": 200, "steps": 200, "times": 50, "seconds": 600}
+LARGEST_NUMBERS: Mapping[Kind, float] = {"degrees": 3600, "metres": 200, "steps": 200, "times": 50, "seconds": 600}
 """The largest number of each kind that is accepted."""
 
-TURN = r"(?:turn|circle|rotation|revolution|spin|twirl|pirouette|lap)s?"
+WHOLE_TURN = r"(?:turn|circle|rotation|revolution|spin|twirl|pirouette|lap)s?"
 SIZE = r"(?:(?:small|little|tiny|short|big|large|long|giant|quick|slow|more|baby) )?"
-UNITS: tuple[tuple[Kind, float, str], ...] = (
+UNIT_SPELLINGS: tuple[tuple[Kind, float, str], ...] = (
     ("degrees", 1, r"deg(?:ree)?s?"),
-    ("degrees", 360, rf"(?:(?:full|whole|complete) )?{TURN}"),
+    ("degrees", 360, rf"(?:(?:full|whole|complete) )?{WHOLE_TURN}"),
     ("metres", 1, r"m|met(?:er|re)s?"),
     ("metres", 0.01, r"cm|centimet(?:er|re)s?"),
     ("metres", 1000, r"km|kilomet(?:er|re)s?"),
@@ -37,9 +37,9 @@ UNITS: tuple[tuple[Kind, float, str], ...] = (
 """Units of numbers: the kind, its amount in a unit, and the spellings of the unit."""
 
 SPELLED = "|".join([*NUMBER_WORDS, "hundred"])
-MEASURES = "|".join(unit for kind, _, unit in UNITS if kind in ("metres", "steps", "seconds"))
-SAID: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
-    (rf"\b(?:a )?(?:{SPELLED})(?:(?:[ -]| and )(?:{SPELLED}))*\b", lambda match: RULES.normalise(match[0])),
+MEASURES = "|".join(unit for kind, _, unit in UNIT_SPELLINGS if kind in ("metres", "steps", "seconds"))
+REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
+    (rf"\b(?:a )?(?:{SPELLED})(?:(?:[ -]| and )(?:{SPELLED}))*\b", lambda match: NEW_MODEL_RULES.normalise(match[0])),
     (r"\u2212(?=\d)", "-"),
     (r"[\u00b0\u00ba]", " degrees "),
     (r"(\d?)\u00bd", lambda match: f"{match[1] or 0}.5"),
@@ -61,7 +61,7 @@ SAID: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
     (r"\b3[ -]quarters?(?: of)?(?: an?)?\b", "0.75"),
     (r"\b(?:an? |1 )?quarter(?: of)?(?: an?)?(?=[ -])", "0.25"),
     (r"\b(?:an? )?half(?: an?)?(?=[ -])", "0.5"),
-    (rf"\b(?:an? )?(?:full|whole|complete) (?={TURN}\b)", "1 "),
+    (rf"\b(?:an? )?(?:full|whole|complete) (?={WHOLE_TURN}\b)", "1 "),
     (r"\bin circles?\b|\bin an? circle\b", "1 circle"),
     (rf"\ban? (?=(?:{MEASURES})\b)", "1 "),
     (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*|does an?|do an?) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
@@ -71,12 +71,12 @@ SAID: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
 LEADING = r"(?:\b(?:for|by|about|roughly|exactly|only|just|in|within|over|of|another|an?|the)\s+)*"
 QUANTITY = re.compile(
     rf"{LEADING}(?<![\w.-])(?P<number>-?\d+(?:\.\d+)?)[\s-]*"
-    rf"(?:{'|'.join(f'(?P<u{i}>{unit})' for i, (*_, unit) in enumerate(UNITS))})\b"
+    rf"(?:{'|'.join(f'(?P<u{i}>{unit})' for i, (*_, unit) in enumerate(UNIT_SPELLINGS))})\b"
     r"(?!\s*(?:/|per\b|high|tall|apart|off))"
 )
 """A number and its unit, with the words before it that belong to it."""
 
-ACTS: Mapping[str, str] = {
+COUNTED_ACTS: Mapping[str, str] = {
     **dict.fromkeys(("jump", "hop", "leap", "bounc"), "jumps"),
     **dict.fromkeys(("jack",), "jacks"),
     **dict.fromkeys(("kick",), "kicks"),
@@ -93,26 +93,28 @@ ACTS: Mapping[str, str] = {
 (:mod:`motet.generate.motion_measures`); "" for acts that are counted by their beginnings."""
 
 
-COUNTED = re.compile(
+COUNT_OF_ACTS = re.compile(
     rf"(?P<doing>\b(?:do|does|doing|performs?)\s+)?(?<![\w.-])(?P<number>-?\d+)\s+"
-    rf"(?P<what>(?:[a-z-]+\s+){{0,2}}?(?:(?:{'|'.join(ACTS)})\w*|(?(doing)[a-z]+s|(?!)))\b)"
+    rf"(?P<what>(?:[a-z-]+\s+){{0,2}}?(?:(?:{'|'.join(COUNTED_ACTS)})\w*|(?(doing)[a-z]+s|(?!)))\b)"
 )
 """A number of acts: "two squats", "does 3 cartwheels"."""
 
-LEFT = {"step": "steps", "pace": "steps", "stri": "steps", "turn": "turn", "spin": "turn", "rota": "turn"}
+REMAINING_WORD = {"step": "steps", "pace": "steps", "stri": "steps", "turn": "turn", "spin": "turn", "rota": "turn"}
 """The word that remains of a unit, by its first letters."""
 
 ON_FEET = re.compile(r"(?:on|with|off|from|lifts?|raises?|puts?|both|the)\s*$|^1$")
 """Words before a number of feet, or the number, that mean the figure's feet."""
 
-BODY = re.compile(r"\b(?:arm|hand|fist|leg|knee|head|shoulder|elbow|hip|waist|trunk|torso|finger|wrist|back|body)s?\b")
+BODY_PARTS = re.compile(
+    r"\b(?:arm|hand|fist|leg|knee|head|shoulder|elbow|hip|waist|trunk|torso|finger|wrist|back|body)s?\b"
+)
 MOVING = re.compile(
     r"\b(?:turn|rotat|spin|pivot|twirl|circl|veer|curv|walk|r[ua]n|jog|go|stride|march|step|climb|crawl|hop|jump|skip|leap|sneak)\w*"
 )
-SIDES = re.compile(
+SIDE_PHRASES = re.compile(
     r"\b(?:(left|anti-?clockwise|counter-?clockwise)|(right|clockwise))\b(?! (?:arm|hand|fist|leg|foot|knee|side of))"
 )
-PACES = re.compile(r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly))\b")
+PACE_PHRASES = re.compile(r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly))\b")
 SLOWER = 0.75
 FASTER = 1.3
 
@@ -140,7 +142,8 @@ class Quantities:
     """Whether a turn may be to either side."""
 
     act: str = ""
-    """The measure of the act that is repeated, a value of :data:`ACTS`; "" for one counted by its beginnings."""
+    """The measure of the act that is repeated, a value of :data:`COUNTED_ACTS`; "" for one counted by its
+    beginnings."""
 
     spot: str = ""
     """The sentence without the numbers, as words alone: a turn without a gait, which ``text`` makes walking."""
@@ -149,7 +152,7 @@ class Quantities:
 def numerals(sentence: str) -> str:
     """A sentence in lower case with numbers as digits: "half a turn" is "0.5 turn", "twice" is "2 times"."""
     text = sentence.lower()
-    for pattern, replacement in SAID:
+    for pattern, replacement in REWORDED_NUMBERS:
         text = re.sub(pattern, replacement, text)
     return text
 
@@ -165,9 +168,9 @@ def quantities_of(sentence: str) -> Quantities:
             phrases.append(phrase)
     for phrase in reversed(phrases):
         text = text[: phrase.start] + phrase.rest + text[phrase.stop :]
-    sides = {1 if left else -1 for left, _ in SIDES.findall(text)}
+    sides = {1 if left else -1 for left, _ in SIDE_PHRASES.findall(text)}
     _turned(text, amounts, sides)
-    if pace := PACES.search(text):
+    if pace := PACE_PHRASES.search(text):
         amounts["pace"] = SLOWER if pace[1] else FASTER
     remaining = _plain(text, amounts) if phrases or "degrees" in amounts else sentence
     spot = re.sub(r"\s+", " ", text).strip(" ,.")
@@ -175,9 +178,9 @@ def quantities_of(sentence: str) -> Quantities:
 
 
 def _act_in(text: str) -> str:
-    """The measure of the act that a text repeats, a value of :data:`ACTS`."""
+    """The measure of the act that a text repeats, a value of :data:`COUNTED_ACTS`."""
     words = re.findall("[a-z]+", re.sub(r"\b(push|press|sit|pull)[ -]?ups?\b", r"\1up", text))
-    acts = [ACTS[word] for word in map(stem, words) if word in ACTS]
+    acts = [COUNTED_ACTS[word] for word in map(stem, words) if word in COUNTED_ACTS]
     return "jacks" if "jacks" in acts else next(filter(None, acts), "")
 
 
@@ -204,27 +207,29 @@ class _Phrase(NamedTuple):
 def _phrases(text: str) -> Iterator[_Phrase]:
     """The quantities in a text, units before acts."""
     for match in QUANTITY.finditer(text):
-        place = next(i for i in range(len(UNITS)) if match[f"u{i}"])
-        kind, factor, _ = UNITS[place]
+        place = next(i for i in range(len(UNIT_SPELLINGS)) if match[f"u{i}"])
+        kind, factor, _ = UNIT_SPELLINGS[place]
         unit = match[f"u{place}"]
         before = text[: match.start()]
         verb_ends = [verb.end() for verb in MOVING.finditer(before)]
         # An angle or a length of a part of the body, the figure's own feet, and "after 3 steps" are no quantities.
-        of_body = kind in ("degrees", "metres") and BODY.search(before, verb_ends[-1] if verb_ends else 0)
+        of_body = kind in ("degrees", "metres") and BODY_PARTS.search(before, verb_ends[-1] if verb_ends else 0)
         of_feet = unit in ("foot", "feet") and (ON_FEET.search(before) or match["number"] == "1")
         if of_body or of_feet or re.search(r"\b(?:after|every|each)\s*$", before):
             continue
-        rest = "" if verb_ends and kind == "degrees" else LEFT.get(unit.split()[-1][:4], "")
+        rest = "" if verb_ends and kind == "degrees" else REMAINING_WORD.get(unit.split()[-1][:4], "")
         yield _Phrase(kind, factor * float(match["number"]), match.start(), match.end(), f" {rest} ")
-    for match in COUNTED.finditer(text):
+    for match in COUNT_OF_ACTS.finditer(text):
         yield _Phrase("times", float(match["number"]), match.start("number"), match.start("what"), "")
 
 
 def _sensible(kind: Kind, value: float, sentence: str) -> float:
-    least = -MOST[kind] if kind == "degrees" else 0
-    if not least <= value <= MOST[kind] or value == 0 or (kind in ("steps", "times") and value % 1):
+    least = -LARGEST_NUMBERS[kind] if kind == "degrees" else 0
+    if not least <= value <= LARGEST_NUMBERS[kind] or value == 0 or (kind in ("steps", "times") and value % 1):
         whole = "a whole number" if kind in ("steps", "times") else "a number"
-        raise TextError(f"{value:g} {kind} cannot be shown (in {sentence!r}): give {whole} up to {MOST[kind]:g}, not 0")
+        raise TextError(
+            f"{value:g} {kind} cannot be shown (in {sentence!r}): give {whole} up to {LARGEST_NUMBERS[kind]:g}, not 0"
+        )
     return value
 
 

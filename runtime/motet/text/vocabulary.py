@@ -142,7 +142,7 @@ class TextRules:
         return (0, 0) if first is None else (first, 1)
 
 
-RULES = TextRules()
+NEW_MODEL_RULES = TextRules()
 """The rules for training new models."""
 
 
@@ -153,7 +153,7 @@ class Vocabulary:
     the one of ``words`` that is nearest to it."""
 
     words: tuple[str, ...]
-    rules: TextRules = field(default=RULES, hash=False)
+    rules: TextRules = field(default=NEW_MODEL_RULES, hash=False)
     common: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
@@ -170,7 +170,7 @@ class Vocabulary:
         """The vocabulary of sentences: their words by falling count, then by name."""
         counts = Counter[str]()
         for sentence in sentences:
-            counts.update(RULES.words(sentence))
+            counts.update(NEW_MODEL_RULES.words(sentence))
         return Vocabulary((*SPECIALS, *sorted(counts, key=lambda word: (-counts[word], word))))
 
     def __len__(self) -> int:

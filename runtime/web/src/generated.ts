@@ -7,7 +7,7 @@ export const BUNDLE = {
 
 // motet.bundle.fields
 export const FIELDS = {
-  LARGEST: 1000000000,
+  LARGEST_NUMBER: 1000000000,
 } as const;
 
 // motet.bundle.graph_safety
@@ -41,12 +41,12 @@ export const CONTACTS = {
   ADULT_HEIGHT: 1.7,
   ALLOWED: [0.6000000000000001, 0.2],
   GRAVITY: 9.81,
-  REACH: 1,
   REWEIGHTINGS: 10,
   RISE_SPAN: 0.05,
   SOLES: { heights: [0.02, 0.05], speeds: [0.3, 0.9], calm: 0.015 },
-  TOGETHER: 0.05,
+  VOTE_DECAY_SECONDS: 0.05,
   VOTING_HEIGHT: 0.07,
+  VOTING_SECONDS: 1,
 } as const;
 
 // motet.figures.feet.hold.HoldSettings
@@ -111,7 +111,7 @@ export const GLTF = {
 // motet.formats.gltf_data
 export const GLTF_DATA = {
   MAX_NODES: 20000,
-  REST: { translation: [0, 0, 0], rotation: [0, 0, 0, 1], scale: [1, 1, 1] },
+  REST_TRANSFORM: { translation: [0, 0, 0], rotation: [0, 0, 0, 1], scale: [1, 1, 1] },
 } as const;
 
 // motet.formats.text
@@ -121,8 +121,8 @@ export const TEXT = {
 
 // motet.generate.codec
 export const CODEC = {
-  PATH: 3,
-  REACH: 0.5,
+  PATH_CHANNELS: 3,
+  RADIAN_METRES: 0.5,
 } as const;
 
 // motet.generate.codes
@@ -170,7 +170,7 @@ export const continuationSettings = {
 
 // motet.generate.memory
 export const MEMORY = {
-  FAR: 1048576,
+  FORGOTTEN_AGE: 1048576,
 } as const;
 
 // motet.generate.memory.MemorySettings
@@ -195,9 +195,9 @@ export const memorySettings = {
 
 // motet.generate.model
 export const GENERATE = {
+  BASE_SENTENCE: "a person stands still",
   FAR_LESS: -100,
   NEVER: -1000000000,
-  STANDING: "a person stands still",
   STANDING_SECONDS: 0.8,
 } as const;
 
@@ -214,7 +214,7 @@ export const CONTROL = {
 
 // motet.models.describe
 export const DESCRIBE = {
-  LEAST: 1e-06,
+  LEAST_PROBABILITY: 1e-06,
 } as const;
 
 // motet.models.describe.ConfidenceSettings
@@ -229,10 +229,10 @@ export const LANGUAGE = {
 
 // motet.models.nearest_neighbour
 export const NEAREST_NEIGHBOUR = {
-  LEFT: 1,
+  GOES_LEFT: 1,
+  GOES_RIGHT: -1,
+  GOES_STRAIGHT: 2,
   NOTHING: "no human motion that it knows",
-  RIGHT: -1,
-  STRAIGHT: 2,
 } as const;
 
 // motet.models.nearest_neighbour.AnswerSettings
@@ -314,9 +314,9 @@ export const ACTION_LAYER = {
 
 // motet.steering.acts
 export const ACTS = {
-  LARGEST: 10000,
-  SHORTEST: 3,
-  STANDS: 0.98,
+  LARGEST_COORDINATE: 10000,
+  LEAST_ACT_FRAMES: 3,
+  STANDING_HIPS: 0.98,
   WIDTH: 92,
 } as const;
 
@@ -370,9 +370,9 @@ export const avoidanceSettings = {
 
 // motet.steering.events
 export const EVENTS = {
-  DOWN: 0.5,
+  DOWN_CONTACT: 0.5,
   FLIES: 2,
-  UP: 0.2,
+  UP_CONTACT: 0.2,
 } as const;
 
 // motet.steering.foot_lock.FootLockSettings
@@ -389,9 +389,9 @@ export const footLockSettings = {
 
 // motet.steering.idle
 export const IDLE = {
-  LEAST: 0.001,
-  TRUNK: [1, 2, 3],
-  TURNS: { 1: 1, 2: 0, 3: -2, 4: 1, 10: 1, 18: 1 },
+  BREATH_TURNS: { 1: 1, 2: 0, 3: -2, 4: 1, 10: 1, 18: 1 },
+  LEAST_BREATH: 0.001,
+  TRUNK_BONES: [1, 2, 3],
 } as const;
 
 // motet.steering.idle.IdleSettings
@@ -407,8 +407,8 @@ export const idleSettings = {
 
 // motet.steering.look_layer
 export const LOOK_LAYER = {
-  EYES: [0, 0.07, 0.08],
-  LEAST: 0.0001,
+  EYES_OFFSET: [0, 0.07, 0.08],
+  LEAST_TURN: 0.0001,
   SHARES: { chest: 0.1, upperChest: 0.25, neck: 0.55, head: 1 },
 } as const;
 
@@ -440,9 +440,9 @@ export const STEERING = {
 
 // motet.steering.reach_layer
 export const REACH_LAYER = {
-  AROUND: -0.7,
-  LEAST: 0.001,
+  LEAST_WEIGHT: 0.001,
   PALM: 0.09,
+  WRAP_COSINE: -0.7,
 } as const;
 
 // motet.steering.reach_layer.ReachSettings
@@ -459,15 +459,15 @@ export const reachSettings = {
 
 // motet.steering.repertoire
 export const REPERTOIRE = {
-  KEPT: 256,
+  MADE_ACTS: 256,
   SEAM: 9,
 } as const;
 
 // motet.steering.saying
 export const SAYING = {
-  GOES: 3,
-  NEARER: 2.5,
-  TURNS: 1.5,
+  GOING_SECONDS: 3,
+  NEARER_DISTANCE: 2.5,
+  TURN_SECONDS: 1.5,
 } as const;
 
 // motet.steering.settings.SteeringSettings
@@ -509,13 +509,13 @@ export const steeringSettings = {
 // motet.steering.spoken
 export const SPOKEN = {
   CURVE: 50,
-  FAST: 1.4,
-  GOING: ["forward", "backwards", "back", "circle", "step", "sideways"],
+  FAST_FACTOR: 1.4,
+  GOING_KINDS: ["forward", "backwards", "back", "circle", "step", "sideways"],
   JOG: 0.8,
-  MOST: 10,
+  MOST_TIMES: 10,
   OFFERED: 3,
-  SHORT: 4,
-  SLOW: 0.65,
+  SHORTEST_MENDED: 4,
+  SLOW_FACTOR: 0.65,
   STEP: 0.6,
 } as const;
 
@@ -546,7 +546,7 @@ export const turnSettings = {
 
 // motet.steering.warping
 export const WARPING = {
-  LEAST: 0.0001,
+  LEAST_CHANGE: 0.0001,
 } as const;
 
 // motet.text.clauses

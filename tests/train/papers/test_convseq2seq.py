@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motet_train.data.errors import DataError
 from motet_train.descent import Training
-from motet_train.papers.li2018.convseq2seq import SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
+from motet_train.papers.li2018.convseq2seq import LEAKY_SLOPE, Config, Convolution, ConvSeq2Seq, Discriminator
 from motet_train.papers.li2018.recipe import Adversary
 from motet_train.papers.li2018.stepwise import Stepwise, free_run
 
@@ -50,7 +50,7 @@ def naive_convolution(image: Array, weight: Array, same: bool) -> Array:
     out = np.array(
         [[[(image[:, t : t + height, d : d + width] * kernel).sum() for d in lefts] for t in tops] for kernel in weight]
     )
-    return np.where(out > 0, out, SLOPE * out)
+    return np.where(out > 0, out, LEAKY_SLOPE * out)
 
 
 @pytest.mark.parametrize("padding", ["valid", "same"])

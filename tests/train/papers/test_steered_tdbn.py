@@ -162,7 +162,7 @@ def test_it_is_measured_as_a_steered_figure_without_a_rival(model: TdbnModel, st
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
-        patch.setattr(following, "STRAIGHT", 2.0)
+        patch.setattr(following, "STRAIGHT_SECONDS", 2.0)
         report = steer_report(steered, Recorded.of(store), minutes=0.02, characters=3)
     groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "creep", "ways_walk", "ways_run"]
     groups += ["reversals", "stick", "random"]

@@ -21,7 +21,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, part
 from motet_train.evaluate.figures import make_folder, save
 from motet_train.recipes.recipe import SETTINGS
-from motet_train.runs import MANIFEST, Run
+from motet_train.runs import RUN_MANIFEST, Run
 from motet_train.settings import read_settings
 
 measurements = with_options(
@@ -90,7 +90,7 @@ def evaluate(
     torch.set_num_threads(1)
     if (says or actions or composed) and keep:
         raise click.UsageError("--says, --actions and --composed only print figures: drop --save")
-    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / MANIFEST).is_file()}
+    runs = {name: Run.load(Path(name)) for name in models if (Path(name) / RUN_MANIFEST).is_file()}
     loaded: dict[str, BundleModel] = {}
     for name in models:
         loaded[name] = runs[name].bundle_model() if name in runs else load(name, session)

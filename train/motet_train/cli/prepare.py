@@ -13,7 +13,7 @@ from motet_train.cli.train_options import unit_in, with_options
 from motet_train.data.corpus import Corpus, Record, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.merging import merge_stores
-from motet_train.data.preparation import ALL, FIGURES, Preparation, preparation
+from motet_train.data.preparation import FIGURE_CHOICES, PARTS_OF_ALL_VERBS, Preparation, preparation
 from motet_train.data.store import INDEX, Store, is_store, prepare_parts
 from motet_train.data.table import read_gaits, read_people
 from motet_train.plan import kind_for, store_for
@@ -31,7 +31,9 @@ source_options = with_options(
 corpus_options = with_options(
     source_options,
     click.option(
-        "--figure", type=click.Choice(FIGURES), help="Skeleton of the store. [default: humanoid; for KIT's data, own]"
+        "--figure",
+        type=click.Choice(FIGURE_CHOICES),
+        help="Skeleton of the store. [default: humanoid; for KIT's data, own]",
     ),
 )
 
@@ -89,7 +91,12 @@ def prepare(
         corpus = corpus_of(data, **source, described=verb != "predict")
         if verb == "all" and (figure or fps):
             raise click.UsageError("--figure and --fps apply to a store of one kind: add --for")
-        _prepare(corpus, out, ALL if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)}, shard)
+        _prepare(
+            corpus,
+            out,
+            PARTS_OF_ALL_VERBS if verb == "all" else {".": preparation(verb, corpus.kit, figure, fps)},
+            shard,
+        )
     _summarise(out)
 
 

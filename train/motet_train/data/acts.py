@@ -15,22 +15,22 @@ from motet.motion.rotations import Array
 from motet.representation.contract import named
 from motet_train.data.sixd_windows import poses_of
 
-LEAST = 4.0
+SHORTEST_ACT = 4.0
 """Shortest act, in seconds."""
 
-MOST = 12.0
+LONGEST_ACT = 12.0
 """Longest act, in seconds; a shorter take is a single act."""
 
-AHEAD = 0.4
+LOOK_AHEAD_SECONDS = 0.4
 """Seconds from a pose to the later pose that is compared with it, so that movement counts as well as posture."""
 
-BACK = 0.4
+RETURN_DISTANCE = 0.4
 """Largest distance of any joint, in metres, between the start and the end of an act."""
 
-KNOWN = 0.45
+KNOWN_DISTANCE = 0.45
 """Largest distance of any joint, in metres, at which an act still shows a pose: hopping on one foot is another act."""
 
-SHARE = 0.95
+KNOWN_SHARE = 0.95
 """Share of a take's poses that each of its acts must show: starting and stopping are often shown only once."""
 
 
@@ -41,7 +41,7 @@ def acts(motion: Motion) -> list[tuple[int, int]]:
     of the take. What remains after the last act is left out. A take that is short, or does not repeat itself, is one
     span.
     """
-    if len(motion) <= MOST * motion.fps:
+    if len(motion) <= LONGEST_ACT * motion.fps:
         return [(0, len(motion))]
     distances = _distances(_local_positions(motion))
     cuts = [0]
@@ -55,13 +55,13 @@ def acts(motion: Motion) -> list[tuple[int, int]]:
 def _end(distances: Array, start: int, fps: float) -> int | None:
     """The end of the act that begins at frame ``start``, from the distances of frames (T, T)."""
     second = round(fps)
-    shortest = start + round(LEAST * fps)
-    longest = start + round(MOST * fps)
+    shortest = start + round(SHORTEST_ACT * fps)
+    longest = start + round(LONGEST_ACT * fps)
     for stop in range(shortest, min(longest, len(distances))):
-        if distances[stop, start] > BACK:
+        if distances[stop, start] > RETURN_DISTANCE:
             continue
         nearest_in_act = distances[start:stop].min(axis=0)
-        if np.mean(nearest_in_act <= KNOWN) >= SHARE:
+        if np.mean(nearest_in_act <= KNOWN_DISTANCE) >= KNOWN_SHARE:
             # within the next second, cut where the figure is closest to its first pose
             return stop + int(np.argmin(distances[stop : stop + second, start]))
     return None
@@ -69,7 +69,7 @@ def _end(distances: Array, start: int, fps: float) -> int | None:
 
 def _local_positions(motion: Motion) -> Array:
     """Positions of joints at each frame and AHEAD of it, (T, 2 J, 3) in metres, relative to the root at that frame."""
-    ahead = round(AHEAD * motion.fps)
+    ahead = round(LOOK_AHEAD_SECONDS * motion.fps)
     world = positions(named("root_sixd").motion(motion))
     pose = poses_of(motion.values, motion.fps)[: len(world) - ahead]
     now_and_ahead = np.concatenate([world[: len(pose)], world[ahead:]], axis=1)

@@ -15,7 +15,7 @@ from motet.errors import MotionError
 from motet.models.language import padded
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract
-from motet.text.vocabulary import MAX_WORDS, RULES, Vocabulary
+from motet.text.vocabulary import MAX_WORDS, NEW_MODEL_RULES, Vocabulary
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import alike, mirror_text, usable
 from motet_train.data.store import Store
@@ -190,7 +190,7 @@ def examples(store: Store, records: Sequence[int], vocabulary: Vocabulary, mirro
         # a sentence without any known word teaches nothing
         texts = []
         for text in store.records[record].sentences:
-            if usable(text) and not vocabulary.ids.keys().isdisjoint(RULES.words(text)):
+            if usable(text) and not vocabulary.ids.keys().isdisjoint(NEW_MODEL_RULES.words(text)):
                 texts.append(text)
         if texts:
             kept.append(record)

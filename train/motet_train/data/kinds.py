@@ -6,19 +6,19 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.table import read_toml
 
-KINDS: Mapping[str, str] = read_toml(__file__, "kinds.toml")
+KIND_PATTERNS: Mapping[str, str] = read_toml(__file__, "kinds.toml")
 """Name of a kind -> the regular expression of the words that name it."""
 
-_WORDS = {kind: re.compile(rf"\b(?:{words})\b") for kind, words in KINDS.items()}
+_WORDS = {kind: re.compile(rf"\b(?:{words})\b") for kind, words in KIND_PATTERNS.items()}
 
 
 @cache
 def named(sentence: str) -> frozenset[str]:
     """The kinds of action that a sentence names; the word after "instead of" or "without" does not count."""
-    text = re.sub(r"(?:instead of|without) \w+", "", " ".join(RULES.words(sentence)))
+    text = re.sub(r"(?:instead of|without) \w+", "", " ".join(NEW_MODEL_RULES.words(sentence)))
     return frozenset(kind for kind, words in _WORDS.items() if words.search(text))
 
 

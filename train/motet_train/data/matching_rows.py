@@ -38,13 +38,13 @@ Most weights are those of Holden et al. 2020, "Learned Motion Matching"; feet we
 swinging feet have to stop at a transition."""
 
 
-STANDS = ContactSettings(heights=(0.03, 0.06), speeds=(0.2, 0.6))
+STANCE_CONTACTS = ContactSettings(heights=(0.03, 0.06), speeds=(0.2, 0.6))
 """Contacts of recorded soles on level ground: a foot turning on its ball is in contact, a landing foot is not yet."""
 
-LEAP = 0.4
+LEAP_DISTANCE = 0.4
 """Shortest flight, in seconds, that is a leap rather than part of a running step."""
 
-AROUND = 0.3
+LEAP_MARGIN_SECONDS = 0.3
 """Seconds before and after a leap that belong to it."""
 
 
@@ -97,11 +97,12 @@ def _shown_gaits(recording: Recording, gaits: tuple[str, ...]) -> list[bool]:
 
 
 def _leaps(airborne: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
-    """The rows (N,) of flights of :data:`LEAP` seconds and more, and of :data:`AROUND` seconds before and after."""
+    """The rows (N,) of flights of :data:`LEAP_DISTANCE` seconds and more, and of :data:`LEAP_MARGIN_SECONDS` seconds
+    before and after."""
     from scipy.ndimage import binary_dilation, binary_opening  # here, so that other trainings do not load scipy
 
-    shortest = _window(LEAP, fps)
-    around = _window(2 * AROUND, fps)
+    shortest = _window(LEAP_DISTANCE, fps)
+    around = _window(2 * LEAP_MARGIN_SECONDS, fps)
     leaps: NDArray[np.bool_] = binary_dilation(binary_opening(airborne, shortest), around)
     return leaps
 
@@ -117,7 +118,7 @@ def _rows(features: Motion, settings: SteeringSettings) -> tuple[Array, Array, A
     rotations, places = global_transforms(named("root_sixd").motion(features))
     block = features.select(ROOT_SIXD).values
     way = poses_of(block, fps)  # x, z, facing
-    contacts = foot_contacts(rotations, places, fps, STANDS)
+    contacts = foot_contacts(rotations, places, fps, STANCE_CONTACTS)
     speed = _smooth_speed(block, fps)
     # features: the trajectory ahead, the speed at the second horizon, and the pose
     times = horizons(settings)

@@ -10,7 +10,7 @@ from motet.files import new_folder
 from motet.jobs import Shard
 from motet_train.data.corpus import NO_MOTION, Skipped
 from motet_train.data.errors import DataError
-from motet_train.data.store import FRAMES, INDEX, Entry, Store, StoreWriter
+from motet_train.data.store import FRAMES_FILE, INDEX, Entry, Store, StoreWriter
 
 
 def merge_stores(places: Sequence[Path], path: Path) -> None:
@@ -60,7 +60,7 @@ def _merge(places: Sequence[Path], folder: Path) -> None:
         if _kind(store) != _kind(stores[0]):
             raise DataError(f"{place} was prepared in another way than {places[0]}")
     # copy record after record, one motion in memory at a time
-    with (folder / FRAMES).open("wb") as file:
+    with (folder / FRAMES_FILE).open("wb") as file:
         writer = StoreWriter(file, stores[0].representation)
         names: set[str] = set()
         for store in stores:

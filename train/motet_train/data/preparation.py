@@ -15,7 +15,7 @@ from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
-SHORTEST = 0.5
+SHORTEST_MOTION = 0.5
 """Shortest motion in seconds: a shorter one shows no action, and has less than five frames at 10 fps."""
 
 
@@ -40,8 +40,8 @@ class Preparation:
     def pieces(self, motion: Motion) -> list[Motion]:
         """The motion to train on, in equal pieces shorter than ``longest``; MotionError if it is too short or long."""
         motion = _cleaned(motion, self.humanoid, self.trim, self.floor)
-        if motion.duration < SHORTEST or not (self.cut or motion.duration < self.longest):
-            limits = f"at least {SHORTEST:g} s" + ("" if self.cut else f" and less than {self.longest:g} s")
+        if motion.duration < SHORTEST_MOTION or not (self.cut or motion.duration < self.longest):
+            limits = f"at least {SHORTEST_MOTION:g} s" + ("" if self.cut else f" and less than {self.longest:g} s")
             raise MotionError(f"{motion.duration:.3g} s ({len(motion)} frames): a training motion has {limits}")
         # equal pieces, as few as are short enough
         count = math.floor(motion.duration / self.longest) + 1
@@ -120,18 +120,18 @@ SIXD = Preparation("root_sixd", humanoid=True, trim=True, cut=True, floor=True, 
 VECTORS = Preparation("root_vectors", humanoid=True, trim=True, cut=False, fps=30.0, longest=math.inf)
 """Root block and exponential maps: for predictors."""
 
-ALL = {"root_angles": FULL, "root_sixd": SIXD, "root_vectors": VECTORS}
+PARTS_OF_ALL_VERBS = {"root_angles": FULL, "root_sixd": SIXD, "root_vectors": VECTORS}
 """The parts of a store for all verbs, by their representation."""
 
-FIGURES = ("humanoid", "own")
+FIGURE_CHOICES = ("humanoid", "own")
 
 
 def preparation(verb: str, kit: bool, figure: str | None = None, fps: float | None = None) -> Preparation:
     """The preparation of a corpus for a verb: "describe", "generate", "codes" or "predict".
 
     kit: whether the corpus is the KIT Motion-Language data, which is prepared as in the paper unless the humanoid is
-    asked for. figure: one of :data:`FIGURES`, by default the humanoid. fps: frames per second, by default the verb's.
-    """
+    asked for. figure: one of :data:`FIGURE_CHOICES`, by default the humanoid. fps: frames per second, by default the
+    verb's."""
     prepared = {"predict": VECTORS, "codes": SIXD}.get(verb, FULL)
     if kit and verb != "predict" and figure != "humanoid":
         prepared = ANGLES

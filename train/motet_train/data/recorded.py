@@ -23,7 +23,7 @@ LEVELLED = ContactSettings(heights=(0.05, 0.08))
 LEVEL_FOR = 0.1
 """Standard deviation, in seconds, of the window over which the height of the ground is averaged."""
 
-SLOPE = 10.0
+COLLAR_SLOPE = 10.0
 """Degrees by which collar bones slope below the horizontal when the arms hang."""
 
 
@@ -101,7 +101,7 @@ def _levelled(features: Motion) -> Motion:
 
 
 def _with_even_collars(features: Motion) -> Motion:
-    """A recording whose collar bones slope by :data:`SLOPE` on average; the arms keep their directions.
+    """A recording whose collar bones slope by :data:`COLLAR_SLOPE` on average; the arms keep their directions.
 
     Marker sets give them slopes of 0 (CMU's) to 40 degrees (ACCAD's), with which other figures' shoulders droop.
     """
@@ -112,7 +112,7 @@ def _with_even_collars(features: Motion) -> Motion:
         arm = local[f"{side}UpperArm"]
         # swing the collar bone's mean direction to the desired one
         rest = HUMANOID.offsets[HUMANOID.index(f"{side}UpperArm")]
-        sloping = np.array([rest[0], -abs(rest[0]) * np.tan(np.radians(SLOPE)), 0.0])
+        sloping = np.array([rest[0], -abs(rest[0]) * np.tan(np.radians(COLLAR_SLOPE)), 0.0])
         even_collar = product(swing(rotated(collar, rest).mean(axis=0), sloping), collar)
         # the upper arm undoes that
         same_arm = product(product(inverse(even_collar), collar), arm)

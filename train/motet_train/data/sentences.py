@@ -6,10 +6,10 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from motet.text.vocabulary import MAX_WORDS, RULES
+from motet.text.vocabulary import MAX_WORDS, NEW_MODEL_RULES
 from motet_train.data.store import Store
 
-OTHER = {
+RIGHT_OF_LEFT = {
     "left": "right",
     "lefts": "rights",
     "leftmost": "rightmost",
@@ -19,15 +19,17 @@ OTHER = {
     "leftfooted": "rightfooted",
     "clockwise": "counterclockwise",
 }
-OTHER |= {right: left for left, right in OTHER.items()} | {"anticlockwise": "clockwise"}
+OPPOSITE_WORDS = RIGHT_OF_LEFT | {right: left for left, right in RIGHT_OF_LEFT.items()} | {"anticlockwise": "clockwise"}
 """Words for a side or a sense of rotation, and their opposites."""
 
-SIDED = re.compile(rf"\b(?!right (?:angles?|angled|away)\b)({'|'.join(sorted(OTHER, key=len, reverse=True))})\b")
+SIDED_WORDS = re.compile(
+    rf"\b(?!right (?:angles?|angled|away)\b)({'|'.join(sorted(OPPOSITE_WORDS, key=len, reverse=True))})\b"
+)
 
 
 def usable(sentence: str) -> bool:
     """Whether a sentence has 1 to MAX_WORDS words."""
-    return 1 <= len(RULES.words(sentence)) <= MAX_WORDS
+    return 1 <= len(NEW_MODEL_RULES.words(sentence)) <= MAX_WORDS
 
 
 def mirror_text(sentence: str) -> str:
@@ -35,7 +37,7 @@ def mirror_text(sentence: str) -> str:
 
     A right angle stays a right angle. Mirroring twice gives the normalised sentence, except for "anticlockwise".
     """
-    return SIDED.sub(lambda match: OTHER[match[0]], RULES.normalise(sentence))
+    return SIDED_WORDS.sub(lambda match: OPPOSITE_WORDS[match[0]], NEW_MODEL_RULES.normalise(sentence))
 
 
 def alike(features: Sequence[Iterable[Hashable]]) -> list[int]:
@@ -101,12 +103,12 @@ def _sided(store: Store, records: tuple[int, ...]) -> set[str]:
     sided = set()
     for record in records:
         entry = store.records[record]
-        if any(mirror_text(sentence) != RULES.normalise(sentence) for sentence in entry.sentences):
+        if any(mirror_text(sentence) != NEW_MODEL_RULES.normalise(sentence) for sentence in entry.sentences):
             sided.add(entry.shows)
     return sided
 
 
 def _worded(sentences: Iterable[str], mirrored: bool) -> dict[str, None]:
     """The usable sentences, normalised and perhaps mirrored, as the keys of a dict."""
-    worded = mirror_text if mirrored else RULES.normalise
+    worded = mirror_text if mirrored else NEW_MODEL_RULES.normalise
     return dict.fromkeys(worded(sentence) for sentence in sentences if usable(sentence))

@@ -30,7 +30,7 @@ from motet_train.data.preparation import Preparation, repeated
 Floats = NDArray[np.float32]
 Item = Record | Skipped
 
-FRAMES = "frames.npy"
+FRAMES_FILE = "frames.npy"
 INDEX = "store.json"
 
 
@@ -129,7 +129,7 @@ class Store:
         """Open a store that :func:`prepare` wrote; DataError if it is incomplete."""
         try:
             index = json.loads((path / INDEX).read_text(encoding="utf-8"))
-            frames = np.load(path / FRAMES, mmap_mode="r")
+            frames = np.load(path / FRAMES_FILE, mmap_mode="r")
             store = Store(
                 frames,
                 str(index["representation"]),
@@ -147,7 +147,7 @@ class Store:
         for entry in store.records:
             stops += [stop for _, stop in entry.spans]
         if frames.shape != (max(stops), len(store.channels)) or frames.dtype != np.float32:
-            raise DataError(f"{path / FRAMES} does not match {INDEX}: prepare the corpus again")
+            raise DataError(f"{path / FRAMES_FILE} does not match {INDEX}: prepare the corpus again")
         return store
 
 
@@ -201,7 +201,7 @@ def prepare_parts(
         writers = []
         for name, preparation in parts.items():
             (folder / name).mkdir(exist_ok=True)
-            writers.append(_Preparing(files.enter_context((folder / name / FRAMES).open("wb")), preparation))
+            writers.append(_Preparing(files.enter_context((folder / name / FRAMES_FILE).open("wb")), preparation))
         # each item is read once, and goes to all of them
         for item in items:
             results = [writer.add(item) for writer in writers]

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.text.vocabulary import RULES, SPECIALS
+from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_train.data.errors import DataError
 
 FIRST = 50_000
 """Number of words of a file that may become common words; files begin with the most frequent."""
 
-NEAR = 0.55
+NEIGHBOUR_COSINE = 0.55
 """Least cosine of neighbours; four in ten common English words are as near to a word of our sentences."""
 
 
@@ -39,7 +39,8 @@ def word_table(path: Path, words: Sequence[str], size: int) -> WordTable:
 
 
 def nearest(vectors: Mapping[str, NDArray[np.float64]], words: Sequence[str]) -> dict[str, str]:
-    """The further words that have vectors, each with the nearest of ``words`` by cosine, if that is :data:`NEAR`."""
+    """The further words that have vectors, each with the nearest of ``words`` by cosine, if that is
+    :data:`NEIGHBOUR_COSINE`."""
     known = [word for word in words if word in vectors and len(word) > 1]
     others = [word for word in vectors if word not in set(words)]
     if not others or not known:
@@ -51,7 +52,7 @@ def nearest(vectors: Mapping[str, NDArray[np.float64]], words: Sequence[str]) ->
     neighbours = {}
     for word, row in zip(others, cosines, strict=True):
         best = int(row.argmax())
-        if row[best] >= NEAR:
+        if row[best] >= NEIGHBOUR_COSINE:
             neighbours[word] = known[best]
     return neighbours
 
@@ -106,7 +107,7 @@ def _vector(numbers: list[str], place: str) -> NDArray[np.float64]:
 
 def _is_word(text: str) -> bool:
     """Whether a text is a word of two letters or more that normalisation does not change."""
-    return text.isalpha() and len(text) > 1 and RULES.words(text) == [text]
+    return text.isalpha() and len(text) > 1 and NEW_MODEL_RULES.words(text) == [text]
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:

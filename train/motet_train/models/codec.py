@@ -17,13 +17,11 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from motet.generate.codec import PATH_CHANNELS
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
 from motet_train.models.kinematics import SixdPlaces, Tree
 from motet_train.models.net import Net, constants, gelu, normalised
-
-PATH = 3
-"""Number of the decoder's first channels: the root's forward, left and turn relative to the way of the moves."""
 
 
 @dataclass(frozen=True)
@@ -158,8 +156,8 @@ class MotionCodec(Net):
         forward and left (m) and turn (rad) relative to the way of the moves at the step; the others the contract's."""
         z = self.decoder(self.book[moves] / self.book_scale, values)
         scale = torch.where(self.scale > 0, self.scale, 0.0)
-        rest = z[..., PATH:] * scale[PATH:] + self.mean[PATH:]
-        return torch.cat([z[..., :PATH] * self.path_scale, rest], dim=-1)
+        rest = z[..., PATH_CHANNELS:] * scale[PATH_CHANNELS:] + self.mean[PATH_CHANNELS:]
+        return torch.cat([z[..., :PATH_CHANNELS] * self.path_scale, rest], dim=-1)
 
     def to_codes(self, values: Tensor) -> Tensor:
         """Rounded numbers (B, N, G L) to codes (B, N, G) int64."""
@@ -187,12 +185,12 @@ class MotionCodec(Net):
 def places_in_world(codec: MotionCodec, frames: Tensor, way: Tensor) -> Tensor:
     """Joints (B, T, J, 3) of decoder frames (B, T, D), whose root is relative to poses (B, T, 3) of x, z, facing."""
     # the root, beside the way of the moves
-    forward, left, turn = frames[..., :PATH].unbind(-1)
+    forward, left, turn = frames[..., :PATH_CHANNELS].unbind(-1)
     sin = way[..., 2].sin()
     cos = way[..., 2].cos()
     x = way[..., 0] + forward * sin + left * cos
     z = way[..., 1] + forward * cos - left * sin
-    root = torch.stack([x, frames[..., PATH], z], dim=-1)
+    root = torch.stack([x, frames[..., PATH_CHANNELS], z], dim=-1)
 
     # the joints around it
     places = _turned(codec.places(frames[..., len(ROOT_SIXD) :]), way[..., 2] + turn)

@@ -14,7 +14,7 @@ from motet_train.data.batches import Views
 from motet_train.models.joint_embedding import LIMIT, JointEmbedding
 from motet_train.models.net import normalised
 
-ACTIONS = 2.0
+BETWEEN_RECORDINGS_WEIGHT = 2.0
 """How much more differences between recordings of an action count than those between views of one."""
 
 RIDGE = 1.0
@@ -32,7 +32,7 @@ def discriminate(net: JointEmbedding, seen: Views) -> None:
 
     # what does not matter: differences between views of a motion, and between recordings of an action
     within = _covariance((views - motions[:, :, None]).flatten(0, 2))
-    within += ACTIONS * _covariance(_around(flat, seen.groups))
+    within += BETWEEN_RECORDINGS_WEIGHT * _covariance(_around(flat, seen.groups))
     within += RIDGE * within.diagonal().mean() * torch.eye(len(within))
 
     # the directions in which motions differ most, relative to that

@@ -20,7 +20,7 @@ from motet_train.models.kinematics import VectorFigure, VectorPlaces
 from motet_train.models.net import Graphs, Part, float_rows, gelu, normalised, zero_linear
 from motet_train.models.predictor import Block, MirroredPredictor, step_graph
 
-LEAST = 1e-3
+ERROR_FLOOR = 1e-3
 """Added to a sign of an error before its logarithm, in units of usual first steps."""
 
 VELOCITIES = 3
@@ -29,10 +29,10 @@ VELOCITIES = 3
 RECENT = 3
 """Last seed frames whose channels are seen, besides the places of all."""
 
-STEEPEST = 4.0
+LARGEST_STEP = 4.0
 """A step between seed frames counts for the linear maps up to so many times a usual one."""
 
-FARTHEST = 100.0
+LARGEST_INPUT = 100.0
 """Numbers of frames further from 0, in metres, radians, and these a second, are no motion, and count as this."""
 
 
@@ -66,7 +66,7 @@ class FigurePredictorConfig:
 
 def possible(frames: Tensor) -> Tensor:
     """Frames (..., C) with each number within what a motion can have."""
-    return frames.clamp(-FARTHEST, FARTHEST)
+    return frames.clamp(-LARGEST_INPUT, LARGEST_INPUT)
 
 
 def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
@@ -82,7 +82,7 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     way = size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1]))).cumsum(1)
     by_frame = [size(steps), disagreement.cumsum(1), way]
     at_all_frames = [sign[:, None].expand(disagreement.shape) for sign in shared]
-    return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1) + LEAST)
+    return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1) + ERROR_FLOOR)
 
 
 def size(values: Tensor) -> Tensor:
@@ -185,7 +185,7 @@ class FigurePredictor(MirroredPredictor):
         together = functional.linear(hidden, self._of_changes(self.outward.weight), self._of_changes(self.outward.bias))
 
         # each channel by its own past
-        usual = self._past(possible(frames)).clamp(-STEEPEST, STEEPEST)
+        usual = self._past(possible(frames)).clamp(-LARGEST_STEP, LARGEST_STEP)
         alone = self._of_changes(self.alone.permute(2, 1, 0).flatten(0, 1))
         by_itself = torch.einsum("blc,ncl->bnc", usual, torch.unflatten(alone, 0, self.reach.shape))
         changes: Tensor = torch.unflatten(together, 1, self.reach.shape) + by_itself

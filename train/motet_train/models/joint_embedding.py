@@ -24,7 +24,7 @@ from motet_train.models.recurrent import WordEmbedding
 LIMIT = 5.0
 """Standard deviations: wilder channels and statistics would outweigh all else."""
 
-SMALLEST = 1e-3
+DEVIATION_FLOOR = 1e-3
 """Added to deviations and speeds: the root of less would make much of rounding."""
 
 
@@ -103,7 +103,9 @@ class JointEmbedding(Net):
 
     def way(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Sums over frames (B, T, D) of lengths (B,) of the channels of the way, and of their sizes."""
-        rates = frames[..., : self.config.travelled] / self.scale[: self.config.travelled].clamp(min=SMALLEST) / 10
+        rates = (
+            frames[..., : self.config.travelled] / self.scale[: self.config.travelled].clamp(min=DEVIATION_FLOOR) / 10
+        )
         rates = torch.where(before(lengths, frames.shape[1])[..., None], rates, 0.0)
         return torch.cat([rates.sum(dim=1), rates.abs().sum(dim=1)], dim=1)
 
@@ -161,7 +163,7 @@ def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
     square = _sum((x - mean[:, None]).square(), active) / count
     shown = torch.where(active[..., None], x, x[:, :1])
     means = torch.where(sizes > 0, sums / sizes.clamp(min=1), mean[:, None]).flatten(1)
-    return torch.cat([mean, (square + SMALLEST**2).sqrt(), shown.amin(dim=1), shown.amax(dim=1), means], dim=1)
+    return torch.cat([mean, (square + DEVIATION_FLOOR**2).sqrt(), shown.amin(dim=1), shown.amax(dim=1), means], dim=1)
 
 
 def _thirds(lengths: Tensor, frames: int) -> Tensor:
@@ -176,7 +178,7 @@ def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:
     """Places (B, T, 3 J) of joints to roots of their mean and greatest speeds (B, 2 J), per frame."""
     steps = torch.diff(places, dim=1, prepend=places[:, :1]).reshape(*places.shape[:2], -1, 3)
     active = before(lengths, places.shape[1])
-    speed = torch.where(active[..., None], (steps.square().sum(dim=-1) + SMALLEST**2).sqrt(), 0.0)
+    speed = torch.where(active[..., None], (steps.square().sum(dim=-1) + DEVIATION_FLOOR**2).sqrt(), 0.0)
     return torch.cat([_sum(speed, active) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
 
 

@@ -17,7 +17,7 @@ Speeds = tuple[float, float, float, float, float]
 """Of a gait in m/s: the slowest, the usual one, and the fastest forward, sideways and backwards; 0 where it does not go
 that way."""
 
-DTYPES = {
+DTYPE_OF_TABLE = {
     "codes": np.float16,
     "moves": np.float32,
     "features": np.int8,
@@ -90,7 +90,9 @@ class Matching(Net):
 
     def tables(self) -> Tables:
         """All that the loop plays."""
-        return {name: getattr(self, name).detach().cpu().numpy().astype(dtype) for name, dtype in DTYPES.items()}
+        return {
+            name: getattr(self, name).detach().cpu().numpy().astype(dtype) for name, dtype in DTYPE_OF_TABLE.items()
+        }
 
 
 def quat_to_sixd(quats: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.text.vocabulary import RULES, Vocabulary
+from motet.text.vocabulary import NEW_MODEL_RULES, Vocabulary
 from motet_train.data.batches import Ids, Rows, padded_tensors
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions, actions_of
@@ -120,7 +120,7 @@ def described(actions: Actions) -> list[dict[str, Any]]:
     """A sentence of each action and the words of all its sentences, for manifests."""
     descriptions = []
     for sentences in actions.sentences:
-        words = set(chain.from_iterable(map(RULES.words, sentences)))
+        words = set(chain.from_iterable(map(NEW_MODEL_RULES.words, sentences)))
         descriptions.append({"sentence": sentences[0], "words": sorted(words)})
     return descriptions
 
@@ -140,7 +140,7 @@ class ActionSentences:
         actions_by_sentence: dict[str, set[int]] = {}
         for action, unseen in enumerate(actions.unseen):
             for sentence in unseen:
-                if any(map(vocabulary.meant, RULES.words(sentence))):
+                if any(map(vocabulary.meant, NEW_MODEL_RULES.words(sentence))):
                     actions_by_sentence.setdefault(sentence, set()).add(action)
         ids = _encoded(vocabulary, actions_by_sentence)
         self.unseen = padded_tensors(ids, "int64") if ids else None

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from motet.generate.codec import REACH, seen_from
+from motet.generate.codec import RADIAN_METRES, seen_from
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.batches import frame_mirror
@@ -147,9 +147,9 @@ def fit_book(poses: list[Array], hop: int, size: int, seed: int) -> Array:
     from sklearn.cluster import MiniBatchKMeans  # imported here, so that other trainings do not load it
 
     moves = np.concatenate([seen_from(way[:-hop], way[hop:]) for way in poses if len(way) > hop])
-    scaled = moves * (1, 1, REACH)
+    scaled = moves * (1, 1, RADIAN_METRES)
     clusters = MiniBatchKMeans(size - 1, random_state=seed, n_init=3, batch_size=4096).fit(scaled)
-    centres = clusters.cluster_centers_ / (1, 1, REACH)
+    centres = clusters.cluster_centers_ / (1, 1, RADIAN_METRES)
     return np.concatenate([np.zeros((1, 3)), centres])
 
 

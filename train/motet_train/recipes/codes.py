@@ -27,7 +27,7 @@ from motet_train.recipes.language import divided, manifest
 from motet_train.recipes.recipe import MUON, Job, Recipe, origin
 from motet_train.runs import Run
 
-DRAWING: dict[str, Any] = {
+DRAWING_SETTINGS: dict[str, Any] = {
     "temperature": 1.0,
     "top_p": 0.8,
     "guidance": 1.5,
@@ -61,7 +61,7 @@ DEFAULT = Recipe(
     ("actions",),
     replace(MUON, steps=4500, every=300, batch=16, weight_decay=0.05, warm_up=100, falling=0.5),
     CodeVisits(),
-    DRAWING,
+    DRAWING_SETTINGS,
 )
 
 RECIPES = {"default": DEFAULT}

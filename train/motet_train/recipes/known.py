@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from motet.bundle.graph import Floats
-from motet.models.nearest_neighbour import LEFT, RIGHT, STRAIGHT, AnswerSettings, Known, log_odds
-from motet.text.vocabulary import RULES
+from motet.models.nearest_neighbour import GOES_LEFT, GOES_RIGHT, GOES_STRAIGHT, AnswerSettings, Known, log_odds
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.batches import Examples, Views
 from motet_train.data.errors import DataError
-from motet_train.data.kinds import KINDS, Shown, careful, named, shown_by
+from motet_train.data.kinds import KIND_PATTERNS, Shown, careful, named, shown_by
 from motet_train.data.sentences import Actions, actions_of
 from motet_train.data.store import Store
 from motet_train.models.discriminant import discriminate
@@ -63,7 +63,7 @@ TRIED = "tried.npz"
 TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
 """Beginnings of words for a path that is not straight."""
 
-GOING = frozenset({"walk", "run", "skip", "backwards", "turn", "jump", "carry", "sidestep"})
+LOCOMOTION_KINDS = frozenset({"walk", "run", "skip", "backwards", "turn", "jump", "carry", "sidestep"})
 """Kinds of locomotion, whose direction is worth mentioning."""
 
 SIDEWAYS = frozenset({"sidestep", "jump"})
@@ -174,33 +174,33 @@ def _clear_sentences(actions: Actions, shown: Sequence[Shown]) -> Iterator[tuple
 
 def _names_both_sides(sentence: str) -> bool:
     """Whether a sentence names left and right, as in "left, right, left"."""
-    return {"left", "right"} <= set(RULES.words(sentence))
+    return {"left", "right"} <= set(NEW_MODEL_RULES.words(sentence))
 
 
 def _kind_row(shown: Shown) -> list[int]:
     """For each kind 2 if it is shown, 1 if it may be mentioned, else 0."""
-    return [2 if kind in shown.shown else int(kind in shown.sayable) for kind in KINDS]
+    return [2 if kind in shown.shown else int(kind in shown.sayable) for kind in KIND_PATTERNS]
 
 
 def _named_row(sentence: str) -> list[bool]:
     """For each kind whether a sentence names it."""
-    return [kind in named(sentence) for kind in KINDS]
+    return [kind in named(sentence) for kind in KIND_PATTERNS]
 
 
 def way_of(sentence: str) -> tuple[int, int, int]:
     """The direction of travel in a sentence, its degrees, 0 for none, and whether it is about locomotion alone."""
-    text = " ".join(RULES.words(sentence))
+    text = " ".join(NEW_MODEL_RULES.words(sentence))
     kinds = named(sentence)
-    going = bool(kinds) and kinds <= GOING
+    going = bool(kinds) and kinds <= LOCOMOTION_KINDS
 
     # a side is that of the path if there is a word of turning, or if the sentence is about nothing but locomotion, as
     # in "walks straight and then continues to the left"
     sides = frozenset(re.findall(r"\b(?:left|right)\b(?! angle)", text))
     of_the_path = re.search(TURNING, text) is not None or (going and not kinds & SIDEWAYS)
     of_a_limb = re.search(r"\b(?:foot|feet|legs?|arms?|hands?|shoulder)\b", text) is not None
-    way = STRAIGHT if re.search(r"\bstraight\b", text) else 0
+    way = GOES_STRAIGHT if re.search(r"\bstraight\b", text) else 0
     if of_the_path and not of_a_limb:
-        way = {frozenset({"left"}): LEFT, frozenset({"right"}): RIGHT}.get(sides, way)
+        way = {frozenset({"left"}): GOES_LEFT, frozenset({"right"}): GOES_RIGHT}.get(sides, way)
 
     # degrees in digits, or a right angle
     digits = re.search(r"\b(\d(?: ?\d)*) degrees?\b", text)
@@ -252,7 +252,7 @@ def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown])
     best = shares.argmax(axis=1)
     right = []
     for shown, flags in zip(shows, known.sets[best], strict=True):
-        right.append(shown.right_kinds(set(compress(KINDS, flags))))
+        right.append(shown.right_kinds(set(compress(KIND_PATTERNS, flags))))
     best_shares = shares[np.arange(len(best)), best]
     return Tried(best_shares, similarity, np.full(len(best), group), np.array(right, dtype=bool))
 

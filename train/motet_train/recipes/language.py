@@ -14,7 +14,7 @@ from motet.models.describe import ConfidenceSettings, DescribeModel
 from motet.models.language import MAX_SECONDS
 from motet.representation.base import FrameMirror
 from motet.representation.contract import MotionContract, named
-from motet.text.vocabulary import RULES, Vocabulary
+from motet.text.vocabulary import NEW_MODEL_RULES, Vocabulary
 from motet_train.data.batches import Batch, Examples, examples, frame_mirror
 from motet_train.data.sentences import mirror_text, usable
 from motet_train.data.store import Split, Store, split
@@ -190,7 +190,7 @@ def manifest(job: Job, corpus: Divided, config: Mapping[str, Any], data: str, by
         "test": [records[record].name for record in parts.test],
     }
     training = {"data": about, "split": split_names}
-    text = {"text": RULES.to_json(), "vocabulary": corpus.vocabulary.words}
+    text = {"text": NEW_MODEL_RULES.to_json(), "vocabulary": corpus.vocabulary.words}
     return job.manifest(corpus.contract, config, job.recipe.defaults, None, training, **text)
 
 

@@ -30,7 +30,7 @@ DEFAULT = Recipe(
 )
 """For the protocol's text files, which have no bones."""
 
-FILES = Recipe(
+FIGURE_RECIPE = Recipe(
     "predict",
     "figure-trajectory",
     "free_run",
@@ -43,7 +43,7 @@ FILES = Recipe(
 )
 """For motion files of a figure."""
 
-RECIPES = {"default": DEFAULT, "files": FILES}
+RECIPES = {"default": DEFAULT, "files": FIGURE_RECIPE}
 
 MEASURED_WINDOWS = 4096
 """Training windows whose mean and scale are those of a figure's predictor."""

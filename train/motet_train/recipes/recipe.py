@@ -14,7 +14,7 @@ from motet_train.data.store import Split, Store
 from motet_train.descent import Training
 from motet_train.models.net import Net
 from motet_train.progress import SILENT, Watcher
-from motet_train.runs import MANIFEST, About, Run, refuse_other, surroundings
+from motet_train.runs import RUN_MANIFEST, About, Run, refuse_other, surroundings
 from motet_train.trainer import Learner, Line, kept, train
 
 SETTINGS = "run.toml"
@@ -157,8 +157,8 @@ class Job:
 
     def _begin(self, manifest: Mapping[str, Any]) -> None:
         """Write the manifest and the settings of a new run."""
-        refuse_other(self.folder / MANIFEST, manifest)
-        write_whole(self.folder / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+        refuse_other(self.folder / RUN_MANIFEST, manifest)
+        write_whole(self.folder / RUN_MANIFEST, json.dumps(manifest, indent=1) + "\n")
         if self.settings is not None:
             write_whole(self.folder / SETTINGS, self.settings)
 

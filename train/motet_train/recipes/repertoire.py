@@ -25,13 +25,13 @@ from motet.models.load import load_as
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.steering.model import SteerModel
-from motet.steering.repertoire import SEAM, STEPS, at_tempo, joined
+from motet.steering.repertoire import SEAM, STEPS_OF_UNIT, at_tempo, joined
 from motet_train.data.errors import DataError
 
-STANDING = 12.0
+BASE_SECONDS = 12.0
 """Seconds of the standing figure over which acts are keyed."""
 
-KEPT = ("name", "also", "side", "limb")
+KEPT_COLUMNS = ("name", "also", "side", "limb")
 """What the document keeps of the table."""
 
 TARGET = Path(motet.steering.__file__).with_name("repertoire.json")
@@ -48,7 +48,7 @@ class Maker:
     def __init__(self, generate: CodesModel, control: SteerModel) -> None:
         self.generate = generate
         self.control = control
-        self.standing: Motion = control.run(f"stop {STANDING:g}s")
+        self.standing: Motion = control.run(f"stop {BASE_SECONDS:g}s")
         self._shown: dict[str, Array] = {}
 
     def numbers(self, act: Mapping[str, Any]) -> Array:
@@ -101,9 +101,9 @@ def made(acts: Mapping[str, Any], maker: Maker) -> dict[str, Any]:
             kept = continuous(maker.numbers(act))[::2]
             more = {"arms": arms_alone(act, kept), "first": sum(map(len, rows)), "frames": len(kept)}
             rows.append(kept)
-        documents[act["name"]] = {key: act[key] for key in KEPT if key in act} | more
+        documents[act["name"]] = {key: act[key] for key in KEPT_COLUMNS if key in act} | more
     frames = packed({"frames": differences(np.concatenate(rows))})
-    return {"words": words(acts["words"]), "acts": [*documents.values()], "steps": STEPS, **frames}
+    return {"words": words(acts["words"]), "acts": [*documents.values()], "steps": STEPS_OF_UNIT, **frames}
 
 
 def arms_alone(act: Mapping[str, Any], kept: Array) -> bool:
@@ -127,7 +127,7 @@ def words(texts: Mapping[str, Any]) -> dict[str, Any]:
 
 def differences(numbers: Array) -> NDArray[np.int16]:
     """Frames of acts, one after the other, as whole steps from row to row."""
-    whole = np.round(numbers * STEPS)
+    whole = np.round(numbers * STEPS_OF_UNIT)
     return np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]))).astype(np.int16)
 
 

@@ -8,7 +8,7 @@ import torch
 from torch.nn import functional
 
 from motet.representation.contract import named
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.batches import Examples, Views, padded_tensors, views
 from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.sentences import usable
@@ -116,7 +116,7 @@ class _UnseenSentences:
         rows = []
         for row, entry in enumerate(entries):
             for sentence in entry.unseen or entry.sentences:
-                if usable(sentence) and not known.isdisjoint(RULES.words(sentence)):
+                if usable(sentence) and not known.isdisjoint(NEW_MODEL_RULES.words(sentence)):
                     ids.append(corpus.vocabulary.encode(sentence)[0])
                     rows.append(row)
         self.texts = padded_tensors(ids, "int64")

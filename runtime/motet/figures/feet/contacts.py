@@ -32,9 +32,9 @@ GROUND_PERCENT = 10
 VOTING_HEIGHT = 0.07
 """Metres above the ground from which on a point has no vote on where the root goes."""
 
-TOGETHER = 0.05
+VOTE_DECAY_SECONDS = 0.05
 """Seconds by which votes apart in time count e times less for each other."""
-REACH = 1.0
+VOTING_SECONDS = 1.0
 """Seconds beyond which votes do not count for each other."""
 
 ALLOWED = (3 * 0.2, 0.2)
@@ -256,8 +256,8 @@ def velocity_by_feet(
     nearness = contacts(heights, None, ContactSettings(heights=(0.0, VOTING_HEIGHT)))
 
     # and votes count less for each other the farther apart in time they are
-    reach = round(REACH * fps)
-    window = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (TOGETHER * fps))
+    reach = round(VOTING_SECONDS * fps)
+    window = np.exp(-np.abs(np.arange(-reach, reach + 1)) / (VOTE_DECAY_SECONDS * fps))
 
     # the mean of all votes first, then means in which votes count less that disagree with the mean before
     velocity = _mean_vote(votes, nearness, window, trust, guess)

@@ -23,16 +23,16 @@ from motet.figures.humanoid.joint_map import Body
 from motet.motion.kinematics import places_of
 from motet.motion.rotations import UP, Array, Mask, product, rotated, rotvec_to_rotmat, unit
 
-STILL = 0.3
+STILL_SPEED = 0.3
 """Metres a second below which heel and ball of a foot that stands both move."""
 
-FLAT = np.radians(20)
+FLAT_TILT = np.radians(20)
 """Tilt up to which a foot that stands is meant to be flat."""
 
-STANDS = 0.1
+STANDING_SHARE = 0.1
 """Share of the frames of a motion in which a foot stands, from which on these tell where the ground is."""
 
-NEAR = 0.1
+NEAR_GROUND = 0.1
 """Metres from the ground within which a motion is meant to stand on it, and is laid on it."""
 
 DEPTH = 0.005
@@ -204,15 +204,15 @@ def _rise_to_the_ground(feet: Sequence[Foot], soles: Array, scale: float, fps: f
     # moments in which a foot stands flat
     heights, stands = _standing_feet(soles, fps)
     flat = np.stack([foot.lowest(np.ones(frames)) for foot in feet], axis=1)
-    stands &= np.stack([foot.tilt <= FLAT for foot in feet], axis=1) & np.isfinite(flat)
-    if stands.any(axis=1).mean() >= STANDS:
+    stands &= np.stack([foot.tilt <= FLAT_TILT for foot in feet], axis=1) & np.isfinite(flat)
+    if stands.any(axis=1).mean() >= STANDING_SHARE:
         ground = float(np.median(heights[stands]))
         raised = -float(np.median(flat[stands]))
     else:
         ground = ground_under(soles)
         lowest = np.min([foot.lowest(np.zeros(frames)) for foot in feet], axis=0)
         raised = -float(np.percentile(lowest, 5))
-    return raised + (scale * ground if abs(ground) > NEAR else 0.0)
+    return raised + (scale * ground if abs(ground) > NEAR_GROUND else 0.0)
 
 
 def _standing_feet(soles: Array, fps: float) -> tuple[Array, Mask]:
@@ -225,7 +225,7 @@ def _standing_feet(soles: Array, fps: float) -> tuple[Array, Mask]:
     if len(soles) < 2:
         return heights, lower
     speeds = np.linalg.norm(np.gradient(points[:, :, :2], axis=0), axis=-1).max(axis=2) * fps
-    return heights, (speeds < STILL) & lower
+    return heights, (speeds < STILL_SPEED) & lower
 
 
 def _envelope(values: Array, reach: float) -> Array:

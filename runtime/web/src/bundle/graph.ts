@@ -92,7 +92,9 @@ export class Graph {
       const data = tensor.data as Float32Array | BigInt64Array;
       results[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
       if (!bounded(results[name].data))
-        throw new BundleError(`graph ${this.role}: ${name} is not finite, or beyond ${FIELDS.LARGEST}`);
+        throw new BundleError(
+          `graph ${this.role}: ${name} is not finite, or beyond ${FIELDS.LARGEST_NUMBER}`,
+        );
     }
     return results;
   }
@@ -129,7 +131,7 @@ function singles(data: NumberArray["data"]): Float32Array {
 
 /** Whether all numbers are finite and within bounds. */
 function bounded(data: Float32Array): boolean {
-  for (let at = 0; at < data.length; at++) if (!(Math.abs(data[at]!) <= FIELDS.LARGEST)) return false;
+  for (let at = 0; at < data.length; at++) if (!(Math.abs(data[at]!) <= FIELDS.LARGEST_NUMBER)) return false;
   return true;
 }
 

@@ -38,7 +38,7 @@ export function checkManifest(manifest: Fields): void {
   checkMotion(manifest.motion as Fields);
   for (const [feature, values] of entries(manifest.settings)) {
     for (const [key, value] of Object.entries(values)) {
-      const fits = typeof value !== "number" || Math.abs(value) <= FIELDS.LARGEST;
+      const fits = typeof value !== "number" || Math.abs(value) <= FIELDS.LARGEST_NUMBER;
       check(fits && value !== null, `settings.${feature}.${key}`, "is no number of a setting");
     }
   }

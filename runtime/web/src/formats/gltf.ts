@@ -26,7 +26,7 @@ import { type Joint, type RestNode, Skeleton, unique } from "../motion/skeleton.
 
 /** Numbers of a node's rotation, translation or scale. */
 const WIDTHS: Record<string, number> = Object.fromEntries(
-  Object.entries(GLTF_DATA.REST).map(([path, rest]) => [path, rest.length]),
+  Object.entries(GLTF_DATA.REST_TRANSFORM).map(([path, rest]) => [path, rest.length]),
 );
 
 /** The names of the animations that move a figure. FormatError as {@link readGLB}. */

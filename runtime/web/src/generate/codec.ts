@@ -49,13 +49,13 @@ export async function codesOf(codec: Codec, frames: Frames): Promise<number[][]>
 async function bookOf({ decoder, moves }: Codec, parts: number): Promise<Pose[]> {
   const codes = Array.from({ length: moves }, (_, move) => [move, ...Array<number>(parts - 1).fill(0)]);
   const { data } = (await decoder.run({ codes: integers(codes.flat(), 1, moves, parts) })).moves!;
-  return codes.map((_, at) => pose(data, CODEC.PATH * at));
+  return codes.map((_, at) => pose(data, CODEC.PATH_CHANNELS * at));
 }
 
 /** The move that leads nearest to another. */
 function nearest([forward, left, turn]: Pose, book: Pose[]): number {
   const off = book.map(
-    ([x, z, angle]) => (forward - x) ** 2 + (left - z) ** 2 + (CODEC.REACH * (turn - angle)) ** 2,
+    ([x, z, angle]) => (forward - x) ** 2 + (left - z) ** 2 + (CODEC.RADIAN_METRES * (turn - angle)) ** 2,
   );
   return off.indexOf(Math.min(...off));
 }
@@ -104,9 +104,9 @@ export class StreamingDecoder {
     for (let step = this.count - start; step < until - start; step++) {
       for (let at = step * hop; at < (step + 1) * hop; at++)
         decoded.push(this.led(frames!.data.slice(at * width, (at + 1) * width)));
-      this.way = moved(this.way, pose(moves!.data, CODEC.PATH * step));
+      this.way = moved(this.way, pose(moves!.data, CODEC.PATH_CHANNELS * step));
     }
-    if (first) decoded[0]!.set(decoded[1]!.subarray(0, CODEC.PATH)); // the first frame has the second one's rates
+    if (first) decoded[0]!.set(decoded[1]!.subarray(0, CODEC.PATH_CHANNELS)); // the first frame has the second one's rates
     this.count = until;
     return this.joined(decoded);
   }
@@ -145,7 +145,7 @@ function inertialized(
   const [before, off] = [0, 1].map((row) =>
     Float64Array.from(context[row]!, (value, at) => value - frames[row]![at]!),
   ) as [Float64Array, Float64Array];
-  const speed = off.map((value, at) => (at < CODEC.PATH ? 0 : (value - before[at]!) * fps));
+  const speed = off.map((value, at) => (at < CODEC.PATH_CHANNELS ? 0 : (value - before[at]!) * fps));
   const y = (2 * Math.LN2) / halfLife;
   const fading = Math.exp(-y / fps);
   return (frame) => {

@@ -208,7 +208,7 @@ export class Memory {
         if (!pieces.has(this.lasts[row]!)) return;
         const age = this.ages[row]! - this.ages[take[first]!]!;
         const inside = age >= 0 && age <= last - first;
-        course.ages[at] = inside ? age : MEMORY.FAR;
+        course.ages[at] = inside ? age : MEMORY.FORGOTTEN_AGE;
         course.over[at] = inside ? age / (last - first) : Infinity;
       });
     }

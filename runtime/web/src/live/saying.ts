@@ -52,7 +52,7 @@ export class Saying {
       page.rest(this.all);
       page.pilot = new Order(0, 0, facing);
     } else if (step.kind === "here") {
-      const away = SAYING.NEARER;
+      const away = SAYING.NEARER_DISTANCE;
       page.pilot = goTo([x + away * Math.sin(towardsCamera), z + away * Math.cos(towardsCamera)]);
     } else if (step.kind === "away") {
       page.pilot = new Order(0, usual(net, 0), towardsCamera + Math.PI);
@@ -80,7 +80,7 @@ export class Saying {
 /** How long a step lasts before the next one. */
 function secondsOf(step: Step): number {
   if (step.seconds) return step.seconds;
-  return step.kind === "go" && step.name ? SAYING.GOES : SAYING.TURNS;
+  return step.kind === "go" && step.name ? SAYING.GOING_SECONDS : SAYING.TURN_SECONDS;
 }
 
 /** The gait and the speed of a step, from those before it. */

@@ -82,7 +82,7 @@ export class DescribeModel extends LanguageModel {
       beams,
     );
     return answers.map(({ text, probability }) => {
-      const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST));
+      const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST_PROBABILITY));
       return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
     });
   }

@@ -152,8 +152,8 @@ export class Known {
       turn === undefined || Math.abs(turn) < this.settings.turned
         ? 0
         : turn > 0
-          ? NEAREST_NEIGHBOUR.LEFT
-          : NEAREST_NEIGHBOUR.RIGHT;
+          ? NEAREST_NEIGHBOUR.GOES_LEFT
+          : NEAREST_NEIGHBOUR.GOES_RIGHT;
     const rows = this.named.flatMap((kinds, row) =>
       kinds === set && counted[actionOf[row]!]! > 0 ? [row] : [],
     );
@@ -165,7 +165,7 @@ export class Known {
     const back = ahead <= -this.settings.backwards && !BACKWARDS.test(text) ? ", backwards" : "";
     const turning =
       side && ways[3 * best!.row] !== side
-        ? `, turning ${side === NEAREST_NEIGHBOUR.LEFT ? "left" : "right"}`
+        ? `, turning ${side === NEAREST_NEIGHBOUR.GOES_LEFT ? "left" : "right"}`
         : "";
     return text + back + turning;
   }
@@ -175,13 +175,13 @@ export class Known {
     if (turn === undefined) return 0;
     const [way, degrees] = this.tables.ways.subarray(3 * row, 3 * row + 2);
     if (degrees! > 0 && Math.abs(degrees! - Math.abs(turn)) > 30) return -1;
-    if (side) return way === side ? 1 : way === -side || way === NEAREST_NEIGHBOUR.STRAIGHT ? -1 : 0;
+    if (side) return way === side ? 1 : way === -side || way === NEAREST_NEIGHBOUR.GOES_STRAIGHT ? -1 : 0;
     // neither turned nor straight for certain: the other side alone is wrong
     if (Math.abs(turn) > this.settings.straight)
-      return way === (turn > 0 ? NEAREST_NEIGHBOUR.RIGHT : NEAREST_NEIGHBOUR.LEFT) ? -1 : 0;
-    return way === NEAREST_NEIGHBOUR.STRAIGHT
+      return way === (turn > 0 ? NEAREST_NEIGHBOUR.GOES_RIGHT : NEAREST_NEIGHBOUR.GOES_LEFT) ? -1 : 0;
+    return way === NEAREST_NEIGHBOUR.GOES_STRAIGHT
       ? 0.5
-      : way === NEAREST_NEIGHBOUR.LEFT || way === NEAREST_NEIGHBOUR.RIGHT
+      : way === NEAREST_NEIGHBOUR.GOES_LEFT || way === NEAREST_NEIGHBOUR.GOES_RIGHT
         ? -1
         : 0;
   }

@@ -53,12 +53,12 @@ export interface ActModel {
 export function actOf({ fps, acts: settings }: ActModel, name: string, numbers: ArrayLike<number>): Act {
   const values = Array.from(numbers);
   const frames = values.length / ACTS.WIDTH;
-  if (!Number.isInteger(frames) || frames < ACTS.SHORTEST)
+  if (!Number.isInteger(frames) || frames < ACTS.LEAST_ACT_FRAMES)
     throw new ControlError(
-      `an act needs ${ACTS.SHORTEST} or more frames of ${ACTS.WIDTH} numbers, not ${values.length} numbers`,
+      `an act needs ${ACTS.LEAST_ACT_FRAMES} or more frames of ${ACTS.WIDTH} numbers, not ${values.length} numbers`,
     );
-  if (!values.every((value) => Math.abs(value) <= ACTS.LARGEST))
-    throw new ControlError(`an act must be finite numbers, no larger than ${ACTS.LARGEST}`);
+  if (!values.every((value) => Math.abs(value) <= ACTS.LARGEST_COORDINATE))
+    throw new ControlError(`an act must be finite numbers, no larger than ${ACTS.LARGEST_COORDINATE}`);
   const rows = Array.from({ length: frames }, (_, at) =>
     values.slice(at * ACTS.WIDTH, (at + 1) * ACTS.WIDTH),
   );
@@ -111,7 +111,7 @@ function byLegs(
   let facing = 0;
   const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
   return (
-    range([ACTS.STANDS, ...height]) > settings.bent ||
+    range([ACTS.STANDING_HIPS, ...height]) > settings.bent ||
     Math.max(...features.map((feature) => Math.max(feature[1]!, feature[4]!))) > settings.raised ||
     range(turned) > settings.turned
   );

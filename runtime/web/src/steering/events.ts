@@ -34,7 +34,7 @@ export function after(
   act: Act | null,
 ): Happenings {
   const foot = (side: 0 | 1) =>
-    before?.down[side] ? contacts[side] >= EVENTS.UP : contacts[side] > EVENTS.DOWN;
+    before?.down[side] ? contacts[side] >= EVENTS.UP_CONTACT : contacts[side] > EVENTS.DOWN_CONTACT;
   const down: [boolean, boolean] = [foot(0), foot(1)];
   const flies = !down[0] && !down[1];
   if (!before) return { down, air: flies ? EVENTS.FLIES : 0, gait, arrived, act };

@@ -8,9 +8,9 @@ import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
 
 /** The bones that a breath turns about the x axis of the hips, and by how many times its depth. */
-const TURNS = Object.entries(IDLE.TURNS).map(([bone, times]) => ({ bone: Number(bone), times }));
+const TURNS = Object.entries(IDLE.BREATH_TURNS).map(([bone, times]) => ({ bone: Number(bone), times }));
 /** Those of the trunk above the hips. */
-const TRUNK: readonly number[] = IDLE.TRUNK;
+const TRUNK: readonly number[] = IDLE.TRUNK_BONES;
 
 /** Of one figure. ticks: since it was there. share, rate: how far it has come to rest, from 0 to 1, and how fast that changes. */
 export interface Standing {
@@ -54,7 +54,7 @@ export function breathed(
   settings: Settings<typeof idleSettings>,
   dt: number,
 ): Played {
-  if (share <= IDLE.LEAST) return pose;
+  if (share <= IDLE.LEAST_BREATH) return pose;
   const [x, z] = pose.ground;
   const angle =
     settings.depth *

@@ -46,7 +46,8 @@ export function looked(
   settings: Settings<typeof lookSettings>,
   seconds: number,
 ): Played {
-  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST)) return pose;
+  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST_TURN))
+    return pose;
   const seen = bonesOf(pose);
   const now = angles(rotated(seen.at(-1)!, Z));
   look.turn = followed(
@@ -107,7 +108,7 @@ function eyes(bones: Quaternion[]): Vector {
     place = plus(place, rotated(above, OFFSETS[SHARES[i]![0]]!));
     above = bone;
   });
-  return plus(place, rotated(above, [...LOOK_LAYER.EYES]));
+  return plus(place, rotated(above, [...LOOK_LAYER.EYES_OFFSET]));
 }
 
 /** Of a direction, to the left and up. */

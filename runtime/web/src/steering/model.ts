@@ -200,8 +200,8 @@ async function tablesOf(bundle: Bundle): Promise<Tables> {
     name: string,
     dtype: string,
     shape: (number | undefined)[],
-    least = -FIELDS.LARGEST,
-    most: (at: number) => number = () => FIELDS.LARGEST,
+    least = -FIELDS.LARGEST_NUMBER,
+    most: (at: number) => number = () => FIELDS.LARGEST_NUMBER,
   ) => {
     const entry = bundle.manifest.tables?.[name];
     if (entry && (entry.dtype !== dtype || `${entry.shape}` !== `${shape}`)) {

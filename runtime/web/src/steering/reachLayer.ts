@@ -52,7 +52,7 @@ export function reached(
   settings: Settings<typeof reachSettings>,
   seconds: number,
 ): Played {
-  const rests = shownBy(hand.weight)[0]! < REACH_LAYER.LEAST;
+  const rests = shownBy(hand.weight)[0]! < REACH_LAYER.LEAST_WEIGHT;
   if (!hand.point && rests) return pose;
   // where the hand can be for its point, and whether that can be held
   const arm = armOf(pose, side);
@@ -194,7 +194,7 @@ function diagonal(side: number): Vector {
  *  way has become too far around. */
 function sign(first: Quaternion, second: Quaternion, before: number): number {
   const cosine = first.reduce((sum, value, i) => sum + value * second[i]!, 0);
-  return before === 0 || cosine * before < REACH_LAYER.AROUND ? (cosine < 0 ? -1 : 1) : before;
+  return before === 0 || cosine * before < REACH_LAYER.WRAP_COSINE ? (cosine < 0 ? -1 : 1) : before;
 }
 
 /** A rotation between two, by a share of the way. side: the sign of the first quaternion. */

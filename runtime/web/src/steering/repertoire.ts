@@ -81,7 +81,7 @@ export class Repertoire {
     const key = [name, side, tempo, count].join("|");
     const known = this.made.get(key);
     if (known) return known;
-    if (this.made.size >= REPERTOIRE.KEPT) this.made.delete(this.made.keys().next().value!);
+    if (this.made.size >= REPERTOIRE.MADE_ACTS) this.made.delete(this.made.keys().next().value!);
     const act = actOf(this.model, name, this.performance(name, side, tempo, count).flat());
     this.made.set(key, act);
     return act;

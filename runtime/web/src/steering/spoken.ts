@@ -66,8 +66,8 @@ const ORDERS: Record<string, Step> = {
   here: stepOf("here"),
   away: stepOf("away"),
   around: stepOf("go", { way: 180 }),
-  faster: stepOf("go", { change: SPOKEN.FAST }),
-  slower: stepOf("go", { change: SPOKEN.SLOW }),
+  faster: stepOf("go", { change: SPOKEN.FAST_FACTOR }),
+  slower: stepOf("go", { change: SPOKEN.SLOW_FACTOR }),
 };
 
 /** What a sentence is read as; without steps, the part that is not known, and the nearest names. */
@@ -219,7 +219,7 @@ export class Words {
 
   /** A word, or the known one that it is a misspelling of. */
   private mendedWord(word: string, mended: Record<string, string>): string {
-    const isWord = [...word].length >= SPOKEN.SHORT && /^\p{L}+$/u.test(word);
+    const isWord = [...word].length >= SPOKEN.SHORTEST_MENDED && /^\p{L}+$/u.test(word);
     if (!isWord || this.known.includes(word) || this.stems.has(stem(word))) return word;
     const readAs = corrected(word, this.known);
     if (readAs) mended[word] = readAs;
@@ -286,15 +286,15 @@ export class Words {
       const name = this.named(tried, side, isSided);
       if (name === null) continue;
       const tempo = tried === words ? 1 : this.tempo(words);
-      return stepOf("act", { name, side, tempo, count: Math.max(1, Math.min(times, SPOKEN.MOST)) });
+      return stepOf("act", { name, side, tempo, count: Math.max(1, Math.min(times, SPOKEN.MOST_TIMES)) });
     }
     return null;
   }
 
   private tempo(words: readonly string[]): number {
     const { slow, fast } = this.table;
-    if (words.some((word) => fast.includes(word))) return SPOKEN.FAST;
-    return words.some((word) => slow.includes(word)) ? SPOKEN.SLOW : 1;
+    if (words.some((word) => fast.includes(word))) return SPOKEN.FAST_FACTOR;
+    return words.some((word) => slow.includes(word)) ? SPOKEN.SLOW_FACTOR : 1;
   }
 
   /** The act that words name, perhaps beside its limb; it has to have a side where one is said. */
@@ -368,13 +368,13 @@ export class Words {
   private gone(kinds: readonly string[], side: string, number: number | null, pace: number): Step | null {
     const has = (kind: string) => kinds.includes(kind);
     if (has("faster") || has("slower")) {
-      return side ? null : stepOf("go", { change: has("faster") ? SPOKEN.FAST : SPOKEN.SLOW });
+      return side ? null : stepOf("go", { change: has("faster") ? SPOKEN.FAST_FACTOR : SPOKEN.SLOW_FACTOR });
     }
     if (kinds.length === 1 && has("turn") && !side) return null;
     const sign = side === "right" ? -1 : 1;
     const jogs = has("jog");
     const gait = kinds.find((kind) => this.gaits.includes(kind)) ?? (jogs ? "run" : "");
-    if (!gait && !SPOKEN.GOING.some(has)) {
+    if (!gait && !SPOKEN.GOING_KINDS.some(has)) {
       return stepOf("go", { way: sign * (has("around") ? 180 : (number ?? 90)) });
     }
     const steps = has("step");

@@ -9,7 +9,7 @@ const BACK = SPINE.map((name) => BONES.indexOf(name));
 
 /** Local rotations with hips and legs turned to the left by an angle; all that the spine carries stays as it is. */
 export function warped(rotations: Quaternion[], angle: number): Quaternion[] {
-  if (Math.abs(angle) <= WARPING.LEAST) return rotations;
+  if (Math.abs(angle) <= WARPING.LEAST_CHANGE) return rotations;
   const turned = [...rotations];
   let above = rotations[0]!;
   turned[0] = product(about(Y, angle), above);
@@ -31,7 +31,7 @@ const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
  * go: one that changed with the row that is played would make feet leap.
  */
 export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
-  if (Math.abs(stride - 1) <= WARPING.LEAST) return rotations;
+  if (Math.abs(stride - 1) <= WARPING.LEAST_CHANGE) return rotations;
   const turned = [...rotations];
   SIDES.forEach((_, side) => {
     const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);

@@ -17,12 +17,12 @@ VERBS: Patterns = {
     "run": r"run|runs|ran|running|runner\w*|jog\w*|sprint\w*",
     "jump": r"jump\w*|leap\w*|hop|hops|hopp\w*|springs?",
 }
-SIDES: Patterns = {
+SIDE_SPELLINGS: Patterns = {
     "left": r"left(?:wards?|most|handed)?",
     "right": r"right(?:wards?|most|handed)?(?! (?:angles?|angled|away))",
 }
-TURNS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
-DIRECTIONS: Patterns = SIDES | {"backward": r"backwards?"}
+TURN_PATTERNS: Patterns = {"turn": r"(?<!in )turn\w*|veer\w*|swerv\w*|curv\w*|corner|rotat\w*|spin\w*|dodg\w*|circle"}
+DIRECTION_PATTERNS: Patterns = SIDE_SPELLINGS | {"backward": r"backwards?"}
 ACTIONS: Patterns = VERBS | {
     "dance": r"danc\w*|ballet|arabesque|pirouette\w*",
     "kick or punch": r"kick\w*|punch\w*|karate|box\w*",
@@ -46,13 +46,13 @@ def mentioned(table: Patterns, *sentences: str) -> frozenset[str]:
 
 def side(sentence: str) -> frozenset[str]:
     """Left or right; empty if a sentence mentions both, as in "the left and the right foot in turn"."""
-    sides = mentioned(SIDES, sentence)
+    sides = mentioned(SIDE_SPELLINGS, sentence)
     return sides if len(sides) == 1 else frozenset()
 
 
 def turning(sentence: str) -> bool:
     """Whether a sentence about walking or running says that the path is not straight."""
-    return bool(mentioned(TURNS, sentence) or side(sentence))
+    return bool(mentioned(TURN_PATTERNS, sentence) or side(sentence))
 
 
 def common(attributes: Sequence[frozenset[str]]) -> frozenset[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motet.models.describe import ConfidenceSettings, DescribeModel, Description, Part
 from motet.motion.motion import Motion
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, mentioned
 from motet_train.evaluate.language.split_store import SplitStore
 
@@ -23,8 +23,8 @@ TIMELINES = 60
 CHAIN = 3
 """Motions of a timeline."""
 
-SHORTEST = 2.0
-LONGEST = 12.0
+SHORTEST_PART = 2.0
+LONGEST_PART = 12.0
 """Seconds that a motion of a timeline lasts."""
 
 Truths = NDArray[np.bool_]
@@ -41,7 +41,7 @@ def confidence(model: DescribeModel, corpus: SplitStore, records: Sequence[int])
     descriptions, right = judged(model, corpus, records)
     sure = np.array([description.confident for description in descriptions])
     scores = np.array([description.log_probability for description in descriptions])
-    words = [len(RULES.words(description.text)) + 1 for description in descriptions]  # with the end
+    words = [len(NEW_MODEL_RULES.words(description.text)) + 1 for description in descriptions]  # with the end
     return {
         "of": float(len(descriptions)),
         "right": share(right),
@@ -158,7 +158,7 @@ def timeline_figures(model: DescribeModel, corpus: SplitStore, records: Sequence
 
 def fits_timeline(motion: Motion) -> bool:
     """Whether a motion is long and short enough for a timeline."""
-    return SHORTEST <= motion.duration <= LONGEST
+    return SHORTEST_PART <= motion.duration <= LONGEST_PART
 
 
 def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence[tuple[str, int]]]:

@@ -15,7 +15,7 @@ from sklearn.metrics import pairwise_distances_argmin
 from motet.errors import TextError
 from motet.models.describe import DescribeModel
 from motet.motion.motion import Motion
-from motet.text.vocabulary import EOS, RULES, SOS
+from motet.text.vocabulary import EOS, NEW_MODEL_RULES, SOS
 from motet_train.evaluate.language.attributes import words_right
 from motet_train.evaluate.language.confidence import confidence, timeline_figures
 from motet_train.evaluate.language.motions import Looks
@@ -25,7 +25,7 @@ from motet_train.evaluate.tables import Report, gathered
 RANKS = 5
 """Hypotheses for each motion, as in the paper."""
 
-ORDERS = (1, 2, 3, 4)
+NGRAM_ORDERS = (1, 2, 3, 4)
 """Longest n-grams of the BLEU scores on unseen references."""
 
 Hypothesis = TypeVar("Hypothesis")
@@ -234,8 +234,8 @@ def _unseen(
 def _by_order(hypotheses: list[list[str]], copied: References, references: References) -> dict[str, float]:
     """BLEU of the first hypotheses, and of copying, for n-grams of each length."""
     best = [row[0] for row in hypotheses]
-    scores = {f"bleu_{n}": bleu(best, references, longest=n) for n in ORDERS}
-    floors = {f"nearest_{n}": copied_bleu(copied, references, n) for n in ORDERS}
+    scores = {f"bleu_{n}": bleu(best, references, longest=n) for n in NGRAM_ORDERS}
+    floors = {f"nearest_{n}": copied_bleu(copied, references, n) for n in NGRAM_ORDERS}
     return scores | floors
 
 
@@ -251,5 +251,5 @@ def _log_probability(model: DescribeModel, corpus: SplitStore, records: Sequence
                     total += model.score(motion, sentence)
                 except TextError:  # all its words are unknown
                     continue
-                count += len(RULES.words(sentence)) + 1
+                count += len(NEW_MODEL_RULES.words(sentence)) + 1
     return total / count if count else np.nan

@@ -13,7 +13,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import TextWarning
 from motet.motion.motion import Motion
 from motet.representation.contract import MotionContract
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import alike, usable
 from motet_train.data.store import Entry, Split, Store
@@ -139,7 +139,7 @@ def _matching(store: Store, wanted: Callable[[str], bool]) -> tuple[int, ...]:
 
 def plain(sentence: str) -> str:
     """A sentence in the form that BLEU compares: normalised, every digit a word."""
-    return " ".join(RULES.words(sentence))
+    return " ".join(NEW_MODEL_RULES.words(sentence))
 
 
 def _plain(sentences: Iterable[str]) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ def description_groups(entries: Sequence[Entry]) -> list[int]:
     """A number for each record, equal for records that share a sentence, directly or through others."""
     descriptions = []
     for entry in entries:
-        descriptions.append([RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
+        descriptions.append([NEW_MODEL_RULES.normalise(sentence) for sentence in (*entry.sentences, *entry.unseen)])
     return alike(descriptions)
 
 

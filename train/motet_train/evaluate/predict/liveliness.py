@@ -30,7 +30,7 @@ from motet_train.evaluate.tables import Report, aligned, short_names
 SPANS = ((0, 1), (1, 5), (5, 30))
 """Seconds after the recording's end."""
 
-KEPT = 0.15
+KEPT_CHANGE = 0.15
 """Largest relative change of a speed that counts as kept."""
 
 CONTINUED = {"still": "standing still", "alone": "{name}, alone", "beyond": "{name}, then the writer"}
@@ -165,7 +165,7 @@ def figures(pairs: Sequence[tuple[Trajectory, Trajectory]]) -> dict[str, float]:
         energies = [part.energy / end.energy for end, part in both]
         span = f"{start}_{stop}_s"
         report[f"speed_{span}"] = float(np.median(speeds))
-        report[f"kept_{span}"] = float(np.mean(np.abs(speeds - 1) <= KEPT))
+        report[f"kept_{span}"] = float(np.mean(np.abs(speeds - 1) <= KEPT_CHANGE))
         report[f"energy_{span}"] = float(np.median(energies))
         report[f"slide_cm_{span}"] = _slide(part for _, part in both)
     return report

@@ -53,21 +53,21 @@ MOTION_KINDS: Mapping[str, str] = {
 """Kind -> its words, fixed before anything was measured by them. An action belongs to the first kind that has a word in
 it before its first comma. A record without an action belongs to the first kind with a word in half of its sentences."""
 
-REST = "everything else"
+EVERYTHING_ELSE = "everything else"
 
 
 def kind_of(entry: Entry) -> str:
-    """The kind of a record of a store, :data:`REST` if no word matches."""
+    """The kind of a record of a store, :data:`EVERYTHING_ELSE` if no word matches."""
     # the action if there is one, else what most sentences say
     texts = [entry.action.partition(",")[0]] if entry.action else entry.sentences
     if not texts:
-        return REST
+        return EVERYTHING_ELSE
     words = [re.findall(r"[a-z]+", text.lower()) for text in texts]
     for kind, pattern in MOTION_KINDS.items():
         matching = [text_words for text_words in words if _any_matches(pattern, text_words)]
         if 2 * len(matching) >= len(texts):
             return kind
-    return REST
+    return EVERYTHING_ELSE
 
 
 def _any_matches(pattern: str, words: Sequence[str]) -> bool:
@@ -76,7 +76,7 @@ def _any_matches(pattern: str, words: Sequence[str]) -> bool:
 
 def by_kind(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
     """The records of each kind that has any, in the order of :data:`MOTION_KINDS`, everything else last."""
-    kinds: dict[str, list[Entry]] = {kind: [] for kind in (*MOTION_KINDS, REST)}
+    kinds: dict[str, list[Entry]] = {kind: [] for kind in (*MOTION_KINDS, EVERYTHING_ELSE)}
     for entry in entries:
         kinds[kind_of(entry)].append(entry)
     return {kind: members for kind, members in kinds.items() if members}

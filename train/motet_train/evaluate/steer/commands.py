@@ -18,7 +18,7 @@ from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import MEASURED_SPEEDS, Track, floats, joint_steps, settled
 
-SAID = (
+MEASURED_ACTS = (
     *("wave", "clap", "point", "greet", "throw", "drink", "punch", "box", "stretch", "look around"),
     *("kick", "bow", "sit down", "jump", "dance", "turn around", "kneel down", "cartwheel", "pick up", "squat"),
 )
@@ -27,20 +27,20 @@ SAID = (
 AFTER = 1.0
 """Seconds that are measured after the longest act."""
 
-FAR = np.array([0.5, 1.0, 2.0, 4.0])
+GOAL_DISTANCES = np.array([0.5, 1.0, 2.0, 4.0])
 """Metres to the points that figures go to, in 8 directions from where they face."""
 
-PATH = np.array([[0.0, 4.0], [4.0, 4.0], [4.0, 8.0]])
+CORNERED_PATH = np.array([[0.0, 4.0], [4.0, 4.0], [4.0, 8.0]])
 """Corners of a path in metres, ahead of where figures stand: a turn to the left, and one to the right."""
 
-UNTIL = 14.0
+POINT_SECONDS = 14.0
 """Seconds that figures have to arrive."""
 
 
 def said_acts(model: SteerModel) -> list[Act]:
-    """The acts of :data:`SAID`, made by the shipped model ``generate``."""
+    """The acts of :data:`MEASURED_ACTS`, made by the shipped model ``generate``."""
     acts = SaidActs(model, load_as(CodesModel, "generate"))
-    return [acts.act(sentence) for sentence in SAID]
+    return [acts.act(sentence) for sentence in MEASURED_ACTS]
 
 
 def act_figures(model: SteerModel, acts: Sequence[Act], leap: Array, gait: str | None) -> dict[str, float]:
@@ -123,7 +123,8 @@ def _largest_steps(act: Act) -> Array:
 
 
 def going_figures(model: SteerModel, gait: str) -> dict[str, float]:
-    """How figures that stand go to points at :data:`FAR` in a gait, and along :data:`PATH`, in :data:`UNTIL` seconds.
+    """How figures that stand go to points at :data:`GOAL_DISTANCES` in a gait, and along :data:`CORNERED_PATH`, in
+    :data:`POINT_SECONDS` seconds.
 
     never: how many do not arrive. off_cm, off_worst_cm: final distances from the points. s: mean seconds until they
     arrive, infinite if one never does. path_cm, path_p95_cm: distances from the path in all ticks until they arrive.
@@ -136,7 +137,7 @@ def _point_figures(model: SteerModel, gait: str) -> dict[str, Any]:
     # points all around, at several distances
     angles = np.radians(np.arange(0, 360, 45))
     directions = np.stack([np.sin(angles), np.cos(angles)], axis=1)
-    points = (FAR[:, None, None] * directions).reshape(-1, 2)
+    points = (GOAL_DISTANCES[:, None, None] * directions).reshape(-1, 2)
 
     # how far figures end from their points, and how soon
     session = model.start(gait, characters=len(points))
@@ -155,10 +156,10 @@ def _point_figures(model: SteerModel, gait: str) -> dict[str, Any]:
 
 def _path_figures(model: SteerModel, gait: str) -> dict[str, Any]:
     session = model.start(gait)
-    session.go_along(PATH)
+    session.go_along(CORNERED_PATH)
     poses, arrived = _gone(session, model.fps)
     places = np.concatenate([pose.ground[:, :2] for pose in poses])
-    corners = np.concatenate([np.zeros((1, 2)), PATH])
+    corners = np.concatenate([np.zeros((1, 2)), CORNERED_PATH])
 
     # until the figure arrives, or all along
     first_arrived = arrived[:, 0].argmax() or None
@@ -166,15 +167,15 @@ def _path_figures(model: SteerModel, gait: str) -> dict[str, Any]:
     return {
         "path_cm": errors.mean(),
         "path_p95_cm": np.percentile(errors, 95),
-        "path_end_cm": 100 * np.hypot(*(places[-1] - PATH[-1])),
+        "path_end_cm": 100 * np.hypot(*(places[-1] - CORNERED_PATH[-1])),
     }
 
 
 def _gone(session: SteerSession, fps: float) -> tuple[list[Pose], Flags]:
-    """The poses of :data:`UNTIL` seconds, and which figures have arrived (T, B)."""
+    """The poses of :data:`POINT_SECONDS` seconds, and which figures have arrived (T, B)."""
     poses = []
     arrived = []
-    for _ in range(round(UNTIL * fps)):
+    for _ in range(round(POINT_SECONDS * fps)):
         poses.append(session.tick())
         arrived.append(session.arrived)
     return poses, np.stack(arrived)

@@ -44,19 +44,19 @@ PHASES = 8
 SETTLE = 3.0
 """Seconds before a change or a measurement."""
 
-STRAIGHT = 10.0
+STRAIGHT_SECONDS = 10.0
 """Seconds for which going straight on is measured."""
 
 MEASURED_SPEEDS = {"walk": 1.4, "run": 3.0}
 """m/s at which a gait is measured."""
 
-PACES = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
+CHANGED_SPEEDS = (0.0, 0.6, 1.0, 1.4, 1.8, 2.0, 2.5, 3.0, 3.5, 4.0)
 """Speeds in m/s of the changes in speed."""
 
 FASTEST_WALK = 1.8
-"""m/s of :data:`PACES` up to which figures walk; above they run."""
+"""m/s of :data:`CHANGED_SPEEDS` up to which figures walk; above they run."""
 
-WAYS = np.arange(-165.0, 195.0, 15.0)
+TRAVEL_DIRECTIONS = np.arange(-165.0, 195.0, 15.0)
 """24 directions of travel, in degrees from the facing."""
 
 WAYS_PACES = {"walk": (0.8, 1.28), "run": (1.2, 2.0, 3.0)}
@@ -65,7 +65,7 @@ WAYS_PACES = {"walk": (0.8, 1.28), "run": (1.2, 2.0, 3.0)}
 CREEPS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 """The slowest measured speeds of a walk in m/s."""
 
-TURNS = (45, 90, 135, 180)
+MEASURED_TURNS = (45, 90, 135, 180)
 """Degrees of the measured turns, to both sides."""
 
 SLOW_SIDE_STEP = 0.8
@@ -74,7 +74,7 @@ SLOW_SIDE_STEP = 0.8
 Command = dict[str, Any]
 """A command to N figures: keyword arguments of :meth:`SteerSession.control`."""
 
-AHEAD: Command = {"direction": 0.0, "facing": 0.0}
+STRAIGHT_AHEAD: Command = {"direction": 0.0, "facing": 0.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +239,7 @@ def straight_on(model: SteerModel, gait: str, hold_feet: bool) -> Track:
     """Six figures going straight on, in different directions, at the speed of :data:`MEASURED_SPEEDS`."""
     session = model.start(gait, characters=6, hold_feet=hold_feet)
     session.control(speed=MEASURED_SPEEDS[gait], direction=np.arange(6) * 60.0)
-    poses = [session.tick() for _ in range(round((SETTLE + STRAIGHT) * model.fps))]
+    poses = [session.tick() for _ in range(round((SETTLE + STRAIGHT_SECONDS) * model.fps))]
     return Track.of(poses, model.fps)[round(SETTLE * model.fps) :]
 
 
@@ -326,14 +326,13 @@ def gait_figures(model: SteerModel, gait: str) -> dict[str, float]:
 
 
 def speed_errors(model: SteerModel) -> dict[str, float]:
-    """Relative errors of the speed: the mean velocity from 1 to 2 s after a change between all pairs of :data:`PACES`,
-    straight on, as a walk up to :data:`FASTEST_WALK` and as a run above. Mean, worst, and the mean for each new speed;
-    rest: m/s where 0 was commanded.
-    """
-    old, new = np.array([(old, new) for old, new in product(PACES, PACES) if old != new]).T
+    """Relative errors of the speed: the mean velocity from 1 to 2 s after a change between all pairs of
+    :data:`CHANGED_SPEEDS`, straight on, as a walk up to :data:`FASTEST_WALK` and as a run above. Mean, worst, and the
+    mean for each new speed; rest: m/s where 0 was commanded."""
+    old, new = np.array([(old, new) for old, new in product(CHANGED_SPEEDS, CHANGED_SPEEDS) if old != new]).T
     # a figure stands in the gait that follows, and stops in the gait that it was in
-    before = {**AHEAD, "gait": _gaits(np.where(old > 0, old, new)), "speed": old}
-    after = {**AHEAD, "gait": _gaits(np.where(new > 0, new, old)), "speed": new}
+    before = {**STRAIGHT_AHEAD, "gait": _gaits(np.where(old > 0, old, new)), "speed": old}
+    after = {**STRAIGHT_AHEAD, "gait": _gaits(np.where(new > 0, new, old)), "speed": new}
     paces = Ground.of(responses(model, before, after, 2.0)).pace(1.0, 2.0)
 
     # relative to the new speed, or in m/s where figures stop
@@ -346,7 +345,7 @@ def _speed_figures(errors: Array, new: Array) -> dict[str, float]:
     moving = errors[:, new > 0]
     rest = errors[:, new == 0]
     figures = {"mean": moving.mean(), "worst": moving.max(), "rest": rest.mean(), "rest_worst": rest.max()}
-    for pace in PACES[1:]:
+    for pace in CHANGED_SPEEDS[1:]:
         figures[f"to_{pace:g}"] = errors[:, new == pace].mean()
     return figures
 
@@ -364,8 +363,8 @@ def turn_errors(model: SteerModel, gait: str, pace: float) -> dict[str, float]:
     """
     # each turn to the left and to the right, half a second longer than is measured
     calm = 0.5
-    angles = np.array([side * turn for turn, side in product(TURNS, (1, -1))], dtype=np.float64)
-    before = {**AHEAD, "gait": (gait,) * len(angles), "speed": pace}
+    angles = np.array([side * turn for turn, side in product(MEASURED_TURNS, (1, -1))], dtype=np.float64)
+    before = {**STRAIGHT_AHEAD, "gait": (gait,) * len(angles), "speed": pace}
     after = {**before, "direction": angles, "facing": angles}
     tracks = responses(model, before, after, 4.0 + calm, hold_feet=True)
     turned = _turn_figures(Ground.of(tracks), np.tile(angles, PHASES), calm)
@@ -377,7 +376,7 @@ def _turn_figures(ground: Ground, angles: Array, calm: float) -> dict[str, float
     direction_errors = ground.way_off(angles, 2.0, 3.0)
     facing_errors = ground.facing_off(angles, 2.0, 3.0)
     figures = {}
-    for turn in TURNS:
+    for turn in MEASURED_TURNS:
         turned: Flags = np.abs(angles) == turn
         figures[f"s_{turn}"] = seconds[turned].mean()
         figures[f"worst_s_{turn}"] = seconds[turned].max()
@@ -391,7 +390,7 @@ def aside_errors(model: SteerModel) -> dict[str, float]:
     and facing in degrees, and the relative error of the speed, from 2 to 4 s after the change."""
     ways = {"left": 90.0, "right": -90.0, "back": 180.0}
     directions = np.repeat(list(ways.values()), 2)
-    before = {**AHEAD, "gait": ("walk",) * len(directions), "speed": np.tile([0.0, 1.4], len(ways))}
+    before = {**STRAIGHT_AHEAD, "gait": ("walk",) * len(directions), "speed": np.tile([0.0, 1.4], len(ways))}
     after = {**before, "speed": SLOW_SIDE_STEP, "direction": directions}
     ground = Ground.of(responses(model, before, after, 4.0))
 
@@ -410,17 +409,16 @@ def aside_errors(model: SteerModel) -> dict[str, float]:
 
 
 def ways_errors(model: SteerModel, gait: str) -> dict[str, float]:
-    """Going in each of :data:`WAYS` with the facing kept, at each of :data:`WAYS_PACES`, from standing and from going
-    ahead at the same speed: the error of the direction in degrees, its mean, 95th percentile and maximum; the error of
-    the facing in degrees; the error of the speed relative to the fastest that the gait allows in that direction, and
-    the lowest speed relative to it; from 2 to 6 s after the change. slide_cm, slide_p95_cm: see :func:`standing`, in
-    all these seconds.
-    """
-    grid = np.meshgrid(WAYS, WAYS_PACES[gait], (0.0, 1.0))
+    """Going in each of :data:`TRAVEL_DIRECTIONS` with the facing kept, at each of :data:`WAYS_PACES`, from standing and
+    from going ahead at the same speed: the error of the direction in degrees, its mean, 95th percentile and maximum;
+    the error of the facing in degrees; the error of the speed relative to the fastest that the gait allows in that
+    direction, and the lowest speed relative to it; from 2 to 6 s after the change. slide_cm, slide_p95_cm: see
+    :func:`standing`, in all these seconds."""
+    grid = np.meshgrid(TRAVEL_DIRECTIONS, WAYS_PACES[gait], (0.0, 1.0))
     directions, paces, moving = (part.ravel() for part in grid)
 
     # from standing, and from going ahead at the same speed
-    before = {**AHEAD, "gait": (gait,) * len(directions), "speed": paces * moving}
+    before = {**STRAIGHT_AHEAD, "gait": (gait,) * len(directions), "speed": paces * moving}
     after = {**before, "speed": paces, "direction": directions}
 
     # the speed that a gait allows in each direction
@@ -452,7 +450,7 @@ def creep_errors(model: SteerModel) -> dict[str, float]:
     """
     grid = np.meshgrid(CREEPS, (0.0, MEASURED_SPEEDS["walk"]))
     speeds, old_speeds = (part.ravel() for part in grid)
-    before = {**AHEAD, "gait": ("walk",) * len(speeds), "speed": old_speeds}
+    before = {**STRAIGHT_AHEAD, "gait": ("walk",) * len(speeds), "speed": old_speeds}
     tracks = responses(model, before, {**before, "speed": speeds}, 6.0, hold_feet=True)
 
     # once figures have had time to slow down

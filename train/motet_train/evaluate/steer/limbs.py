@@ -13,23 +13,23 @@ from motet.steering.session import SteerSession
 from motet_train.evaluate.positions import length
 from motet_train.evaluate.steer.following import MEASURED_SPEEDS, Track, settled, turns
 
-SEED = 4
+CUTS_SEED = 4
 """Of the ticks at which acts are cut, and of the points that hands reach for; it chose no setting."""
 
 SHOWN = 1.5
 """Seconds that are measured after an act was cut."""
 
-POINTS = 300
+REACHED_POINTS = 300
 """Points that hands reach for."""
 
-LOW = (-0.3, 0.3, -0.2)
-HIGH = (0.8, 1.9, 0.8)
+LOWEST_POINT = (-0.3, 0.3, -0.2)
+HIGHEST_POINT = (0.8, 1.9, 0.8)
 """Where they are, from the left of the figure, the ground and its back: from within the body to beyond the arm."""
 
 PASSED_AT = 1.2
 """m/s of a walk past points that stay where they are."""
 
-AHEAD = 3.0
+STARTING_DISTANCE = 3.0
 """How far these are ahead at first, metres."""
 
 
@@ -40,7 +40,7 @@ def cut_figures(model: SteerModel, acts: Sequence[Act], gait: str | None) -> dic
     velocity: the largest change of a joint's velocity in a tick, in the figure's own space, m/s.
     """
     # each figure has its pair, and the tick at which the second act cuts the first
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(CUTS_SEED)
     pairs = [(first, second) for first in acts for second in acts]
     cuts = np.array([rng.integers(1, len(first)) for first, _ in pairs])
     session = model.start(gait, characters=len(pairs))
@@ -68,11 +68,11 @@ def _cut(
 
 
 def reach_figures(model: SteerModel) -> dict[str, float]:
-    """Left hands that reach for :data:`POINTS` points, of figures that walk.
+    """Left hands that reach for :data:`REACHED_POINTS` points, of figures that walk.
 
     turn, velocity: as of :func:`cut_figures`, where points go along with the figures, and where figures pass them.
     """
-    points = np.random.default_rng(SEED).uniform(LOW, HIGH, (POINTS, 3))
+    points = np.random.default_rng(CUTS_SEED).uniform(LOWEST_POINT, HIGHEST_POINT, (REACHED_POINTS, 3))
     first = _reach_figures(model, points, along=True)
     second = _reach_figures(model, points, along=False)
     return {name: max(first[name], second[name]) for name in first}
@@ -83,9 +83,9 @@ def _reach_figures(model: SteerModel, points: Array, along: bool) -> dict[str, f
     session = model.start("walk", characters=len(points))
     session.control(speed=PASSED_AT, direction=0.0)
     before = settled(session, model.fps, 0)
-    ahead = before.place + np.array([0.0, 0.0, AHEAD])
+    ahead = before.place + np.array([0.0, 0.0, STARTING_DISTANCE])
     poses = [before]
-    for _ in range(round(2 * AHEAD / PASSED_AT * model.fps)):
+    for _ in range(round(2 * STARTING_DISTANCE / PASSED_AT * model.fps)):
         session.reach("left", points + (poses[-1].place if along else ahead))
         poses.append(session.tick())
     return _largest(poses, model.fps)

@@ -11,15 +11,15 @@ from motet.steering.session import SteerSession
 from motet_train.evaluate.positions import Flags, length
 from motet_train.evaluate.steer.commands import from_path
 from motet_train.evaluate.steer.following import floats
-from motet_train.evaluate.steer.players import SEED
+from motet_train.evaluate.steer.players import COMMANDS_SEED
 
 BATCH = 20
 """Figures of a session: few enough that each searches after a command, not in its turn."""
 
-LEGS = 6
+LEGS_OF_POLYLINE = 6
 """Straight parts of a random polyline."""
 
-LEG = 1.2
+LEG_DEVIATION = 1.2
 """Standard deviation of x and z of a leg, metres."""
 
 ZIGZAG = np.array([[0.0, 0.0], [0.0, 2.0], [0.5, 0.0], [1.0, 2.0], [1.5, 0.0], [2.0, 2.0]])
@@ -28,35 +28,34 @@ ZIGZAG = np.array([[0.0, 0.0], [0.0, 2.0], [0.5, 0.0], [1.0, 2.0], [1.5, 0.0], [
 FACINGS = np.arange(0, 360, 45)
 """Degrees in which figures stand at first."""
 
-RADII = (0.5, 1.0, 2.0)
+CIRCLE_RADII = (0.5, 1.0, 2.0)
 """Metres of the circles."""
 
 CIRCLE_POINTS = 40
 """Points of a circle."""
 
-SLOW = (0.2, 0.5)
+SLOW_SPEEDS = (0.2, 0.5)
 """m/s at which figures go to near points."""
 
-NEAREST = 0.3
+NEAREST_POINT = 0.3
 """Metres to the nearest of these points."""
 
-FARTHEST = 2.0
+FARTHEST_POINT = 2.0
 """Metres to the farthest of them."""
 
-CHASED = 0.8
+CHASED_SPEED = 0.8
 """m/s of points that move on circles of 2 m."""
 
-UNTIL = 40.0
+PATH_SECONDS = 40.0
 """Seconds that figures have to arrive."""
 
 
 def path_figures(model: SteerModel, gait: str) -> dict[str, float]:
     """How figures that stand go along 40 random polylines, a zigzag and circles at a gait's usual speed.
 
-    never: how many do not arrive in :data:`UNTIL` seconds. late_s, late_worst_s: seconds until they arrive, less those
-    that the path takes at that speed: the mean of those that do, and the largest of all. cm, p95_cm: distances from the
-    path until they arrive.
-    """
+    never: how many do not arrive in :data:`PATH_SECONDS` seconds. late_s, late_worst_s: seconds until they arrive, less
+    those that the path takes at that speed: the mean of those that do, and the largest of all. cm, p95_cm: distances
+    from the path until they arrive."""
     figures = dict[str, Any]()
     for kind, batches in _paths().items():
         walked = [_along(model, gait, paths) for paths in batches]
@@ -74,14 +73,14 @@ def path_figures(model: SteerModel, gait: str) -> dict[str, float]:
 
 def _paths() -> dict[str, list[Array]]:
     """Kind -> batches of paths (B, P, 2), from the origin."""
-    rng = np.random.default_rng(SEED)
-    corners = [rng.normal(0, LEG, (BATCH, LEGS, 2)).cumsum(axis=1) for _ in range(2)]
+    rng = np.random.default_rng(COMMANDS_SEED)
+    corners = [rng.normal(0, LEG_DEVIATION, (BATCH, LEGS_OF_POLYLINE, 2)).cumsum(axis=1) for _ in range(2)]
     angles = np.linspace(0, 2 * np.pi, CIRCLE_POINTS)
     circle = np.stack([1 - np.cos(angles), np.sin(angles)], axis=1)
     return {
         "polylines": [np.insert(paths, 0, 0.0, axis=1) for paths in corners],
         "zigzag": [np.tile(ZIGZAG, (len(FACINGS), 1, 1))],
-        "circles": [np.tile(radius * circle, (len(FACINGS), 1, 1)) for radius in RADII],
+        "circles": [np.tile(radius * circle, (len(FACINGS), 1, 1)) for radius in CIRCLE_RADII],
     }
 
 
@@ -109,10 +108,11 @@ def _along(model: SteerModel, gait: str, paths: Array) -> tuple[Array, Array]:
 
 
 def _gone(session: SteerSession, fps: float) -> tuple[Array, Flags]:
-    """The places (T, B, 2) of figures until all have arrived, or for :data:`UNTIL` seconds; and which have (T, B)."""
+    """The places (T, B, 2) of figures until all have arrived, or for :data:`PATH_SECONDS` seconds; and which have (T,
+    B)."""
     places = list[Array]()
     arrived = list[Flags]()
-    for _ in range(round(UNTIL * fps)):
+    for _ in range(round(PATH_SECONDS * fps)):
         places.append(session.tick().ground[:, :2])
         arrived.append(session.arrived)
         if np.any(arrived, axis=0).all():
@@ -127,13 +127,12 @@ def _arrival(arrived: Flags, fps: float) -> Array:
 
 
 def slow_point_figures(model: SteerModel) -> dict[str, float]:
-    """How figures that stand walk to near points all around at :data:`SLOW` speeds.
+    """How figures that stand walk to near points all around at :data:`SLOW_SPEEDS` speeds.
 
-    never: how many of 80 do not arrive in :data:`UNTIL` seconds. way, way_worst: how far they go, relative to the
-    distance. long_way: of how many that is more than 1.5. late_s: seconds more than the distance takes.
-    """
-    rng = np.random.default_rng(SEED)
-    walked = [_to_near_points(model, speed, rng) for speed in np.repeat(SLOW, 2).tolist()]
+    never: how many of 80 do not arrive in :data:`PATH_SECONDS` seconds. way, way_worst: how far they go, relative to
+    the distance. long_way: of how many that is more than 1.5. late_s: seconds more than the distance takes."""
+    rng = np.random.default_rng(COMMANDS_SEED)
+    walked = [_to_near_points(model, speed, rng) for speed in np.repeat(SLOW_SPEEDS, 2).tolist()]
     lateness = np.concatenate([late for late, _ in walked])
     way = np.concatenate([relative for _, relative in walked])
     return floats(
@@ -151,7 +150,7 @@ def _to_near_points(model: SteerModel, speed: float, rng: np.random.Generator) -
     """How many seconds figures (B,) are late at points, infinite if they do not arrive; and how far they have gone
     (B,), relative to the distance."""
     angles = rng.uniform(-np.pi, np.pi, BATCH)
-    distances = rng.uniform(NEAREST, FARTHEST, BATCH)
+    distances = rng.uniform(NEAREST_POINT, FARTHEST_POINT, BATCH)
     places = np.column_stack([np.zeros((BATCH, 2)), rng.uniform(-180, 180, BATCH)])
     session = model.start("walk", characters=BATCH, places=places)
     session.go_to(np.stack([np.sin(angles), np.cos(angles)], axis=1) * distances[:, None], speed=speed)
@@ -161,10 +160,10 @@ def _to_near_points(model: SteerModel, speed: float, rng: np.random.Generator) -
 
 
 def chase_figures(model: SteerModel) -> dict[str, float]:
-    """behind_m, behind_worst_m: how far walking figures are behind points that move at :data:`CHASED` m/s, to which
-    they are sent anew in each tick, after the first 6 of 16 seconds."""
+    """behind_m, behind_worst_m: how far walking figures are behind points that move at :data:`CHASED_SPEED` m/s, to
+    which they are sent anew in each tick, after the first 6 of 16 seconds."""
     starts = np.arange(8.0)
-    rate = CHASED / 2
+    rate = CHASED_SPEED / 2
     session = model.start("walk", characters=len(starts))
     distances = list[Array]()
     for tick in range(round(16 * model.fps)):

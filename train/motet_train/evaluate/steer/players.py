@@ -9,13 +9,13 @@ from motet.steering.model import SteerModel
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import Track, slide_of
 
-FIGURES = 24
+STEERED_FIGURES = 24
 """Figures that are steered."""
 
-SECONDS = 20.0
+STEERED_SECONDS = 20.0
 """How long they are steered."""
 
-SEED = 4
+COMMANDS_SEED = 4
 """Of the commands; it was not used to choose anything of the model."""
 
 REVERSED_AT = 1.28
@@ -51,11 +51,11 @@ def stick_figures(model: SteerModel) -> dict[str, float]:
 
 def _steered(model: SteerModel, commands: Iterator[tuple[Array, Array]]) -> Track:
     """Figures that are steered by speeds (B,) and directions (B,), in degrees, after the first seconds."""
-    session = model.start("walk", characters=FIGURES)
+    session = model.start("walk", characters=STEERED_FIGURES)
     first = round(following.SETTLE * model.fps)
-    before = np.full((2, FIGURES), np.nan)
+    before = np.full((2, STEERED_FIGURES), np.nan)
     poses = []
-    for _ in range(first + round(SECONDS * model.fps)):
+    for _ in range(first + round(STEERED_SECONDS * model.fps)):
         speed, direction = next(commands)
         # a new command only where it changes
         command = np.array([speed, direction])
@@ -67,30 +67,30 @@ def _steered(model: SteerModel, commands: Iterator[tuple[Array, Array]]) -> Trac
 
 
 def _reversals(fps: float) -> Iterator[tuple[Array, Array]]:
-    rng = np.random.default_rng(SEED)
-    speed = np.full(FIGURES, REVERSED_AT)
-    direction = np.zeros(FIGURES)
-    seconds_left = rng.uniform(0, REVERSED_AFTER[1], FIGURES)
+    rng = np.random.default_rng(COMMANDS_SEED)
+    speed = np.full(STEERED_FIGURES, REVERSED_AT)
+    direction = np.zeros(STEERED_FIGURES)
+    seconds_left = rng.uniform(0, REVERSED_AFTER[1], STEERED_FIGURES)
     while True:
         yield speed, direction
         seconds_left = seconds_left - 1 / fps
         reverses = seconds_left < 0
-        seconds_left = np.where(reverses, rng.uniform(*REVERSED_AFTER, FIGURES), seconds_left)
+        seconds_left = np.where(reverses, rng.uniform(*REVERSED_AFTER, STEERED_FIGURES), seconds_left)
         direction = np.where(reverses, 180 - direction, direction)
 
 
 def _sticks(fps: float) -> Iterator[tuple[Array, Array]]:
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(COMMANDS_SEED)
     dt = 1 / fps
     low, high = STICK_PACES
-    direction = rng.uniform(-180, 180, FIGURES)
-    phase = rng.uniform(-np.pi, np.pi, FIGURES)
-    turn_rate = rng.normal(0, STICK_TURNS, FIGURES)
+    direction = rng.uniform(-180, 180, STEERED_FIGURES)
+    phase = rng.uniform(-np.pi, np.pi, STEERED_FIGURES)
+    turn_rate = rng.normal(0, STICK_TURNS, STEERED_FIGURES)
     decay = np.exp(-dt / STICK_CALM)
     while True:
         speed = (low + high) / 2 + (high - low) / 2 * np.sin(phase)
         yield speed, direction
         # an Ornstein-Uhlenbeck process
-        turn_rate = decay * turn_rate + rng.normal(0, STICK_TURNS * np.sqrt(1 - decay**2), FIGURES)
+        turn_rate = decay * turn_rate + rng.normal(0, STICK_TURNS * np.sqrt(1 - decay**2), STEERED_FIGURES)
         direction = direction + turn_rate * dt
         phase = phase + 2 * np.pi * dt / STICK_PERIOD

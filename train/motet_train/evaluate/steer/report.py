@@ -45,7 +45,7 @@ from motet_train.evaluate.steer.following import (
 )
 from motet_train.evaluate.steer.limbs import cut_figures, reach_figures
 from motet_train.evaluate.steer.paths import chase_figures, path_figures, slow_point_figures
-from motet_train.evaluate.steer.players import SEED, reversal_figures, stick_figures
+from motet_train.evaluate.steer.players import COMMANDS_SEED, reversal_figures, stick_figures
 from motet_train.evaluate.tables import Report, gathered, read_goals, report_table
 
 STEER_GOALS = read_goals("steer")
@@ -114,7 +114,7 @@ class _RandomPlayer:
     """Gives B figures random commands that last 0.2 to 3 s: 15 % of them to stand, half to face the way they go."""
 
     def __init__(self, model: SteerModel, characters: int) -> None:
-        self.rng = np.random.default_rng(SEED)
+        self.rng = np.random.default_rng(COMMANDS_SEED)
         self.fps = model.fps
         self.names = np.array(model.gaits)
         self.ranges = np.array([model.speeds[name] for name in model.gaits])

@@ -11,7 +11,7 @@ from motet.errors import TextWarning, collected
 from motet.generate.base import Generated, GenerateModel
 from motet.generate.model import Story
 from motet.text.clauses import stem
-from motet.text.vocabulary import RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.table import read_toml
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
@@ -63,6 +63,6 @@ def odd_words(generated: Generated, row: Mapping[str, Any]) -> set[str]:
     shown = [generated.action]
     if isinstance(generated, Story):
         shown += [passage.action for passage in generated.passages]
-    stems = set(map(stem, RULES.words(" ".join(shown))))
-    allowed = {*map(stem, RULES.words(row["text"])), *row.get("also", ())}
+    stems = set(map(stem, NEW_MODEL_RULES.words(" ".join(shown))))
+    allowed = {*map(stem, NEW_MODEL_RULES.words(row["text"])), *row.get("also", ())}
     return stems & set(table()["odd"]) - allowed

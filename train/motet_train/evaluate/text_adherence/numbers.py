@@ -11,7 +11,7 @@ from motet_train.data.table import read_toml
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import length, spells
 from motet_train.evaluate.tables import Report
-from motet_train.evaluate.text_adherence.rules import HANDS
+from motet_train.evaluate.text_adherence.rules import HAND_BONES
 from motet_train.evaluate.text_adherence.table import slide
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, pair, swings, track_of
 
@@ -72,7 +72,7 @@ def measured(track: Track, kind: str, act: str = "") -> float:
         return float(np.linalg.norm(track.path[-1] - track.path[0]))
     if kind == "seconds":
         return track.seconds
-    return float(steps(track) if kind == "steps" else ACTS[act](track))
+    return float(steps(track) if kind == "steps" else COUNTS_BY_NAME[act](track))
 
 
 def steps(track: Track) -> int:
@@ -115,7 +115,7 @@ def punches(track: Track) -> int:
     """How often a hand shoots forward from the chest at 2 m/s."""
     chest = track.body("chest")[:, 2]
     count = 0
-    for hand in HANDS:
+    for hand in HAND_BONES:
         forward_speeds = np.diff(track.body(hand)[:, 2] - chest) * RATE
         count += len(spells(calm(forward_speeds, 0.1) >= 2.0))
     return count
@@ -128,7 +128,7 @@ def bows(track: Track) -> int:
     return len(spells(calm(lean, 0.2) >= 25))
 
 
-COUNTED = (jumps, jumping_jacks, kicks, dips, punches, bows)
+COUNTING_FUNCTIONS = (jumps, jumping_jacks, kicks, dips, punches, bows)
 
-ACTS: Mapping[str, Callable[[Track], int]] = {act.__name__: act for act in COUNTED}
+COUNTS_BY_NAME: Mapping[str, Callable[[Track], int]] = {act.__name__: act for act in COUNTING_FUNCTIONS}
 """Name of an act -> how often a motion shows it."""

@@ -12,7 +12,7 @@ from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.motion.motion import Motion
 from motet.representation.contract import named
-from motet.text.vocabulary import RULES as TEXT_RULES
+from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.corpus import Record, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, Store
@@ -20,14 +20,14 @@ from motet_train.data.table import read_toml
 from motet_train.evaluate.text_adherence import rules
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
-RULES: dict[str, Callable[..., bool]] = {}
+RULE_BY_NAME: dict[str, Callable[..., bool]] = {}
 """Name -> rule: a function of a track and keyword arguments."""
 
 for name, rule in inspect.getmembers(rules, inspect.isfunction):
     if rule.__module__ == rules.__name__ and not name.startswith("_"):
-        RULES[name] = rule
+        RULE_BY_NAME[name] = rule
 
-SHORTEST_MOTION = 0.3
+SHORTEST_SHOWN = 0.3
 """Seconds: a shorter motion passes no prompt."""
 
 
@@ -66,12 +66,12 @@ class Prompt:
 
 def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
     """Whether a motion passes all of some rules."""
-    if track.seconds < SHORTEST_MOTION:
+    if track.seconds < SHORTEST_SHOWN:
         return False
     for rule in rules:
         # all of a rule but its name
         arguments = {key: value for key, value in rule.items() if key != "is"}
-        if not RULES[rule["is"]](track, **arguments):
+        if not RULE_BY_NAME[rule["is"]](track, **arguments):
             return False
     return True
 
@@ -156,7 +156,7 @@ class LookUp:
         self._sentences: list[tuple[Trial, frozenset[str]]] = []
         for trial in sorted(trials, key=lambda trial: trial.name):
             for sentence in trial.sentences:
-                words = frozenset(TEXT_RULES.words(sentence))
+                words = frozenset(NEW_MODEL_RULES.words(sentence))
                 if words:
                     self._sentences.append((trial, words))
         if not self._sentences:
@@ -170,7 +170,7 @@ class LookUp:
         """The trial with the sentence that shares most different words with the text; of several such sentences the
         one with the fewest different words, then the first trial by name."""
         # most words in common, then fewest words
-        text_words = frozenset(TEXT_RULES.words(text))
+        text_words = frozenset(NEW_MODEL_RULES.words(text))
         nearest, _ = max(self._sentences, key=lambda pair: (len(text_words & pair[1]), -len(pair[1])))
         return nearest
 

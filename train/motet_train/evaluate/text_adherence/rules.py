@@ -10,7 +10,7 @@ from motet.motion.rotations import Array
 from motet_train.evaluate.positions import Flags, length, spells
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, direction, longest, pair, swings
 
-WAYS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "right": (1, -1)}
+VELOCITY_COLUMNS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "right": (1, -1)}
 """Way -> the column of the velocity, and its sign."""
 
 CLEAR = 0.1
@@ -20,7 +20,7 @@ SHORTEST_FLIGHT = 0.12
 LONGEST_FLIGHT = 0.9
 """Seconds of a jump: shorter flights are running steps, in longer ones the figure stands on something."""
 
-HANDS = pair("Hand")
+HAND_BONES = pair("Hand")
 
 
 def goes(track: Track, way: str, least: float, most: float = np.inf, metres: float = 0.0) -> bool:
@@ -28,7 +28,7 @@ def goes(track: Track, way: str, least: float, most: float = np.inf, metres: flo
 
     The typical velocity is the 75th percentile, so that standing at the ends does not matter.
     """
-    column, sign = WAYS[way]
+    column, sign = VELOCITY_COLUMNS[way]
     velocity = sign * track.velocity[:, column]
     typical = np.percentile(velocity, 75)
     return bool(least <= typical <= most and velocity.sum() / RATE >= metres)
@@ -37,7 +37,7 @@ def goes(track: Track, way: str, least: float, most: float = np.inf, metres: flo
 def sidesteps(track: Track, side: str, metres: float) -> bool:
     """Moves by a number of metres to one side of its facing, and not as far forward or back."""
     ahead, left = track.velocity.sum(axis=0) / RATE
-    return bool(WAYS[side][1] * left >= max(metres, abs(ahead)))
+    return bool(VELOCITY_COLUMNS[side][1] * left >= max(metres, abs(ahead)))
 
 
 def travels(track: Track, metres: float) -> bool:
@@ -200,7 +200,7 @@ def waves(track: Track, count: int) -> bool:
 def punches(track: Track, side: str, speed: float = 2.5, count: int = 1) -> bool:
     """A hand shoots forward or up from the chest at a speed, m/s, ``count`` times; "both": each does. For one side it
     is half as fast again as the other hand."""
-    left, right = (_thrust(track, hand) for hand in HANDS)
+    left, right = (_thrust(track, hand) for hand in HAND_BONES)
     if side not in LEFT_RIGHT:
         return all(len(spells(thrust >= speed)) >= count for thrust in (left, right))
     # one hand, and clearly faster than the other
@@ -235,7 +235,7 @@ def wipes(track: Track, count: int) -> bool:
 def to_mouth(track: Track) -> bool:
     """A hand is at the mouth for half a second, the other one lower than the chest."""
     head = track.joint("head")
-    near = [length(track.joint(name) - head) < 0.42 for name in HANDS]
+    near = [length(track.joint(name) - head) < 0.42 for name in HAND_BONES]
     low = [hand < track.height("chest") + 0.05 for hand in track.heights("Hand")]
     return max(longest(near[0] & low[1]), longest(near[1] & low[0])) >= 0.5
 
@@ -281,18 +281,18 @@ def swings_arms(track: Track, count: int, metres: float = 0.2) -> bool:
 
 def hands_still(track: Track, most: float) -> bool:
     """The mean speed of both hands relative to the hips is at most ``most`` m/s: they do not swing."""
-    return all(track.motion_of(name).mean() <= most for name in HANDS)
+    return all(track.motion_of(name).mean() <= most for name in HAND_BONES)
 
 
 def hands_move(track: Track, least: float, most: float = np.inf) -> bool:
     """The mean speed of the hands relative to the chest is from least to most, m/s."""
-    speeds = [track.motion_of(name, "upperChest").mean() for name in HANDS]
+    speeds = [track.motion_of(name, "upperChest").mean() for name in HAND_BONES]
     return bool(least <= np.mean(speeds) <= most)
 
 
 def hands_fast(track: Track, least: float) -> bool:
     """A hand reaches a speed relative to the chest, m/s."""
-    return bool(max(track.motion_of(name, "upperChest").max() for name in HANDS) >= least)
+    return bool(max(track.motion_of(name, "upperChest").max() for name in HAND_BONES) >= least)
 
 
 def lies(track: Track, when: str) -> bool:
@@ -441,7 +441,7 @@ def lasts(track: Track, seconds: float) -> bool:
 
 def _between_hands(track: Track) -> Array:
     """The distance (T,) between the wrists, metres."""
-    return length(np.subtract(*map(track.joint, HANDS)))
+    return length(np.subtract(*map(track.joint, HAND_BONES)))
 
 
 def _hands(flags: list[Flags], side: str) -> Flags:

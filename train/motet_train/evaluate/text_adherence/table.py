@@ -22,7 +22,7 @@ from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import BALLS, jerk, length, skate
 from motet_train.evaluate.tables import Report, aligned, read_goals, report_table, short_names
-from motet_train.evaluate.text_adherence.prompts import SHORTEST_MOTION, LookUp, Prompt, Trial, actions, prompts
+from motet_train.evaluate.text_adherence.prompts import SHORTEST_SHOWN, LookUp, Prompt, Trial, actions, prompts
 from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
 SAYS_GOALS = read_goals("says")
@@ -295,11 +295,11 @@ def _known_rows(vectors: Floats) -> Floats:
 
 
 def embedded(model: SearchModel, motions: Sequence[Motion]) -> Floats:
-    """The directions (N, E) of motions, NaN for those shorter than :data:`SHORTEST_MOTION`; MotionError as in
+    """The directions (N, E) of motions, NaN for those shorter than :data:`SHORTEST_SHOWN`; MotionError as in
     :func:`direction` for others that the model does not accept."""
     vectors = np.full((len(motions), model.sizes["E"]), np.nan, np.float32)
     for row, motion in enumerate(motions):
-        if motion.duration >= SHORTEST_MOTION:
+        if motion.duration >= SHORTEST_SHOWN:
             vectors[row] = direction(model, motion)
     return vectors
 

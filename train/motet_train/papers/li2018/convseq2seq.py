@@ -14,7 +14,7 @@ from torch.nn.functional import conv2d, leaky_relu, pad
 from motet_train.data.errors import DataError
 from motet_train.papers.li2018.stepwise import State, System, free_run
 
-SLOPE = 0.2
+LEAKY_SLOPE = 0.2
 """Slope of the leaky rectifiers."""
 
 
@@ -71,7 +71,7 @@ class Convolution(nn.Module):
             extra_channels = max(0, 2 * (channels_out - 1) + self.kernel[1] - channels)
             # torch pads the last axis first; of an odd number, one more goes after
             x = pad(x, [*_halves(extra_channels), *_halves(extra_frames)])
-        return leaky_relu(conv2d(x, self.weight, stride=2), SLOPE)
+        return leaky_relu(conv2d(x, self.weight, stride=2), LEAKY_SLOPE)
 
 
 def _halves(total: int) -> tuple[int, int]:
@@ -104,7 +104,7 @@ class EncodingModule(nn.Module):
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D) to (B, U)."""
         image = frames[:, None].contiguous(memory_format=torch.channels_last)  # a fifth faster on a CPU
-        return leaky_relu(self.linear(self.layers(image)), SLOPE)
+        return leaky_relu(self.linear(self.layers(image)), LEAKY_SLOPE)
 
 
 class RecurrentEncoder(nn.Module):
@@ -137,7 +137,7 @@ class ConvSeq2Seq(System):
         self.short_term = EncodingModule(config.window, config, config.filters)
         hidden = nn.Linear(config.units * (1 + len(self.constant)), config.units)
         outward = nn.Linear(config.units, config.dimensions)
-        self.decoder = nn.Sequential(hidden, nn.LeakyReLU(SLOPE), nn.Dropout(config.decoder_dropout), outward)
+        self.decoder = nn.Sequential(hidden, nn.LeakyReLU(LEAKY_SLOPE), nn.Dropout(config.decoder_dropout), outward)
 
     def begin(self, seed: Tensor) -> State:
         """The last C frames, and the long-term encoding of all frames but the last (eqs 1, 2)."""
@@ -174,7 +174,7 @@ class Discriminator(nn.Module):
         super().__init__()
         self.encode = EncodingModule(frames, config, tuple(2 * n for n in config.filters))
         half = config.units // 2
-        self.judge = nn.Sequential(nn.Linear(config.units, half), nn.LeakyReLU(SLOPE), nn.Linear(half, 1))
+        self.judge = nn.Sequential(nn.Linear(config.units, half), nn.LeakyReLU(LEAKY_SLOPE), nn.Linear(half, 1))
 
     def forward(self, windows: Tensor) -> Tensor:
         """Windows (B, T, D) to log odds (B,) that they are true."""

@@ -17,15 +17,15 @@ Rows = Mapping[str, tuple[float, ...]]
 
 Actions = Mapping[str, Rows]
 
-TABLES = read_toml(__file__, "published.toml")
+PUBLISHED_TABLES = read_toml(__file__, "published.toml")
 
-BY_ACTION: Mapping[str, Actions] = TABLES["actions"]
+BY_ACTION: Mapping[str, Actions] = PUBLISHED_TABLES["actions"]
 """Name of a layout -> the published rows of each action: tables 3, 1 and 2; NaN where they state none."""
 
-AVERAGES: Mapping[str, Rows] = TABLES["averages"]
+AVERAGES: Mapping[str, Rows] = PUBLISHED_TABLES["averages"]
 """Name of a layout -> averages over all its actions: tables 4 and 2, and Mao et al."""
 
-PREDICTOR_GOALS: Mapping[str, Rows] = TABLES["goals"]
+PREDICTOR_GOALS: Mapping[str, Rows] = PUBLISHED_TABLES["goals"]
 """Goals of the small predictor on the complete actions, by the number of windows."""
 
 

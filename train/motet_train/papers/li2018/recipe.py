@@ -25,7 +25,7 @@ PAPER_TRAINING = Training(steps=20_000, every=500, learning_rate=2e-4, batch=64,
 """Section 4.1. How long it trains is not said there: 20,000 steps are the code's. The error is divided by the number of
 channels, as in the code, while eq. 7 sums over them; so both regularisers weigh that many times as much as in eq. 9."""
 
-SHORT = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5, average=0.99)
+SHORT_TRAINING = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5, average=0.99)
 """What learns best in a quarter of an hour on a CPU, by the error on held-out files: a higher learning rate, which
 falls; the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels; no
 adversary, which doubles the time and brings nothing; and the running mean of the weights, as of motet's own
@@ -47,7 +47,7 @@ def _recipe(model: str, config: Any, training: Training, visits: Visits = AUGMEN
 
 RECIPES: Mapping[str, Mapping[str, Recipe]] = {
     "convseq2seq": {
-        "default": _recipe("convseq2seq", convseq2seq.Config(0, padding="same", loss="distance"), SHORT),
+        "default": _recipe("convseq2seq", convseq2seq.Config(0, padding="same", loss="distance"), SHORT_TRAINING),
         "paper": _recipe("convseq2seq", convseq2seq.Config(0, padding="paper"), PAPER_TRAINING, Visits()),
         "code": _recipe(
             "convseq2seq", convseq2seq.Config(0, padding="paper", dropout=(0.2, 0.2, 0.5), own=0.95), CODE, Visits()

@@ -23,7 +23,7 @@ from motet_train.papers.li2018.expmap import ExpmapCorpus, scaling_of
 from motet_train.papers.li2018.protocol import errors, predictions, predictor, rotation_errors, text_floors, true_times
 from motet_train.papers.li2018.published import AVERAGES, BY_ACTION, PREDICTOR_GOALS, PUBLISHED_FRAMES, Rows, mean_over
 
-KINDS = {
+FIGURE_KINDS = {
     "windows_8": "8 windows of each action",
     "windows_256": "256 windows of each action",
     "rotation": "256 windows, mean angle between predicted and true rotations of the joints that move, degrees",
@@ -31,7 +31,7 @@ KINDS = {
 """Kinds of figures: as many windows of each action as in papers; enough for a figure with little noise; and, of these,
 :func:`motet_train.papers.li2018.protocol.rotation_errors` in place of Euler errors."""
 
-FEW, MANY, ANGLE_ERRORS = KINDS
+FEW, MANY, ANGLE_ERRORS = FIGURE_KINDS
 
 MEAN = "mean"
 """In place of an action: the mean of the actions with all their files."""
@@ -205,7 +205,7 @@ def protocol_table(systems: Errors, corpus: ExpmapCorpus, spreads: Errors | None
         if action in (first, EVERY):
             rows.append(("",))
         if action == first:
-            rows.append((KINDS[kind],))
+            rows.append((FIGURE_KINDS[kind],))
         rows.append((titles.get(action, action),))
         for name, parts in every:
             if part in parts:

@@ -21,7 +21,7 @@ Tensors = dict[str, Tensor]
 Halves = tuple[Tensor, Tensor]
 """Hidden units and memory of the members of a type, each (B, K, U)."""
 
-LIMBS = ("arm", "leg")
+LIMB_NODES = ("arm", "leg")
 NODES = {"spine": 1, "arm": 2, "leg": 2}
 """Type of nodes -> number of members; of limbs the left one, then the right one."""
 
@@ -206,7 +206,7 @@ def _each(rnns: nn.ModuleDict, inputs: Tensors, state: Tensor) -> tuple[Tensors,
 def _concatenated(now: Tensors, before: Tensors) -> Tensors:
     """The features of edges: those of both ends, summed over edges of a type to the same node (the authors' code)."""
     features = {name: torch.cat([before[name], now[name]], dim=-1) for name in NODES}
-    for limb in LIMBS:
+    for limb in LIMB_NODES:
         pair = now[limb]
         spine = torch.cat([now["spine"].expand(-1, -1, 2, -1), pair], dim=-1)
         features[f"spine_{limb}"] = torch.cat([spine.sum(2, keepdim=True), spine], dim=2)
@@ -217,9 +217,9 @@ def _concatenated(now: Tensors, before: Tensors) -> Tensors:
 def _node_inputs(features: Tensors, messages: Tensors) -> Tensors:
     """The inputs of nodes: their features and the outputs of the edges that lead to them."""
     # the first member of an edge between spine and limb leads to the spine
-    to_spine = [messages["spine"], *(messages[f"spine_{limb}"][:, :, :1] for limb in LIMBS)]
+    to_spine = [messages["spine"], *(messages[f"spine_{limb}"][:, :, :1] for limb in LIMB_NODES)]
     inputs = {"spine": torch.cat([features["spine"], *to_spine], dim=-1)}
-    for limb in LIMBS:
+    for limb in LIMB_NODES:
         to_limb = [messages[limb], messages[f"spine_{limb}"][:, :, 1:], messages[f"{limb}_{limb}"]]
         inputs[limb] = torch.cat([features[limb], *to_limb], dim=-1)
     return inputs

@@ -14,7 +14,7 @@ from motet.models.describe import DescribeModel
 from motet.representation.root_block import from_root_block
 from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, panels, strips
-from motet_train.evaluate.language.attributes import ACTIONS, DIRECTIONS, Patterns, common, mentioned
+from motet_train.evaluate.language.attributes import ACTIONS, DIRECTION_PATTERNS, Patterns, common, mentioned
 from motet_train.evaluate.language.generate import ASKED, known_sentences, knows
 from motet_train.evaluate.language.motions import moves
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
@@ -28,7 +28,7 @@ def describe_drawings(model: DescribeModel, corpus: SplitStore, run: Path | None
     contexts = Contexts(model.embed(corpus.motions(records)))
     figures: dict[str, Callable[[], Figure]] = {
         "figure-9a-contexts-of-motions": lambda: contexts.draw(ACTIONS, sentences, "Contexts of motions"),
-        "figure-10-walking": lambda: contexts.draw(DIRECTIONS, sentences, "Contexts of walking", "walk"),
+        "figure-10-walking": lambda: contexts.draw(DIRECTION_PATTERNS, sentences, "Contexts of walking", "walk"),
     }
     if run is not None:
         figures["figure-5-loss"] = lambda: losses(run)

@@ -24,10 +24,10 @@ PAPER = Recipe(
 """Encoder 2 x 64, 2 x 64; decoder 3 x 400; embedding 64; 20 components; dropout 0.1; loss 12; 100 epochs of every pair
 of a motion and a sentence, and the last weights, as in the authors' code."""
 
-SMALL = {"decoder_units": (200, 200), "components": 5, "loss": "likelihood", "variance_floor": 0.01}
+SMALL_NET = {"decoder_units": (200, 200), "components": 5, "loss": "likelihood", "variance_floor": 0.01}
 DEFAULT = replace(
     PAPER,
-    config=replace(PAPER.config, **SMALL, feed_noise=0.2, frame_dropout=0.3, summary=60.0),
+    config=replace(PAPER.config, **SMALL_NET, feed_noise=0.2, frame_dropout=0.3, summary=60.0),
     training=replace(NADAM, epochs=400, batch=16, learning_rate=2e-3, falling=0.5),
     visits=LanguageVisits(offsets=1, windows=(50, 50), mirror=True),
     defaults={**BEAM, "hypotheses": 10, "candidates": 1, "temperature": 0.05},

@@ -55,7 +55,7 @@ def course(features: Motion) -> Array:
     return np.asarray((total[stop] - total[start]) / (stop - start)[:, None])
 
 
-GAITS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
+GAIT_SPEEDS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
 """Range of speeds of each gait, m/s. The net has no gaits: it walks or runs depending on the speed."""
 
 TDBN = TDBNConfig(
@@ -92,7 +92,7 @@ RECIPES = {
 
 
 def train_steered(store: Store, job: Job, data: str = "") -> Run:
-    """Train on the recordings of a store in ``root_sixd`` that show :data:`GAITS`, and on their mirror images.
+    """Train on the recordings of a store in ``root_sixd`` that show :data:`GAIT_SPEEDS`, and on their mirror images.
 
     DataError if a gait has no recording, or the store is in another representation.
     """
@@ -119,9 +119,9 @@ def _lessons(motions: Sequence[Motion]) -> Lessons:
 
 
 def _recorded(store: Store) -> list[Recording]:
-    """The recordings of :data:`GAITS`; DataError if a gait has none."""
+    """The recordings of :data:`GAIT_SPEEDS`; DataError if a gait has none."""
     known = {gait.name: gait for gait in gaits_of(store)}
-    gaits = tuple(known.get(name, Gait(name, (), ())) for name in GAITS)
+    gaits = tuple(known.get(name, Gait(name, (), ())) for name in GAIT_SPEEDS)
     return recordings(store, gaits)
 
 
@@ -149,7 +149,7 @@ class Driven:
     interface that measures use."""
 
     model: TdbnModel
-    gaits: tuple[str, ...] = tuple(GAITS)
+    gaits: tuple[str, ...] = tuple(GAIT_SPEEDS)
 
     @staticmethod
     def fits(model: TdbnModel) -> bool:
@@ -164,7 +164,7 @@ class Driven:
     @property
     def speeds(self) -> dict[str, tuple[float, float]]:
         """The slowest and the fastest speed of each gait, m/s."""
-        return GAITS
+        return GAIT_SPEEDS
 
     def start(self, start: str | None = None, *, characters: int = 1, hold_feet: bool = True) -> "DrivenSession":
         """A session of standing figures; ``start`` is ignored. hold_feet: with the foot lock."""

@@ -65,9 +65,9 @@ function led(votes: Plane[], weights: number[][], fps: number): Plane {
       row.reduce((all, vote, k) => all + weights[at]![k]! * of(vote), 0);
     return [sum(() => 1), sum(([x]) => x), sum(([, z]) => z)] as const;
   });
-  const reach = rounded(CONTACTS.REACH * fps);
+  const reach = rounded(CONTACTS.VOTING_SECONDS * fps);
   const nearness = Array.from({ length: reach + 1 }, (_, away) =>
-    Math.exp(-away / (CONTACTS.TOGETHER * fps)),
+    Math.exp(-away / (CONTACTS.VOTE_DECAY_SECONDS * fps)),
   );
   return sums.map((_, at) => {
     let total = 1e-12;
