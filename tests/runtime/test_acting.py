@@ -122,8 +122,8 @@ def test_acts_ten_times_a_second_do_not_leap(model: SteerModel) -> None:
     poses = ticks(session, 2)
     for tick in range(240):
         if tick % 3 == 0:
-            who = rng.permutation(count)[:4]
-            session.act([acts[i] for i in rng.integers(3, size=4)], who=who, upper=[None, True, False][tick % 9 // 3])
+            ids = rng.permutation(count)[:4]
+            session.act([acts[i] for i in rng.integers(3, size=4)], ids=ids, upper=[None, True, False][tick % 9 // 3])
         if tick % 40 == 0:
             session.control(
                 gait="walk", speed=np.where(rng.random(count) < 0.5, 0, 1.3), direction=rng.uniform(-180, 180, count)
@@ -140,7 +140,7 @@ def test_an_act_is_broken_off_without_a_leap(model: SteerModel) -> None:
     (*_, standing) = ticks(session, 10)
     session.act(act_of(model, lift=2.5), upper=False)
     ticks(session, 20)
-    session.act(None, who=[1])
+    session.act(None, ids=[1])
     assert [one and one[0] for one in session.acting] == ["lift", None]
     before, *after = ticks(session, 30)
     places = np.array([pose.positions()[1] for pose in (before, *after)])
@@ -183,9 +183,9 @@ def test_a_motion_is_an_act_without_its_rest(model: SteerModel) -> None:
 
 def test_what_cannot_be_acted_is_refused_and_changes_nothing(model: SteerModel) -> None:
     session, how = model.start(characters=2), model.settings(ActSettings)
-    for who in (2, -1, [0, 5], 0.5, "left", [[0]]):
-        with pytest.raises(ControlError, match="who must be numbers of characters from 0 to 1"):
-            session.act(act_of(model), who=who)
+    for ids in (2, -1, [0, 5], 0.5, "left", [[0]]):
+        with pytest.raises(ControlError, match="ids must be numbers of characters from 0 to 1"):
+            session.act(act_of(model), ids=ids)
     with pytest.raises(ControlError, match="3 acts do not fit 2 characters"):
         session.act([act_of(model)] * 3)
     with pytest.raises(MotionError):
@@ -214,10 +214,10 @@ def happened(poses: list[Pose]) -> list[tuple[int, str, int, str]]:
 
 def test_beginnings_and_ends_of_acts_are_told_once(model: SteerModel) -> None:
     session, lift, wave = model.start(characters=2), act_of(model), act_of(model, "wave", lift=0.8)
-    session.act([lift, wave], who=[0, 1])
+    session.act([lift, wave], ids=[0, 1])
     assert happened(ticks(session, 1)) == [(0, "act begun", 0, "lift"), (0, "act begun", 1, "wave")]
-    session.act(lift, who=0)  # in its own place
-    session.act(None, who=1)
+    session.act(lift, ids=0)  # in its own place
+    session.act(None, ids=1)
     told = [(0, "act ended", 0, "lift"), (0, "act begun", 0, "lift"), (0, "act ended", 1, "wave")]
     assert happened(ticks(session, 10)) == told
     left = session.acting[0]
@@ -225,7 +225,7 @@ def test_beginnings_and_ends_of_acts_are_told_once(model: SteerModel) -> None:
     assert happened(ticks(session, 60)) == [(round(left[1] * model.fps), "act ended", 0, "lift")]
     session.act(None)
     assert not happened(ticks(session, 5))
-    session.act(wave, who=1)
+    session.act(wave, ids=1)
     ticks(session, 5)
     session.put([3, 2, 10])
     assert happened(ticks(session, 5)) == [(0, "act ended", 1, "wave")]

@@ -247,19 +247,19 @@ def goes_by_gait(session: Any, numbers: Array) -> None:
 
 def looks_and_reaches(session: Any, numbers: Array) -> None:
     for row, number in enumerate(numbers):
-        session.look_at((2.0 - number, 1.0, 1.0), who=row)
-        session.reach("right", (-0.3, 1.0 + 0.1 * number, 0.3), who=row)
+        session.look_at((2.0 - number, 1.0, 1.0), ids=row)
+        session.reach("right", (-0.3, 1.0 + 0.1 * number, 0.3), ids=row)
 
 
 def acts(session: Any, numbers: Array) -> None:
     bend = motet.to_humanoid(motet.read(CLIPS / "02_06.amc")).motion
     for row, number in enumerate(numbers):
-        session.act(bend[120 : 300 + 20 * number], who=row)
+        session.act(bend[120 : 300 + 20 * number], ids=row)
 
 
 def goes_to_places(session: Any, numbers: Array) -> None:
     for row, number in enumerate(numbers):
-        session.go_to((number - 3.0, 3.0), who=row)
+        session.go_to((number - 3.0, 3.0), ids=row)
 
 
 SESSIONS = {

@@ -29,12 +29,12 @@ def same(pose: Pose, each: list[Pose]) -> None:
     assert set(pose.events) == events
 
 
-def told(session: SteerSession, who: int) -> None:
+def steer(session: SteerSession, number: int) -> None:
     """Different for each, of all that a session can be told."""
     ways = [(0.0, 3.0), (2.5, -1.0), (-3.0, 0.5), (1.0, 1.0), (-2.0, -2.0)]
-    session.look_at((0.0, 1.0 + who, 3.0), who=session.characters - 1)
-    session.reach("left", (0.4, 1.2, 0.5), who=session.characters - 1)
-    session.go_to(ways[who], who=session.characters - 1)
+    session.look_at((0.0, 1.0 + number, 3.0), ids=session.characters - 1)
+    session.reach("left", (0.4, 1.2, 0.5), ids=session.characters - 1)
+    session.go_to(ways[number], ids=session.characters - 1)
 
 
 @pytest.mark.parametrize("hold_feet", [True, False])
@@ -50,7 +50,7 @@ def test_who_comes_and_who_stays_moves_as_alone(model: SteerModel, hold_feet: bo
     crowd = begun(places[0])
     alone = [begun(places[0])]
     for session in (crowd, alone[0]):
-        told(session, 0)
+        steer(session, 0)
     for step in range(120):
         if step in {20, 45, 70}:
             number = len(alone)
@@ -60,10 +60,10 @@ def test_who_comes_and_who_stays_moves_as_alone(model: SteerModel, hold_feet: bo
                 alone[-1]._state.ahead = crowd._state.ahead
                 alone[-1].advance(0)
             if step < 60:
-                told(crowd, number)
-                told(alone[-1], number)
+                steer(crowd, number)
+                steer(alone[-1], number)
         if step == 75:
-            crowd.act("jump", who=2)
+            crowd.act("jump", ids=2)
             alone[2].act("jump")
         if step == 85:
             crowd.remove([0, 3])
@@ -121,11 +121,11 @@ def test_places_that_make_no_sense_add_no_one(model: SteerModel, places: Any) ->
     assert session.characters == len(session.tick()) == 1
 
 
-@pytest.mark.parametrize("who", [None, 2, -1, [0, 0], [0, 1], "0", 0.0, []])
-def test_who_is_not_there_or_the_last_is_not_removed(model: SteerModel, who: Any) -> None:
+@pytest.mark.parametrize("ids", [None, 2, -1, [0, 0], [0, 1], "0", 0.0, []])
+def test_who_is_not_there_or_the_last_is_not_removed(model: SteerModel, ids: Any) -> None:
     session = model.start(characters=2)
     with pytest.raises(ControlError):
-        session.remove(who)
+        session.remove(ids)
     assert session.characters == len(session.tick()) == 2
 
 

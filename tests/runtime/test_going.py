@@ -240,7 +240,7 @@ def test_what_is_matched_costs_what_features_differ_and_leads_where_is_asked(mod
         ({"points": (0, 1), "speed": 0}, "speed must be above 0"),
         ({"points": (0, 1), "gait": "fly"}, "unknown gait 'fly'"),
         ({"points": (0, 1), "gait": "jump"}, "'jump' goes nowhere: give a gait such as 'walk'"),
-        ({"points": (0, 1), "who": 2}, "who must be numbers"),
+        ({"points": (0, 1), "ids": 2}, "ids must be numbers"),
     ],
 )
 def test_ways_that_make_no_sense_are_refused(model: SteerModel, told: dict[str, Any], said: str) -> None:

@@ -144,7 +144,7 @@ def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(m
 
 
 @pytest.mark.parametrize(
-    ("points", "who", "said"),
+    ("points", "ids", "said"),
     [
         ((0, 1), None, "points need x, y and z, for all or for each of 3 characters"),
         ([(0, 1, 2)] * 2, None, "for each of 3 characters"),
@@ -152,20 +152,20 @@ def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(m
         ((0, np.nan, 1), None, "points must be finite numbers, no larger than 1e"),
         ((0, np.inf, 1), None, "points must be finite numbers"),
         ("ahead", None, "points need x, y and z"),
-        ((0, 1, 2), 3, "who must be numbers of characters from 0 to 2, none twice, not 3"),
+        ((0, 1, 2), 3, "ids must be numbers of characters from 0 to 2, none twice, not 3"),
         ((0, 1, 2), [0, 0], "none twice"),
-        ((0, 1, 2), [], "who must be numbers"),
-        ((0, 1, 2), [True, False, True], "who must be numbers"),
-        ((0, 1, 2), "first", "who must be numbers"),
+        ((0, 1, 2), [], "ids must be numbers"),
+        ((0, 1, 2), [True, False, True], "ids must be numbers"),
+        ((0, 1, 2), "first", "ids must be numbers"),
     ],
 )
-def test_points_that_make_no_sense_are_refused(model: SteerModel, points: Any, who: Any, said: str) -> None:
+def test_points_that_make_no_sense_are_refused(model: SteerModel, points: Any, ids: Any, said: str) -> None:
     session = model.start(characters=3)
     before = session.snapshot()
     with pytest.raises(ControlError, match=said):
-        session.look_at(points, who=who)
+        session.look_at(points, ids=ids)
     with pytest.raises(ControlError, match=said):
-        session.reach("left", points, who=who)
+        session.reach("left", points, ids=ids)
     assert session.snapshot().look is before.look
     assert session.snapshot().left is before.left
     with pytest.raises(ControlError, match="unknown hand 'both'; expected left or right"):

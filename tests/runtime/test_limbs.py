@@ -122,7 +122,7 @@ def test_no_joint_jumps_where_acts_cut_each_other(model: SteerModel) -> None:
     for tick in range(120):
         figures = np.flatnonzero(cuts == tick)
         if len(figures):
-            session.act([pairs[figure][1] for figure in figures], who=figures.tolist())
+            session.act([pairs[figure][1] for figure in figures], ids=figures.tolist())
         poses.append(session.tick())
     assert turned(np.stack([pose.rotations[:, 1:] for pose in poses])).max() < 35
     speeds = np.diff([pose.positions() - pose.place[:, None] for pose in poses], axis=0) * model.fps

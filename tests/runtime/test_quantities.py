@@ -93,8 +93,8 @@ def test_what_remains_is_what_is_done() -> None:
 )
 def test_a_motion_has_as_much_as_was_asked(sentence: str, model: CodesModel) -> None:
     (made,) = model.generate(sentence, seed=3)
-    ((kind, amount),) = made.asked.items()
-    assert not short(made.asked, made.measured, either=False)
+    ((kind, amount),) = made.requested.items()
+    assert not short(made.requested, made.measured, either=False)
     seen = Seen.of(model.contract, made.features.values)  # with feet that are planted
     assert seen.measured(kind, quantities_of(sentence).act) == pytest.approx(
         amount, rel=0.1, abs=1 if kind == "steps" else 0
@@ -104,8 +104,8 @@ def test_a_motion_has_as_much_as_was_asked(sentence: str, model: CodesModel) -> 
 def test_parts_of_a_story_keep_their_numbers(model: CodesModel) -> None:
     (made,) = model.generate("walk 3 metres, then jump twice, then stand still for 2 seconds", seed=1)
     assert isinstance(made, Story)
-    assert [dict(one.asked) for one in made.passages] == [{"metres": 3}, {"times": 2}, {"seconds": 2}]
-    assert made.asked == {}
+    assert [dict(one.requested) for one in made.passages] == [{"metres": 3}, {"times": 2}, {"seconds": 2}]
+    assert made.requested == {}
     assert made.passages[-1].stop == pytest.approx(len(made.frames) / model.fps)
     assert made.passages[-1].measured["seconds"] == pytest.approx(2, abs=0.1)
     leaps = np.abs(np.diff(made.frames[:, 4:], axis=0)).max(axis=1)
@@ -117,7 +117,7 @@ def test_parts_of_a_story_keep_their_numbers(model: CodesModel) -> None:
 
 def test_numbers_can_be_words(model: CodesModel) -> None:
     (made,) = model.generate("a person walks 4 metres forward", numbers=False)
-    assert made.asked == {}
+    assert made.requested == {}
     assert not isinstance(made, Story)
 
 
@@ -228,7 +228,7 @@ def test_a_turn_is_that_of_the_hips_from_first_to_last(sentence: str, model: Cod
     points = positions(made.motion)
     across = points[:, HUMANOID.index("leftUpperLeg")] - points[:, HUMANOID.index("rightUpperLeg")]
     turned = np.degrees(np.ptp(np.unwrap(np.arctan2(-across[:, 2], across[:, 0]))[[0, -1]]))
-    assert turned == pytest.approx(abs(made.asked["degrees"]), abs=1)
+    assert turned == pytest.approx(abs(made.requested["degrees"]), abs=1)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ import importlib.util
 import json
 import logging
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -129,8 +130,10 @@ def _earlier(file: Path) -> dict[str, Any]:
     """What ``--json`` printed."""
     try:
         report: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        known = [(row["name"], float(row["value"])) for rows in report["bundles"].values() for row in rows]
-        if not known or not isinstance(report["machine"], dict):
+        rows = list(chain(*report["bundles"].values()))
+        for row in rows:
+            _ = row["name"], float(row["value"])
+        if not rows or not isinstance(report["machine"], dict):
             raise ValueError("no rows")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FormatError(file, f"not what motet bench --json prints: {error}") from error

@@ -158,7 +158,7 @@ def _written(
         facts = {"frames": len(motion), "fps": motion.fps, "seconds": motion.duration}
         passages = {"passages": list(map(asdict, result.passages))} if isinstance(result, Story) else {}
         shown = {"action": result.action or None, "lacking": result.lacking, "confidence": result.confidence}
-        details = {**shown, "asked": dict(result.asked), "measured": dict(result.measured)}
+        details = {**shown, "requested": dict(result.requested), "measured": dict(result.measured)}
         scored = {"output": str(place), "log_likelihood": result.log_likelihood}
         hypotheses.append({**scored, **facts, **details, **passages})
     return {"input": text, "hypotheses": hypotheses}
@@ -196,5 +196,5 @@ def confidence_of(shown: Mapping[str, Any]) -> str:
 def _numbers(hypothesis: Mapping[str, Any]) -> str:
     """What was asked in numbers beside what was measured: "asked 3 steps: 3"."""
     shown = {kind: f": {value:.3g} shown" for kind, value in hypothesis["measured"].items()}
-    numbers = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in hypothesis["asked"].items())
+    numbers = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in hypothesis["requested"].items())
     return numbers and f"asked: {numbers}"

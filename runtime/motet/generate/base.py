@@ -89,7 +89,7 @@ class Generated:
     """How well the model knows its sentence (:meth:`motet.generate.model.CodesModel.understood`), 0 to 1; of several
     sentences the least; None where a model cannot tell."""
 
-    asked: Mapping[str, float] = field(default_factory=dict)
+    requested: Mapping[str, float] = field(default_factory=dict)
     """The numbers in its sentence (:mod:`motet.text.numeric_phrases`): degrees to the left, metres, steps, times,
     seconds, and a pace relative to the usual one; empty where several things are shown."""
 

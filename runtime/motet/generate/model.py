@@ -565,7 +565,7 @@ class CodesModel(GenerateModel):
             action=only.action,
             lacking=tuple(lacking),
             confidence=min(passage.confidence or 0.0 for passage in passages),
-            asked=only.asked,
+            requested=only.requested,
             measured=only.measured,
             passages=tuple(passages),
         )

@@ -113,8 +113,10 @@ class ClientSession:
             "contacts": pose.contacts,
             **({"positions": pose.positions()} if self.positions else {}),
         }
-        rows = {name: np.round(values.astype(np.float64), 5).tolist() for name, values in parts.items()}
-        characters = [{name: values[i] for name, values in rows.items()} for i in range(len(pose))]
+        characters = list[dict[str, Any]]()
+        columns = [np.round(values.astype(np.float64), 5).tolist() for values in parts.values()]
+        for values in zip(*columns, strict=True):
+            characters.append(dict(zip(parts, values, strict=True)))
         time = round(self.ticks / self.model.fps, 5)
         events = [[event.kind, event.character, *([event.name] if event.name else [])] for event in pose.events]
         happened = {"events": events} if events else {}

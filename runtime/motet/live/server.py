@@ -180,7 +180,8 @@ class LiveClients:
         count = 0
         while True:
             text = await connection.recv()
-            tick, count = client.ticks, (count + 1 if tick == client.ticks else 1)
+            count = count + 1 if tick == client.ticks else 1
+            tick = client.ticks
             if count > self.limits.messages:
                 raise ProtocolError(f"more than {self.limits.messages} messages between two frames")
             await self._made(text)

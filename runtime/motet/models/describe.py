@@ -342,8 +342,11 @@ class DescribeModel(LanguageModel):
             rows = np.arange(start, min(start + ENCODED, len(sequences)))
             feeds = taken(inputs, two_rows(rows))
             parts.append(taken({**feeds, **encoder(feeds)}, np.arange(len(rows))))
-        names = [name for name in parts[0] if self.graphs["step"].spec.takes(name)]
-        return {name: np.concatenate([part[name] for part in parts]) for name in names}
+        attended = dict[str, NDArray[Any]]()
+        for name in parts[0]:
+            if self.graphs["step"].spec.takes(name):
+                attended[name] = np.concatenate([part[name] for part in parts])
+        return attended
 
     def embed(self, motions: Motion | Sequence[Motion]) -> Floats:
         """The context vector (C,) float32 of a motion, or (N, C) of several; MotionError like :meth:`frames`."""

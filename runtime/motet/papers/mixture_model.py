@@ -33,7 +33,7 @@ class MixtureModel(GenerateModel):
         rest = {name: value for name, value in settings.items() if name != "max_seconds"}
         frames = max(1, round(settings["max_seconds"] * self.fps))
         samples: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
-        return [[self._denormalised(sample) for sample in row] for row in samples]
+        return [list(map(self._denormalised, row)) for row in samples]
 
     def _denormalised(self, sample: Sample) -> Sample:
         return sample._replace(frames=self.contract.denormalised(sample.frames))

@@ -83,7 +83,7 @@ class SteerSnapshot:
 
 class SteerSession:
     """Characters that move in one batch, each steered separately; holds their whole state. A tick is 1 / ``model.fps``
-    seconds. Angles are degrees about the vertical: 0 along z, positive to the left. ``who``: the numbers of the
+    seconds. Angles are degrees about the vertical: 0 along z, positive to the left. ``ids``: the numbers of the
     characters that are meant, from 0; by default all."""
 
     def __init__(
@@ -327,7 +327,7 @@ class SteerSession:
         *,
         gait: str | None = None,
         speed: ArrayLike | None = None,
-        who: CharacterIds = None,
+        ids: CharacterIds = None,
     ) -> None:
         """Let characters go to points on the ground and stand there, or None: stand where they are.
 
@@ -337,7 +337,7 @@ class SteerSession:
         it. ControlError for values that are not numbers or do not fit, and for a gait that goes nowhere; nothing has
         changed then.
         """
-        characters = self._chosen(who)
+        characters = self._chosen(ids)
         if points is None:
             self._send(characters, self._resting_places[characters, None], None, None, None)
             return
@@ -351,14 +351,14 @@ class SteerSession:
         *,
         gait: str | None = None,
         speed: ArrayLike | None = None,
-        who: CharacterIds = None,
+        ids: CharacterIds = None,
     ) -> None:
         """Let characters go along a path on the ground, from where they are to its first point, and so on to its last,
         where they stand. Everything else is like :meth:`go_to`.
 
         points: a path (P, 2) for all, or one for each (n, P, 2), x and z in metres, of up to 10,000 points.
         """
-        characters = self._chosen(who)
+        characters = self._chosen(ids)
         self._send(characters, checked_path(points, len(characters)), facing, gait, speed)
 
     @property
@@ -411,7 +411,7 @@ class SteerSession:
             raise ControlError(f"characters keep 0.1 to 5 m apart, or None, not {room!r}")
         self._state.room = room or 0.0
 
-    def look_at(self, points: ArrayLike | None, *, who: CharacterIds = None) -> None:
+    def look_at(self, points: ArrayLike | None, *, ids: CharacterIds = None) -> None:
         """Let characters look at points in the world from now on, or None: ahead again, as they are recorded.
 
         points: (3,) or one for each (n, 3), x, y and z in metres. Head, neck and upper spine share the turn, up to 85
@@ -420,9 +420,9 @@ class SteerSession:
         that are not numbers or do not fit; nothing has changed then.
         """
         state = self._state
-        state.look = replace(state.look, points=self._with_points(state.look.points, points, who))
+        state.look = replace(state.look, points=self._with_points(state.look.points, points, ids))
 
-    def reach(self, hand: Literal["left", "right"], points: ArrayLike | None, *, who: CharacterIds = None) -> None:
+    def reach(self, hand: Literal["left", "right"], points: ArrayLike | None, *, ids: CharacterIds = None) -> None:
         """Let a hand of characters be at points in the world from now on, or None: as it is recorded.
 
         points: (3,) or one for each (n, 3), x, y and z in metres, for the middle of the hand. Only the arm moves. The
@@ -432,7 +432,7 @@ class SteerSession:
         if hand not in LEFT_RIGHT:
             raise ControlError(f"unknown hand {hand!r}; expected left or right")
         layer: ReachLayer = getattr(self._state, hand)
-        setattr(self._state, hand, replace(layer, points=self._with_points(layer.points, points, who)))
+        setattr(self._state, hand, replace(layer, points=self._with_points(layer.points, points, ids)))
 
     @property
     def out_of_reach(self) -> Flags:
@@ -456,7 +456,7 @@ class SteerSession:
         return numbers_of(needed, values, self.characters if count is None else count, *columns)
 
     def act(
-        self, what: Action | Sequence[Action], *, who: CharacterIds = None, upper: bool | None = None
+        self, what: Action | Sequence[Action], *, ids: CharacterIds = None, upper: bool | None = None
     ) -> list[Shown]:
         """Begin an act in the next tick, in place of the present one.
 
@@ -464,8 +464,8 @@ class SteerSession:
             :meth:`motet.steering.model.SteerModel.act_of`; the name of a gait that goes nowhere, such as "jump", which
             is done once, forward by characters that move; or a sentence: an act by name, such as "wave with the left
             hand" or "kick twice", or what the session's ``words`` generate, once. None ends the present act. One for
-            all, or one for each of ``who``.
-        who: numbers of characters, by default all.
+            all, or one for each of ``ids``.
+        ids: numbers of characters, by default all.
         upper: by the upper body alone, while the legs go on; or by the whole body (False), which goes its own way over
             the ground. By default by the whole body where a character stands, until it is steered elsewhere; or
             where the act is one of the legs, such as a kick, after which a character that moves goes on.
@@ -474,7 +474,7 @@ class SteerSession:
         or, in a strict session, with words that are left out, ControlError for a motion of less than three ticks and
         for unknown characters; nothing changes then.
         """
-        characters = self._chosen(who).tolist()
+        characters = self._chosen(ids).tolist()
         each = list(what) if is_many(what) and not isinstance(what, Action) else [what] * len(characters)
         if len(each) != len(characters):
             raise ControlError(f"{len(each)} acts do not fit {len(characters)} characters")
@@ -622,12 +622,12 @@ class SteerSession:
         self._become(picked([state, more._state], [self.characters, count], np.arange(total)))
         return numbers
 
-    def remove(self, who: int | Sequence[int]) -> None:
+    def remove(self, ids: int | Sequence[int]) -> None:
         """Remove characters. The others keep their order, and the numbers of later ones become smaller. ControlError
         for unknown characters, and for all of them: one stays."""
-        if who is None:
-            raise ControlError("who must be the numbers of the characters that go")
-        stay = np.delete(np.arange(self.characters), self._chosen(who))
+        if ids is None:
+            raise ControlError("ids must be the numbers of the characters that go")
+        stay = np.delete(np.arange(self.characters), self._chosen(ids))
         if not len(stay):
             raise ControlError("a session keeps one character at least")
         self._become(picked([self._state], [self.characters], stay))

@@ -166,12 +166,8 @@ class Words:
                 yield name
                 yield from words if isinstance(words, list) else ()
         yield from self.gaits
-        phrases = [phrase for act in self.acts.values() for phrase in act.phrases]
-        for phrase in (
-            *phrases,
-            *self.table["still"],
-            *(text for texts in self.table["phrases"].values() for text in texts),
-        ):
+        phrases = [act.phrases for act in self.acts.values()]
+        for phrase in chain(*phrases, self.table["still"], *self.table["phrases"].values()):
             yield from words_of(phrase)
 
     def key(self, words: str | Iterable[str]) -> str:
@@ -307,7 +303,7 @@ class Words:
         return None
 
     def _side(self, words: Sequence[str]) -> str:
-        sides = [side for side, names in self.table["sides"].items() if any(word in names for word in words)]
+        sides = [side for side, names in self.table["sides"].items() if not frozenset(names).isdisjoint(words)]
         return sides[0] if len(sides) == 1 else ""
 
     def _without_sides(self, words: Sequence[str]) -> list[str]:

@@ -27,7 +27,7 @@ def chosen_ids(ids: CharacterIds, characters: int) -> Rows:
     are_whole = numbers.ndim == 1 and numbers.dtype.kind in "iu" and len(numbers) > 0
     exist = are_whole and (numbers >= 0).all() and (numbers < characters).all()
     if not exist or len(set(numbers)) < len(numbers):
-        raise ControlError(f"who must be numbers of characters from 0 to {characters - 1}, none twice, not {ids!r}")
+        raise ControlError(f"ids must be numbers of characters from 0 to {characters - 1}, none twice, not {ids!r}")
     return numbers.astype(np.int64)
 
 

@@ -61,8 +61,11 @@ BONES_OF_LIMIT = {
 }
 """Setting -> the bones that it is about."""
 
-LIMITED = {BONES.index(bone): kind for kind, bones in BONES_OF_LIMIT.items() for bone in bones}
+LIMITED = dict[int, str]()
 """Bone -> its setting."""
+
+for kind, bones in BONES_OF_LIMIT.items():
+    LIMITED |= dict.fromkeys(map(BONES.index, bones), kind)
 
 
 @dataclass(frozen=True, eq=False)

@@ -68,7 +68,7 @@ class Shown(NamedTuple):
 @dataclass(frozen=True)
 class Passage:
     """A sentence of a story, shown from ``start`` to ``stop`` in seconds; ``action``, ``lacking``, ``confidence``,
-    ``asked`` and ``measured`` as for :class:`motet.generate.base.Generated`."""
+    ``requested`` and ``measured`` as for :class:`motet.generate.base.Generated`."""
 
     text: str
     start: float
@@ -76,7 +76,7 @@ class Passage:
     action: str = ""
     lacking: tuple[str, ...] = ()
     confidence: float | None = None
-    asked: Mapping[str, float] = field(default_factory=dict)
+    requested: Mapping[str, float] = field(default_factory=dict)
     measured: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -17,7 +17,8 @@ from motet.errors import TextError
 from motet.text.clauses import stem
 from motet.text.spelling import corrected
 
-PAD, SOS, EOS, UNK = SPECIALS = ("PAD", "SOS", "EOS", "UNK")
+SPECIALS = ("PAD", "SOS", "EOS", "UNK")
+PAD, SOS, EOS, UNK = SPECIALS
 """Padding, start and end of a sentence, unknown word: ids 0 to 3. Upper case, so that no normal word is one."""
 
 

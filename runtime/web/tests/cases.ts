@@ -305,14 +305,14 @@ async function steers(read: Read): Promise<void> {
     const turn = actOf(model, "act", python.acted.flat());
     const squat = actOf(model, "crouch", python.crouched.flat());
     type Go = Way & { points: number[][] | null };
-    type Some = { who?: number[] };
+    type Some = { ids?: number[] };
     type Points = { points: number[] | number[][] | null };
     type Call = {
       put?: number[][];
       push?: number[];
       control?: Told;
-      act?: { who: number[]; upper?: boolean };
-      crouch?: { who: number[]; upper?: boolean };
+      act?: { ids: number[]; upper?: boolean };
+      crouch?: { ids: number[]; upper?: boolean };
       end?: Some;
       jump?: Some;
       look_at?: Some & Points;

@@ -62,7 +62,7 @@ test("ways that cannot be gone are refused, and change nothing", () => {
   const refused: [() => void, RegExp][] = [
     [() => session.lookAt([0, 1]), /points needs x, y, z, for all or for each of 2/],
     [() => session.lookAt([0, 1, NaN]), /points must be finite/],
-    [() => session.lookAt([0, 1, 1], { who: [2] }), /whole numbers from 0 to 1/],
+    [() => session.lookAt([0, 1, 1], { ids: [2] }), /whole numbers from 0 to 1/],
     [
       () =>
         session.reach("left", [
@@ -88,12 +88,12 @@ test("ways that cannot be gone are refused, and change nothing", () => {
             [1, 0],
             [0, 1],
           ],
-          { who: [1] },
+          { ids: [1] },
         ),
       /for each of 1/,
     ],
-    [() => session.goTo([1, 0], { who: [2] }), /whole numbers from 0 to 1/],
-    [() => session.goTo([1, 0], { who: [1, 1] }), /none twice/],
+    [() => session.goTo([1, 0], { ids: [2] }), /whole numbers from 0 to 1/],
+    [() => session.goTo([1, 0], { ids: [1, 1] }), /none twice/],
     [() => session.goTo([1, 0], { speed: 0 }), /speed must be above 0/],
     [() => session.goTo([1, 0], { facing: NaN }), /facing must be finite/],
     [() => session.goTo([1, 0], { gait: "fly" }), /unknown gait "fly"/],
@@ -112,7 +112,7 @@ test("ways that cannot be gone are refused, and change nothing", () => {
 
 test("a figure arrives, says so once, and a command takes it off its path", () => {
   const session = model.start({ characters: 2 });
-  session.goTo([0.5, 2], { who: [1] });
+  session.goTo([0.5, 2], { ids: [1] });
   const happened = Array.from({ length: 480 }, () => session.advance(1 / 60)).flatMap((poses) =>
     poses.map(({ events }) => events.filter(({ kind }) => kind === "arrived").length),
   );
@@ -257,7 +257,7 @@ test("figures come and go, and each moves as it would alone", () => {
         assert.deepEqual(crowd.add(places[number]!), [number]);
         alone.push(begun(places[number]!));
         if (step === "advance") alone[number]!.advance(0); // the crowd is shown already
-        crowd.goTo([3, -number], { who: [number] });
+        crowd.goTo([3, -number], { ids: [number] });
         alone[number]!.goTo([3, -number]);
       }
       if (at === 60) {

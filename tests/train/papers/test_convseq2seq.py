@@ -77,7 +77,7 @@ def test_a_frame_is_the_last_one_plus_what_the_decoder_says_of_both_contexts() -
 
 
 def test_a_free_run_feeds_back_its_frames_mixed_with_true_ones() -> None:
-    net, windows, own = small(own=0.7), torch.randn(2, 55, 45), 0.7
+    net, windows, own = small(predicted_share=0.7), torch.randn(2, 55, 45), 0.7
     seen, truth, state = windows[:, :50], windows[:, 50:], net.begin(windows[:, :50])
     expected = []
     for n in range(5):

@@ -305,7 +305,7 @@ ablations = with_options(
     click.option("--padding", type=click.Choice(["valid", "same"]), help="Other kernels or windows need 'same'."),
     click.option("--window", type=click.IntRange(1), help="Frames seen by the short-term encoder, C."),
     click.option(
-        "--own", type=click.FloatRange(0, 1), help="Share of predicted frames among those fed back in training."
+        "--predicted-share", type=click.FloatRange(0, 1), help="Share of predicted frames among those fed back."
     ),
     click.option("--loss", type=click.Choice(["square", "distance"]), help="Mean squared distance, or mean distance."),
     click.option("--l2", type=click.FloatRange(0), help="Weight of the squared weights in the loss."),

@@ -58,7 +58,7 @@ export interface Way {
   /** m/s, by default the gait's usual one. */
   speed?: ForAll<number>;
   /** The numbers of the figures that are meant, by default all. */
-  who?: readonly number[];
+  ids?: readonly number[];
 }
 
 /** Of a tick, and what has happened since the one before. */
@@ -150,16 +150,16 @@ export class ControlSession {
   /**
    * Do something, from the next tick on, in place of what is being done: a motion of any human figure, or an act that
    * `actOf` made of one, or the name of a gait that goes nowhere, such as "jump", done once and forward by who moves, or null to
-   * end what is done; one for all, or one for each of `who`, the numbers of the figures. upper: by the upper body alone, or by
+   * end what is done; one for all, or one for each of `ids`, the numbers of the figures. upper: by the upper body alone, or by
    * the whole body with its own way over the ground; if neither is said, by the whole body where a figure stands, whose legs go as
    * soon as it is told to, or where the act is one of the legs, such as a kick, after which a figure that moves goes on.
    * ControlError for figures that are not there and gaits that have no such act, MotionError for what is no human's.
    */
   act(
     what: Doable | readonly Doable[],
-    { who, upper }: { who?: readonly number[]; upper?: boolean } = {},
+    { ids, upper }: { ids?: readonly number[]; upper?: boolean } = {},
   ): void {
-    const figures = this.chosen(who);
+    const figures = this.chosen(ids);
     const each = (Array.isArray(what) ? what : Array<typeof what>(figures.length).fill(what)) as Doable[];
     if (each.length !== figures.length)
       throw new ControlError(`${each.length} acts do not fit ${figures.length} figures`);
@@ -185,7 +185,7 @@ export class ControlSession {
    * does not fit, and for a gait that goes nowhere; nothing changes then.
    */
   goTo(points: readonly number[] | readonly (readonly number[])[] | null, way: Way = {}): void {
-    const figures = this.chosen(way.who);
+    const figures = this.chosen(way.ids);
     const ends =
       points === null
         ? figures.map((at) => this.restingPlace(at))
@@ -202,7 +202,7 @@ export class ControlSession {
     if (!Array.isArray(path) || path.length < 1 || path.length > TARGETS.LONGEST_PATH)
       throw new ControlError(`a path needs 1 to ${TARGETS.LONGEST_PATH} points of x and z`);
     const points = path.map((point) => this.rows("points", point, ["x", "z"], 1)[0]!);
-    const figures = this.chosen(way.who);
+    const figures = this.chosen(way.ids);
     this.send(
       figures,
       figures.map(() => points),
@@ -264,9 +264,9 @@ export class ControlSession {
    */
   lookAt(
     points: readonly number[] | readonly (readonly number[])[] | null,
-    { who }: { who?: readonly number[] } = {},
+    { ids }: { ids?: readonly number[] } = {},
   ): void {
-    this.pointed(points, who).forEach(([at, point]) => (this.state.figures[at]!.look.point = point));
+    this.pointed(points, ids).forEach(([at, point]) => (this.state.figures[at]!.look.point = point));
   }
 
   /**
@@ -277,11 +277,11 @@ export class ControlSession {
   reach(
     hand: "left" | "right",
     points: readonly number[] | readonly (readonly number[])[] | null,
-    { who }: { who?: readonly number[] } = {},
+    { ids }: { ids?: readonly number[] } = {},
   ): void {
     const side = SIDES.indexOf(hand);
     if (side < 0) throw new ControlError(`unknown hand ${JSON.stringify(hand)}; expected left or right`);
-    this.pointed(points, who).forEach(([at, point]) => (this.state.figures[at]!.hands[side]!.point = point));
+    this.pointed(points, ids).forEach(([at, point]) => (this.state.figures[at]!.hands[side]!.point = point));
   }
 
   /** Of each figure whether what its left and its right hand reach for was out of reach in the last tick. */
@@ -428,7 +428,7 @@ export class ControlSession {
   /** Remove figures by their numbers. Those behind move up. ControlError for figures that are not there, and for all: one stays. */
   remove(numbers: readonly number[]): void {
     if (!Array.isArray(numbers) || !numbers.length)
-      throw new ControlError("who needs the numbers of the figures that go");
+      throw new ControlError("ids needs the numbers of the figures that go");
     const gone = new Set(this.chosen(numbers));
     if (gone.size === this.characters) throw new ControlError("a session keeps one figure at least");
     const stay = <One>(all: One[]) => all.filter((_, at) => !gone.has(at));

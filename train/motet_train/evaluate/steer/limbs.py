@@ -1,6 +1,7 @@
 """Whether knees and elbows flip: acts that cut each other at any tick, and hands that reach for points at random."""
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,7 @@ def cut_figures(model: SteerModel, acts: Sequence[Act], gait: str | None) -> dic
     """
     # each figure has its pair, and the tick at which the second act cuts the first
     rng = np.random.default_rng(CUTS_SEED)
-    pairs = [(first, second) for first in acts for second in acts]
+    pairs = list(product(acts, acts))
     cuts = np.array([rng.integers(1, len(first)) for first, _ in pairs])
     session = model.start(gait, characters=len(pairs))
     if gait is not None:
@@ -50,8 +51,8 @@ def cut_figures(model: SteerModel, acts: Sequence[Act], gait: str | None) -> dic
 
     # until some time after the last cut
     poses = [before, *_cut(session, pairs, cuts, round(SHOWN * model.fps))]
-    own = max(float(_own_turns(act).max()) for act in acts)
-    return _largest(poses, model.fps) | {"acts": own}
+    acts_own_turn = max(float(_own_turns(act).max()) for act in acts)
+    return _largest(poses, model.fps) | {"acts": acts_own_turn}
 
 
 def _cut(
@@ -63,7 +64,7 @@ def _cut(
     for tick in range(int(cuts.max()) + after):
         (cut,) = np.nonzero(cuts == tick)
         if len(cut):
-            session.act([pairs[figure][1] for figure in cut.tolist()], who=cut.tolist())
+            session.act([pairs[figure][1] for figure in cut.tolist()], ids=cut.tolist())
         yield session.tick()
 
 

@@ -26,10 +26,10 @@ class Config:
     which a window of 5 frames and other kernels need. The paper does not say; its authors' code has "valid" for CMU and
     "same" for Human3.6M, and "paper", in recipes alone, becomes that of the data. long_term: the encoder of the seed:
     convolutional, an LSTM, or none. It sees all frames but the last, 49 of 50, as in the authors' code; eq. 1 has all.
-    dropout: of each convolution's outputs. decoder_dropout: of the decoder's hidden
-    units. own: share of predicted frames among those fed back in training, eta in eq. 10. loss: "square", the mean
-    squared distance of predicted frames, eq. 7, or "distance", their mean distance, which is the final measure and
-    gives early frames, whose errors are small, more weight.
+    dropout: of each convolution's outputs. decoder_dropout: of the decoder's hidden units. predicted_share: of the
+    frames fed back in training, eta in eq. 10; the rest are recorded. loss: "square", the mean squared distance of
+    predicted frames, eq. 7, or "distance", their mean distance, which is the final measure and gives early frames,
+    whose errors are small, more weight.
     """
 
     dimensions: int
@@ -42,7 +42,7 @@ class Config:
     units: int = 512
     dropout: tuple[float, ...] = (0.0, 0.0, 0.5)
     decoder_dropout: float = 0.5
-    own: float = 1.0
+    predicted_share: float = 1.0
     loss: Literal["square", "distance"] = "square"
 
 
@@ -157,7 +157,9 @@ class ConvSeq2Seq(System):
         """A free run that may feed back predicted frames mixed with true ones (eq. 10)."""
         seed = windows[:, :seed_frames]
         truth = windows[:, seed_frames:]
-        return free_run(self, seed, truth.shape[1], truth if self.config.own < 1 else None, self.config.own)
+        return free_run(
+            self, seed, truth.shape[1], truth if self.config.predicted_share < 1 else None, self.config.predicted_share
+        )
 
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
         """The mean squared error (eq. 7), per channel; or the mean distance over the root of the number of channels."""

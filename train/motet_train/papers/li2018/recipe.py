@@ -50,7 +50,10 @@ RECIPES: Mapping[str, Mapping[str, Recipe]] = {
         "default": _recipe("convseq2seq", convseq2seq.Config(0, padding="same", loss="distance"), SHORT_TRAINING),
         "paper": _recipe("convseq2seq", convseq2seq.Config(0, padding="paper"), PAPER_TRAINING, Visits()),
         "code": _recipe(
-            "convseq2seq", convseq2seq.Config(0, padding="paper", dropout=(0.2, 0.2, 0.5), own=0.95), CODE, Visits()
+            "convseq2seq",
+            convseq2seq.Config(0, padding="paper", dropout=(0.2, 0.2, 0.5), predicted_share=0.95),
+            CODE,
+            Visits(),
         ),
     },
     "rrnn": {"default": _recipe("rrnn", recurrent.RRNNConfig(0), RESIDUAL)},
