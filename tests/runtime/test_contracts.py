@@ -262,6 +262,11 @@ def goes_to_places(session: Any, numbers: Array) -> None:
         session.go_to((number - 3.0, 3.0), ids=row)
 
 
+def goes_over_hills(session: Any, numbers: Array) -> None:
+    session.set_ground(lambda x, z: 0.3 * np.sin(2 * z) + 0.1 * x)
+    session.control(gait="walk", speed=1.2, direction=30.0 * numbers)
+
+
 SESSIONS = {
     "the thesis' net, drawn": tdbn(1.0),
     "the thesis' net, its mean": tdbn(0.0),
@@ -270,6 +275,7 @@ SESSIONS = {
     "looks and reaches": steered(looks_and_reaches),
     "acts": steered(acts),
     "goes to places": steered(goes_to_places),
+    "goes over hills": steered(goes_over_hills),
 }
 
 

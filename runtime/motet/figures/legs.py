@@ -46,17 +46,18 @@ def limbs(rotations: Floats, contacts: Floats) -> Iterator[Limb]:
         for bones, offsets, contact in zip(LEG_BONES, LEG_OFFSETS.tolist(), contacts[0].tolist(), strict=True):
             yield Limb(rotations[0, bones].tolist(), offsets, contact)
     else:
-        local = np.array(
-            rotations.transpose(1, 2, 0)[LEG_BONES].transpose(1, 2, 0, 3),
-            dtype=np.float64,
-            order="C",
-        )
-        offsets = LEG_OFFSETS.transpose(1, 2, 0)[..., None]
-        yield Limb(
-            [tuple(quats) for quats in local],
-            [tuple(offset) for offset in offsets],
-            contacts.T,
-        )
+        yield limbs_as_arrays(rotations, contacts)
+
+
+def limbs_as_arrays(rotations: Floats, contacts: Floats) -> Limb:
+    """The legs of characters as one: each part is an array (2, B) of left and right legs."""
+    local = np.array(
+        rotations.transpose(1, 2, 0)[LEG_BONES].transpose(1, 2, 0, 3),
+        dtype=np.float64,
+        order="C",
+    )
+    offsets = LEG_OFFSETS.transpose(1, 2, 0)[..., None]
+    return Limb([tuple(quats) for quats in local], [tuple(offset) for offset in offsets], contacts.T)
 
 
 def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:

@@ -121,7 +121,7 @@ def _held(
     """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
     # the foot as it is played, and how it is corrected
     turned, places = joints_of(limb, hips, place)
-    sole = _sole(turned, places)
+    sole = sole_points(turned, places)
     foot = _corrected(foot_before, sole, limb.contact, place[1], settings, seconds)
     shift_x, shift_z, _, _, height, *_ = foot
     # no point of the sole is below the ground
@@ -192,7 +192,7 @@ def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float
     return where(is_new, 0.0, move_x), where(is_new, 0.0, move_z)
 
 
-def _sole(turned: Sequence[Quaternion], places: Sequence[Vector]) -> list[Vector]:
+def sole_points(turned: Sequence[Quaternion], places: Sequence[Vector]) -> list[Vector]:
     """Where the points of a sole are, of rotations and places of a leg's joints."""
     return [plus(places[joint], rotated(turned[joint], point)) for joint, point in SOLE_POINTS]
 

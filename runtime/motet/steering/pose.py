@@ -26,7 +26,7 @@ class Pose:
 
     ground: (B, 3) x, z, and the facing in radians: 0 along z, positive to the left. rotations: (B, J, 4) quaternions
     (x, y, z, w) of the bones (:data:`motet.motion.BONES`) in their parents' frames; of the hips in the frame of the
-    facing. height: (B,) of the hips above the ground. contacts: (B, 2) from 0 to 1, ground contact of the left and the
+    facing. height: (B,) of the hips above y = 0. contacts: (B, 2) from 0 to 1, ground contact of the left and the
     right foot. events: what has happened since the pose before, such as footsteps.
     """
 

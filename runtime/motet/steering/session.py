@@ -31,6 +31,7 @@ from motet.steering.scripts import Order, parse_orders
 from motet.steering.spoken import Reading
 from motet.steering.step import tick
 from motet.steering.targets import CharacterIds, checked_path, chosen_ids, numbers_of
+from motet.steering.terrain import GroundHeight, Terrain, TerrainLayer, TerrainSettings
 from motet.steering.turn_limit import TurnLimit, TurnSettings
 from motet.text.clauses import Shown
 
@@ -51,6 +52,7 @@ class SteerSnapshot:
     idle: IdleLayer
     command: Command
     lock: FootLock | None
+    terrain: TerrainLayer
     look: LookLayer
     left: ReachLayer
     """The left hands."""
@@ -100,6 +102,7 @@ class SteerSession:
         self.model = model
         self.strict = strict
         self._words = words
+        self._terrain: Terrain | None = None
         self._warned: set[str] = set()  # gaits whose limits a warning has named
         self._state = SteerSnapshot(
             playback=playback,
@@ -107,6 +110,7 @@ class SteerSession:
             idle=IdleLayer.none(characters),
             command=Command(np.full(characters, gait), zero, zero, zero, zero > 0),
             lock=FootLock.none(characters) if hold_feet else None,
+            terrain=TerrainLayer.none(characters),
             look=LookLayer.none(characters),
             left=ReachLayer.none(0, characters),
             right=ReachLayer.none(1, characters),
@@ -270,6 +274,8 @@ class SteerSession:
         playback = state.playback
         gait = state.command.gait
         root_before = playback.root
+        if self._terrain is not None:
+            target = self._terrain.slowed(target, root_before, settings(TerrainSettings))
         # acts go on, begin and end; legs that an act has led so far get a row to continue from
         changed = state.actions.begin(matcher, codes, settings(ActSettings), playback, target, gait)
         # search, playback, springs, warping: the pose of the recordings, and the root
@@ -285,6 +291,9 @@ class SteerSession:
         if state.lock is not None:
             pose = state.idle.breathe(pose, settings(IdleSettings), seconds)
             state.lock, pose = state.lock.update(pose, settings(FootLockSettings), seconds)
+        # terrain: feet, legs and hips follow the ground
+        if self._terrain is not None:
+            state.terrain, pose = state.terrain.update(pose, self._terrain, settings(TerrainSettings), seconds)
         # look and reach: heads and arms
         state.look, pose = state.look.update(pose, settings(LookSettings), seconds)
         state.left, pose = state.left.update(pose, settings(ReachSettings), seconds)
@@ -564,6 +573,17 @@ class SteerSession:
         first, second = state.poses
         return replace(first.towards(second, state.ahead), events=events)
 
+    def set_ground(self, ground: GroundHeight | None) -> None:
+        """Let the characters go over ground that is not flat, from the next tick on; None for the plane y = 0.
+
+        ground: the height in metres at places x and z, float64 arrays of one shape, such as
+            ``lambda x, z: 0.3 * np.sin(x)``. Heights of poses are then above y = 0, too, and uphill they go slower.
+        A session keeps it when it is restored. ControlError for what is no function; what it raises, and heights that
+        are none, are ControlErrors of the ticks.
+        """
+        self._terrain = None if ground is None else Terrain(ground)
+        self._state.terrain = TerrainLayer.none(self.characters)
+
     def push(self, velocity: ArrayLike) -> None:
         """Push the characters by a velocity (2,) or (characters, 2) along x and z, m/s, from which they recover."""
         playback = self._state.playback
@@ -583,14 +603,20 @@ class SteerSession:
         no_way = np.zeros_like(before.faces_way)
         state.command = replace(before, direction=direction, facing=facing, faces_way=no_way)
         self._target, _ = self.model.abilities.target(state.command)
-        state.actions = self._no_acts()
-        state.going = state.going.ended()
-        if state.lock is not None:
-            state.lock = FootLock.none(self.characters)
+        self._begin_anew()
         # nothing lies between there and here
         if state.poses is not None:
             state.late += state.poses[1].events
         state.poses = None
+
+    def _begin_anew(self) -> None:
+        """Without acts and ways, and with feet that have not stood yet."""
+        state = self._state
+        state.actions = self._no_acts()
+        state.going = state.going.ended()
+        if state.lock is not None:
+            state.lock = FootLock.none(self.characters)
+        state.terrain = TerrainLayer.none(self.characters)
 
     def _no_acts(self) -> ActionLayer:
         return ActionLayer.none(self.model.matcher, self.model.pose_codes, self._state.playback)
@@ -647,7 +673,7 @@ class SteerSession:
     def run(self, script: str) -> list[Motion]:
         """Run a script (:mod:`motet.steering.scripts`) for all characters; one motion for each."""
         frames = self.frames_of(list(self.follow(parse_orders(script, self.model.gaits))))
-        plant = self._state.lock is not None
+        plant = self._state.lock is not None and self._terrain is None
         return [self.model.contract.motion(each, plant=plant) for each in frames]
 
     def follow(self, orders: Sequence[Order]) -> Iterator[Pose]:
