@@ -96,7 +96,7 @@ CEILINGS = {
     "motet.representation": 9_500,
     "motet.search": 3_600,
     "motet.serve": 17_100,
-    "motet.steering": 48_800,
+    "motet.steering": 48_700,
     "motet.text": 5_400,
     "motet_export": 11_400,
     "motet_train": 9_500,
