@@ -74,6 +74,7 @@ MODULES = (
     "motet.steering.settings",
     "motet.steering.spoken",
     "motet.steering.targets",
+    "motet.steering.terrain",
     "motet.steering.turn_limit",
     "motet.steering.warping",
     "motet.text.clauses",

@@ -5,6 +5,7 @@
 
 import json
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -28,7 +29,7 @@ from motet.models.describe import DescribeModel
 from motet.motion import in_place, is_in_place, with_travel
 from motet.motion.kinematics import local_translations
 from motet.motion.motion import Motion
-from motet.motion.rotations import quat_product
+from motet.motion.rotations import Array, quat_product
 from motet.predict.model import PredictModel
 from motet.search.model import Index, IndexSettings, Member, SearchModel
 from motet.steering.acts import Act, ActSettings
@@ -254,6 +255,12 @@ def crouching(frames: int = 24) -> list[list[float]]:
     return found
 
 
+GROUNDS: dict[str | None, Callable[[Array, Array], Array]] = {
+    "stairs": lambda x, z: 0.17 * np.clip(np.floor((z - 2.3) / 0.29), 0, 8),
+    "hills": lambda x, z: 0.3 * np.sin(0.7 * x) + 0.02 * z * z,
+}
+"""Heights of the ground, which tests/cases.ts has, too."""
+
 STEERED: list[dict[str, Any]] = [
     {"control": {"gait": "walk", "velocity": [[1.2, 0.4], [0.3, -1.1]]}},
     {"control": {"gait": ["run", "walk"], "speed": 2.5, "direction": [80.0, -40.0], "facing": [80.0, -20.0]}},
@@ -281,6 +288,13 @@ STEERED: list[dict[str, Any]] = [
     {"control": {"speed": 0.0}, "crouch": {"ids": [0, 1], "upper": False}},
     {},
     {"act": {"ids": [0, 1], "upper": False}, "reach": {"hand": "right", "points": [0.0, 1.6, -9.0]}},
+    {"put": [[1.0, 2.0, 30.0], [-2.0, 0.5, -90.0]], "set_ground": "stairs"},
+    {"control": {"gait": ["walk", "run"], "speed": [1.2, 2.5], "direction": [0.0, 20.0]}},
+    *[{}] * 3,
+    {"set_ground": "hills"},
+    {"control": {"gait": "walk", "speed": 1.0, "direction": [80.0, -150.0], "facing": [0.0, -100.0]}},
+    *[{}] * 3,
+    {"set_ground": None},
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
 :func:`turning_about`, and for "crouch" :func:`crouching`."""
@@ -299,6 +313,8 @@ def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[l
             for name, given in calls.items():
                 if name in acts:
                     session.act(acts[name], **given)
+                elif name == "set_ground":
+                    session.set_ground(GROUNDS.get(given))
                 elif isinstance(given, dict):
                     getattr(session, name)(**given)
                 else:

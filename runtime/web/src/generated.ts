@@ -525,6 +525,30 @@ export const TARGETS = {
   LONGEST_PATH: 10000,
 } as const;
 
+// motet.steering.terrain
+export const TERRAIN = {
+  GLANCES: 4,
+  HIGHEST_GROUND: 10000,
+  LEAST_SQUARED_SPEED: 0.0001,
+} as const;
+
+// motet.steering.terrain.TerrainSettings
+export const terrainSettings = {
+  stands: { default: 0.5, low: 0, high: 1, whole: false },
+  feet: { default: 0.02, low: 0.01, high: 10, whole: false },
+  tilt: { default: 0.06, low: 0.01, high: 10, whole: false },
+  hips: { default: 0.1, low: 0.01, high: 10, whole: false },
+  steepest: { default: 40, low: 0, high: 80, whole: false },
+  spread: { default: 0.04, low: 0, high: 100, whole: false },
+  climbs: { default: 0.9, low: 0.01, high: 10, whole: false },
+  foresees: { default: 0.24, low: 0.01, high: 100, whole: false },
+  swings: { default: 1.7, low: 1, high: 5, whole: false },
+  half_step: { default: 0.25, low: 0.01, high: 100, whole: false },
+  straight: { default: 0.97, low: 0, high: 1, whole: false },
+  uphill: { default: 0.7, low: 0, high: 10, whole: false },
+  slope_span: { default: 0.6, low: 0, high: 100, whole: false },
+} as const;
+
 // motet.steering.turn_limit
 export const TURN_LIMIT = {
   LIMITED: { 1: "trunk", 2: "trunk", 3: "trunk", 4: "head", 5: "head", 10: "shoulder", 18: "shoulder", 11: "upper_arm", 19: "upper_arm", 12: "lower_arm", 20: "lower_arm", 13: "hand", 21: "hand", 6: "upper_leg", 14: "upper_leg", 7: "lower_leg", 15: "lower_leg", 8: "foot", 16: "foot", 9: "toes", 17: "toes" },

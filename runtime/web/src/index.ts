@@ -11,6 +11,7 @@ export {
   type Way,
 } from "./steering/session.js";
 export { DescribeModel, type Description, type DescribeSettings } from "./models/describe.js";
+export type { GroundHeight } from "./steering/terrain.js";
 export type { FigureEvent } from "./steering/events.js";
 export { FillModel } from "./predict/fill.js";
 export {

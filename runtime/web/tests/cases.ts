@@ -294,6 +294,12 @@ async function steersTargets(read: Read): Promise<void> {
   close(flat(framesOf(poses, model.fps)), wanted("frames").data, "frames");
 }
 
+/** Heights of the ground, as test_web.py has them. */
+const GROUNDS = {
+  stairs: (_: number, z: number) => 0.17 * Math.min(Math.max(Math.floor((z - 2.3) / 0.29), 0), 8),
+  hills: (x: number, z: number) => 0.3 * Math.sin(0.7 * x) + 0.02 * z * z,
+};
+
 /** The calls of python.json, and some pictures of each, with the feet held and without. */
 async function steers(read: Read): Promise<void> {
   const { model } = await loaded(read, "control", ControlModel);
@@ -320,29 +326,31 @@ async function steers(read: Read): Promise<void> {
       keep_apart?: number | null;
       go_to?: Go;
       go_along?: Go;
+      set_ground?: keyof typeof GROUNDS | null;
     };
-    const found = (python.steering as Call[]).flatMap(
-      ({ put, push, control, act, crouch, end, jump, keep_apart, go_to, go_along, look_at, reach }, call) => {
-        if (act) session.act(turn, act);
-        if (crouch) session.act(squat, crouch);
-        if (end) session.act(null, end);
-        if (jump) session.act("jump", jump);
-        if (look_at) session.lookAt(look_at.points, look_at);
-        if (reach) session.reach(reach.hand, reach.points, reach);
-        if (put) session.put(put);
-        if (push) session.push(push);
-        if (control) session.control(control);
-        if (keep_apart !== undefined) session.keepApart(keep_apart);
-        if (go_to) session.goTo(go_to.points, go_to);
-        if (go_along) session.goAlong(go_along.points!, go_along);
-        const pictures = Array.from({ length: 36 }, () => session.advance(1 / 48));
-        const happened = [0, 1].map((figure) =>
-          pictures.flatMap((poses) => poses[figure]!.events.map(({ kind, name }) => [kind, name ?? ""])),
-        );
-        if (holdFeet) equal(happened, python.happened[call], `events after call ${call}`);
-        return pictures.filter((_, at) => at % 12 === 0);
-      },
-    );
+    const found = (python.steering as Call[]).flatMap((calls, call) => {
+      const { put, push, control, act, crouch, end, jump } = calls;
+      const { keep_apart, go_to, go_along, look_at, reach, set_ground } = calls;
+      if (act) session.act(turn, act);
+      if (crouch) session.act(squat, crouch);
+      if (end) session.act(null, end);
+      if (jump) session.act("jump", jump);
+      if (look_at) session.lookAt(look_at.points, look_at);
+      if (reach) session.reach(reach.hand, reach.points, reach);
+      if (put) session.put(put);
+      if (push) session.push(push);
+      if (control) session.control(control);
+      if (keep_apart !== undefined) session.keepApart(keep_apart);
+      if (go_to) session.goTo(go_to.points, go_to);
+      if (go_along) session.goAlong(go_along.points!, go_along);
+      if (set_ground !== undefined) session.setGround(set_ground && GROUNDS[set_ground]);
+      const pictures = Array.from({ length: 36 }, () => session.advance(1 / 48));
+      const happened = [0, 1].map((figure) =>
+        pictures.flatMap((poses) => poses[figure]!.events.map(({ kind, name }) => [kind, name ?? ""])),
+      );
+      if (holdFeet) equal(happened, python.happened[call], `events after call ${call}`);
+      return pictures.filter((_, at) => at % 12 === 0);
+    });
     equal(found.length, wanted.length, "pictures");
     found.forEach((poses, at) =>
       poses.forEach(({ ground, hips, rotations, contacts }, figure) => {

@@ -1,7 +1,7 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
 import type { footLockSettings } from "../generated.js";
 import { LEG, SOLES } from "../figures/humanoid/bones.js";
-import { legOf, reach } from "../figures/legs.js";
+import { legOf, type Limb, reach } from "../figures/legs.js";
 import { about, minus, plus, product, rotated, type Vector, Y } from "../motion/rotations.js";
 import { damped, dampingOf } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
@@ -43,9 +43,7 @@ export function held(
   lock.forEach((foot, side) => {
     // where the leg and the points of its sole are played
     const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
-    const soles = POINTS.map(([joint, point]) =>
-      plus(leg.places[joint]!, rotated(leg.turned[joint]!, point)),
-    );
+    const soles = solePoints(leg);
     const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
     // the point that bears the foot: the ball, or heel or tip if they are lower
     const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
@@ -68,6 +66,11 @@ export function held(
       reach(rotations, side, hips, leg, [foot.shift[0], lift, foot.shift[1]]);
   });
   return { ...pose, rotations };
+}
+
+/** Where heel, ball and tip of a leg's sole are. */
+export function solePoints({ turned, places }: Limb): Vector[] {
+  return POINTS.map(([joint, point]) => plus(places[joint]!, rotated(turned[joint]!, point)));
 }
 
 /** Move a foot whose point that bears it was moved since the last tick; how far that is then shown to move. */

@@ -12,6 +12,7 @@ import {
   lookSettings,
   reachSettings,
   steeringSettings,
+  terrainSettings,
   turnSettings,
 } from "../generated.js";
 import { type Act, actOf, reachOf } from "./acts.js";
@@ -50,6 +51,7 @@ export class ControlModel extends Model {
   readonly idle: Settings<typeof idleSettings>;
   readonly look: Settings<typeof lookSettings>;
   readonly reach: Settings<typeof reachSettings>;
+  readonly terrain: Settings<typeof terrainSettings>;
   readonly turns: Settings<typeof turnSettings>;
   readonly arrival: Settings<typeof arrivalSettings>;
   readonly avoidance: Settings<typeof avoidanceSettings>;
@@ -66,6 +68,7 @@ export class ControlModel extends Model {
     this.idle = settingsOf("idle", idleSettings, manifest.settings.idle);
     this.look = settingsOf("look", lookSettings, manifest.settings.look);
     this.reach = settingsOf("reach", reachSettings, manifest.settings.reach);
+    this.terrain = settingsOf("terrain", terrainSettings, manifest.settings.terrain);
     this.turns = settingsOf("turns", turnSettings, manifest.settings.turns);
     this.arrival = settingsOf("arrival", arrivalSettings, manifest.settings.arrival);
     this.avoidance = settingsOf("avoidance", avoidanceSettings, manifest.settings.avoidance);

@@ -16,6 +16,7 @@ import { about, product, type Quaternion, type Vector, Y } from "../motion/rotat
 import { wrapped } from "../motion/springs.js";
 import { hasten, standing, type Steered, tell, tick } from "./steered.js";
 import { between, type Played } from "./step.js";
+import { checkedGround, type GroundHeight, newTerrain } from "./terrain.js";
 
 const RADIANS = Math.PI / 180;
 
@@ -87,6 +88,7 @@ export interface ControlSnapshot {
 export class ControlSession {
   private state: State;
   private readonly warned = new Set<number>();
+  private ground: GroundHeight | null = null;
 
   constructor(
     readonly model: ControlModel,
@@ -318,7 +320,7 @@ export class ControlSession {
     const { figures, room } = this.state;
     if (!targets && (room || figures.some(({ going }) => going))) lead(this.model, figures, room);
     return figures.map((figure, at) =>
-      this.happened(figure, tick(this.model, figure, this.holdFeet, targets?.[at])),
+      this.happened(figure, tick(this.model, figure, this.holdFeet, this.ground, targets?.[at])),
     );
   }
 
@@ -364,6 +366,16 @@ export class ControlSession {
     );
   }
 
+  /**
+   * Let the figures go over ground that is not flat, from the next tick on: its height in metres at places x and z; null: the
+   * plane y = 0. Hips are then above y = 0, and uphill figures are slower. A session keeps it when it is restored. ControlError for
+   * what is no function; a height that is no number is one of the tick.
+   */
+  setGround(ground: GroundHeight | null): void {
+    this.ground = ground && checkedGround(ground);
+    for (const figure of this.state.figures) figure.terrain = newTerrain();
+  }
+
   /** Push the figures by a velocity along x and z, m/s, from which they recover. */
   push(velocity: readonly number[] | readonly (readonly number[])[]): void {
     const rows = this.rows("a velocity", velocity, ["x", "z"]);
@@ -387,6 +399,7 @@ export class ControlSession {
       figure.target = this.model.abilities.target(figure.command).target;
       figure.going = null;
       figure.lock = newLock();
+      figure.terrain = newTerrain();
       figure.acting = noAct(this.model.steerer, playback);
     });
     this.state.shown?.[1].forEach((pose, at) => this.state.late[at]!.push(...pose.events));

@@ -6,6 +6,7 @@ import type {
   idleSettings,
   lookSettings,
   reachSettings,
+  terrainSettings,
   turnSettings,
 } from "../generated.js";
 import { type Acting, type ActingModel, begin, laid, noAct } from "./actionLayer.js";
@@ -20,6 +21,7 @@ import { idle, type Reach, reached } from "./reachLayer.js";
 import { breathed, kept, notYet, type Standing } from "./idle.js";
 import type { Settings } from "../settings.js";
 import type { Played, Steerer } from "./step.js";
+import { grounded, type GroundHeight, newTerrain, slowed, type Terrain } from "./terrain.js";
 import { type Joints, limited } from "./turnLimit.js";
 
 /** What figures are steered with. */
@@ -29,6 +31,7 @@ export interface SteeringModel extends ActingModel {
   readonly idle: Settings<typeof idleSettings>;
   readonly look: Settings<typeof lookSettings>;
   readonly reach: Settings<typeof reachSettings>;
+  readonly terrain: Settings<typeof terrainSettings>;
   readonly turns: Settings<typeof turnSettings>;
   readonly arrival: Settings<typeof arrivalSettings>;
   readonly avoidance: Settings<typeof avoidanceSettings>;
@@ -38,6 +41,7 @@ export interface Steered {
   playback: Playback;
   acting: Acting;
   lock: Lock;
+  terrain: Terrain;
   standing: Standing;
   command: Command;
   target: Target;
@@ -66,6 +70,7 @@ export function standing(steerer: Steerer, gait: number, place?: Ground, phase?:
     playback,
     acting: noAct(steerer, playback),
     lock: newLock(),
+    terrain: newTerrain(),
     standing: notYet(),
     command,
     target: [0, 0, facing],
@@ -89,10 +94,19 @@ export function hasten(playback: Playback): void {
   if (!playback.inTurn) playback.ticksToSearch = 0;
 }
 
-/** The next pose, 1 / fps seconds later. raw: a target in place of the figure's own, gone for as it is. */
-export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, raw?: Target): Played {
+/**
+ * The next pose, 1 / fps seconds later. ground: where it is not flat. raw: a target in place of the figure's own, gone for as it is.
+ */
+export function tick(
+  model: SteeringModel,
+  figure: Steered,
+  holdFeet: boolean,
+  ground: GroundHeight | null = null,
+  raw?: Target,
+): Played {
   const { playback, acting, command } = figure;
-  const target = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
+  const wanted = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
+  const target = ground ? slowed(wanted, playback.root, ground, model.terrain) : wanted;
   const { steerer, idle: settings, fps } = model;
   const { root } = playback;
   const dt = 1 / fps;
@@ -107,7 +121,8 @@ export function tick(model: SteeringModel, figure: Steered, holdFeet: boolean, r
   const footed = holdFeet
     ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt)
     : pose;
-  return limited(figure.joints, guided(model, figure, footed, dt), model.turns, dt);
+  const stepped = ground ? grounded(figure.terrain, footed, ground, model.terrain, dt) : footed;
+  return limited(figure.joints, guided(model, figure, stepped, dt), model.turns, dt);
 }
 
 /** A pose with head and arms as the figure is told. */
