@@ -12,15 +12,16 @@ from motet.steering.model import SteerModel
 
 FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "live.png"
 STEPS = """(() => {
-  motet.stage.view.yaw += 150;
-  motet.stage.zoom(1.7);
-  const walk = { gait: 0, x: 0, z: 1.2, facing: 0 };
-  for (let i = 0; i < 60; i++) motet.tick(walk);
-  motet.obey(document.getElementById("text").value = "wave");
-  for (let i = 0; i < 60; i++) motet.tick(walk);
+  motet.stage.view.yaw += 100;
+  motet.stage.zoom(1.2);
+  motet.goTo([-6, 6.5]);
+  for (let i = 0; i < 215; i++) motet.tick(motet.command());
+  motet.obey(document.getElementById("text").value = "walk and wave");
+  for (let i = 0; i < 42; i++) motet.tick(motet.command());
+  motet.scene.cut();
   document.getElementById("pause").click();
 })()"""
-"""Five figures walk ahead, and the first one waves."""
+"""Five figures walk up the hill, and the first one waves."""
 
 
 def main() -> None:

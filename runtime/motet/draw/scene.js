@@ -123,6 +123,8 @@ class Stage {
     const { x, y, width, height } = box ?? { x: 0, y: 0, width: canvas.clientWidth, height: canvas.clientHeight };
     const area = [x, canvas.height / ratio - y - height, width, height].map((part) => Math.round(part * ratio));
     const theme = THEMES[isDark() ? "dark" : "light"], { groups, casters } = this.pose(figures, camera);
+    const paint = [...rgb(theme.dark).map((x) => 0.85 * x), 1];
+    for (const { body, isGround } of figures) if (isGround) for (const part of body.primitives) part.colour = paint;
     const shared = { ...sharedBy(camera, width, height, theme), ...this.castShadows(groups, casters, camera) };
     gl.viewport(...area);
     gl.enable(gl.SCISSOR_TEST);
@@ -145,8 +147,8 @@ class Stage {
     const put = (mesh, kind, one) => groups.set(mesh, groups.get(mesh) ?? [[], [], []]).get(mesh)[kind].push(one);
     placed.sort((a, b) => a.away - b.away).forEach(({ figure, root, away }, order) => {
       const { body } = figure, size = project(camera, root).scale * this.ratio;
-      const shown = inSight(camera, root) ? simpler(body, sizes.filter((least) => size < least).length) : null;
-      const cast = order < most && away < CAST_REACH ? simpler(body, quick ? 2 : 1) : null;
+      const shown = figure.isGround || inSight(camera, root) ? simpler(body, sizes.filter((least) => size < least).length) : null;
+      const cast = !figure.isGround && order < most && away < CAST_REACH ? simpler(body, quick ? 2 : 1) : null;
       if (!shown && !cast) return;
       const one = { figure, root, rows: rowsOf(figure) };
       if (cast) casters.push(one);
@@ -206,7 +208,7 @@ class Stage {
   drawMarks(shared, figures, strips, spots, theme) {
     const { gl } = this, marks = new Marks();
     for (const strip of strips) marks.strip(strip);
-    for (const figure of figures) darken(marks, figure, 0.5 * theme.shade);
+    for (const figure of figures) if (!figure.isGround) darken(marks, figure, 0.5 * theme.shade);
     for (const spot of spots) marks.spot(spot);
     this.blended(() => {
       use(gl, this.program("marks"), shared);

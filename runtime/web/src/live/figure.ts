@@ -10,6 +10,7 @@ import { worldOf } from "../motion/motion.js";
 import type { Pose as Ground } from "../motion/planar.js";
 import type { Quaternion, Vector } from "../motion/rotations.js";
 import { damped, dampedPath, dampingOf, wrapped } from "../motion/springs.js";
+import { landscape } from "./landscape.js";
 import { type Packed, unpacked } from "../bundle/packing.js";
 import { standing, type Steered, tell, tick } from "../steering/steered.js";
 import { between, type Played } from "../steering/step.js";
@@ -50,7 +51,7 @@ export class Figure {
     phase?: number,
   ) {
     this.steered = standing(model.steerer, 0, place, phase);
-    this.before = this.now = tick(model, this.steered, true);
+    this.before = this.now = tick(model, this.steered, true, landscape);
   }
 
   /** x and z in metres, and the facing in radians. */
@@ -84,7 +85,7 @@ export class Figure {
     if ("points" in command) this.lead(command);
     else this.tell(command);
     this.before = this.now;
-    this.now = tick(this.model, this.steered, true);
+    this.now = tick(this.model, this.steered, true, landscape);
   }
 
   private tell({ gait, x, z, facing }: Asked): void {

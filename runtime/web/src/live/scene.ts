@@ -3,6 +3,7 @@ import { SIDES } from "../figures/humanoid/bones.js";
 import type { Vector } from "../motion/rotations.js";
 import { FEET, type Figure, type Shown } from "./figure.js";
 import type { Avatar } from "./avatar.js";
+import { drawnLandscape } from "./landscape.js";
 import type { Body, Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";
 
 /** What a figure looks like: what is drawn of it in a pose. */
@@ -29,6 +30,7 @@ export class Scene {
   readonly painter: Painter;
   /** The usual one. */
   readonly body: Body;
+  private readonly landscape: Drawn;
   private camera: Camera | null = null;
   private target: Vector | null = null;
   private readonly trails = new WeakMap<Figure, [x: number, z: number][]>();
@@ -47,6 +49,7 @@ export class Scene {
     if (!painter) throw new Error("it has no WebGL2");
     this.painter = painter;
     const first = (this.body = painter.body(body));
+    this.landscape = drawnLandscape(painter, height);
     this.looks = ({ turned, places }, n) => ({ body: first, turned, places, unit: 1 / height, colour: n });
   }
 
@@ -92,7 +95,7 @@ export class Scene {
       ...(goal ? [this.spot(goal, 0.09, this.accent, 0.6)] : []),
     ];
     this.painter.draw(this.camera, {
-      figures: poses.map((pose, n) => this.looks(pose, n)),
+      figures: [this.landscape, ...poses.map((pose, n) => this.looks(pose, n))],
       strips: ways,
       spots,
     });

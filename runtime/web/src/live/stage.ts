@@ -20,6 +20,8 @@ export interface Drawn {
   places: Vector[];
   matrices?: Float32Array;
   colour?: number;
+  /** It is part of the ground: larger than a figure, and casts no shadow. */
+  isGround?: boolean;
 }
 
 /** A strip on the ground, in heights. fade: towards its end; arrows: little heads along it. */
