@@ -13,6 +13,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import Entry
 from motet_train.evaluate.predict.floors import FLOORS
 from motet_train.evaluate.predict.mocap import (
+    ANIMALS,
     EVERYTHING_ELSE,
     MOTION_KINDS,
     PLACE,
@@ -66,9 +67,10 @@ def test_kinds_are_listed_in_their_order() -> None:
 def measured(**systems: float) -> Measured:
     """Windows of four recordings: constant distances, ten times as large in "box", and once more in "one"'s pose."""
     names = ("box", "box", "walk", "run", "wave")
+    speeds = np.array([0.1, 0.0, 1.2, 2.5, 0.4])
     factor = np.array([10.0, 10, 1, 1, 2])[:, None] * np.ones(25)
     every = {**dict(zip(FLOORS, (2.0, 3, 1, 3, 1), strict=True)), **systems}
-    return Measured(names, {name: {PLACE: v * factor, POSE: 0.5 * v * factor} for name, v in every.items()}, ())
+    return Measured(names, {name: {PLACE: v * factor, POSE: 0.5 * v * factor} for name, v in every.items()}, (), speeds)
 
 
 ENTRIES = [
@@ -90,7 +92,7 @@ def test_distances_are_means_over_the_windows_of_a_kind() -> None:
     models: Any = {"a": Unsure(), "b": Unsure()}
     reports = mocap_report(models, measured(a=1.0, b=2.0), ENTRIES[:4])
     assert list(reports) == ["a", "b"]
-    assert list(reports["b"]["kinds"]) == ["boxing", "walks and runs", EVERYTHING_ELSE]
+    assert list(reports["b"]["kinds"]) == ["boxing", "walks and runs", EVERYTHING_ELSE, "going", "others"]
     boxing, walks = reports["b"]["kinds"]["boxing"], reports["b"]["kinds"]["walks and runs"]
     assert [boxing[count] for count in ("recordings", "people", "windows")] == [1, 1, 2]
     assert [walks[count] for count in ("recordings", "people", "windows")] == [2, 1, 2]
@@ -99,6 +101,20 @@ def test_distances_are_means_over_the_windows_of_a_kind() -> None:
     assert walks["zero_velocity"]["pose_cm"]["frame_1"] == 1.0
     assert reports["a"]["place_cm"]["frame_3"] == pytest.approx((10 + 10 + 1 + 1 + 2) / 5)
     assert "calibration" not in reports["a"]
+
+
+def test_windows_are_divided_by_whether_they_begin_on_the_way() -> None:
+    entries = [*ENTRIES[:3], entry("wave", "wave", subject=ANIMALS)]
+    found = measured(a=1.0)
+    assert {name: part.tolist() for name, part in found.by_going(entries).items()} == {
+        "going": [2, 3],
+        "animals": [4],
+        "others": [0, 1],
+    }
+    part = found.part("a", entries, np.array([2, 3]))
+    assert (part["people"], part["recordings"], part["windows"]) == (1, 2, 2)
+    assert part["behind_standing"] == 0.0
+    assert measured(a=3.0).part("a", entries, np.array([2, 3]))["behind_standing"] == 1.0
 
 
 def test_the_table_has_a_row_of_each_system_for_each_kind() -> None:
@@ -110,10 +126,10 @@ def test_the_table_has_a_row_of_each_system_for_each_kind() -> None:
     assert [row[1:] for row in rows if row[0] == "a"] == [
         ["4.8"] * 6,
         ["2.4"] * 6,
-        *([v] * 6 for v in ("10.0", "1.0", "2.0")),
+        *([v] * 6 for v in ("10.0", "1.0", "2.0", "1.0", "7.3")),
     ]
     assert "walks and runs: 1 people, 2 recordings, 2 windows" in text
-    assert sum(row[:2] == ["zero", "velocity"] for row in rows) == 5
+    assert sum(row[:2] == ["zero", "velocity"] for row in rows) == 7
 
 
 def test_what_one_model_was_trained_on_is_not_held_out() -> None:
@@ -176,7 +192,7 @@ def test_a_model_is_asked_for_its_errors_where_it_knows_them() -> None:
     distances = {
         name: {measure: np.outer([4.0, 1, 3], np.ones(25)) for measure in (PLACE, POSE)} for name in (*FLOORS, "m")
     }
-    found = Measured(("box", "walk", "walk"), distances, tuple[Any]([None] * 3))
+    found = Measured(("box", "walk", "walk"), distances, tuple[Any]([None] * 3), np.array([0.0, 1, 1]))
     models: Any = {"m": Honest(np.outer([2.0, 1, 1], np.ones(25)))}
     reports = mocap_report(models, found, ENTRIES[:2])
     one = json_ready(reports["m"]["calibration"])
@@ -184,6 +200,8 @@ def test_a_model_is_asked_for_its_errors_where_it_knows_them() -> None:
         "all": 2,
         "boxing": 2,
         "walks and runs": 2,
+        "going": 2,
+        "others": 2,
     }
     assert set(one["quarters"][0]["expected_cm"].values()) == set(one["quarters"][0]["measured_cm"].values()) == {1.0}
     assert one["rank_correlation"]["frame_1"] == pytest.approx(0.866, abs=1e-3)

@@ -48,6 +48,12 @@ measurements = with_options(
         "'ACCAD_*,CC0_*', whatever the model was trained on; or of its own 'test' part.",
     ),
     click.option("--composed", is_flag=True, help="Generate: how well compositions meet places, poses and times."),
+    click.option(
+        "--rival",
+        is_flag=True,
+        help="Predict, motion files: also train a plain MLP on positions of joints with the same data (five minutes), "
+        "and measure it.",
+    ),
 )
 
 outputs = with_options(
@@ -70,6 +76,7 @@ def evaluate(
     search: str,
     actions: str | None,
     composed: bool,
+    rival: bool,
     as_json: bool,
     plots: Path | None,
     unit_in: str | None,
@@ -100,7 +107,7 @@ def evaluate(
     # their data, and the figures
     data_paths = dict.fromkeys(loaded, data) if says or composed else data_of(loaded, suite, data)
     search_model = load_as(SearchModel, search, session) if says else None
-    results = suite.measure(loaded, Inputs(data_paths, unit_in, search_model))
+    results = suite.measure(loaded, Inputs(data_paths, unit_in, search_model, rival))
     _finish(results, runs if keep else {}, plots)
     figures = results.figures[models[0]] if len(models) == 1 else results.figures
     click.echo(json.dumps(figures) if as_json else results.text)

@@ -57,12 +57,13 @@ class Inputs:
     """Inputs of a measurement.
 
     data: the path of each model's data. unit: the length unit of files that do not state theirs. search: the model
-    whose space is used to compare motions and prompts.
+    whose space is used to compare motions and prompts. rival: whether to train a plain MLP next to predictors.
     """
 
     data: Mapping[str, Path | None]
     unit: str | None = None
     search: SearchModel | None = None
+    rival: bool = False
 
     @property
     def first(self) -> Path:
@@ -178,16 +179,17 @@ def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str
 def _predict(models: Mapping[str, PredictModel], inputs: Inputs) -> Results:
     """By the protocol if its text files are given, else the joints' distances in held-out trials."""
     if not is_expmap(inputs.first):
-        return _in_mocap(models, Store.open(inputs.first))
+        return _in_mocap(models, Store.open(inputs.first), inputs)
     results = protocol_results(models, read_expmap_files(inputs.first))
     return Results(json_ready(results.to_json()), results.text(), lambda: {"": protocol_drawings(results)})
 
 
-def _in_mocap(models: Mapping[str, PredictModel], store: Store) -> Results:
+def _in_mocap(models: Mapping[str, PredictModel], store: Store, inputs: Inputs) -> Results:
     trials = mocap.held_out(models, store)
     motions = {entry.name: motion for entry, motion in trials.items()}
     fps = next(iter(models.values())).fps
-    measured = mocap.measured(models, motions, mocap.chosen_decays(models, store))
+    rival = mocap.plain_mlp(models, store) if inputs.rival else None
+    measured = mocap.measured(models, motions, mocap.chosen_decays(models, store), rival)
     reports = mocap.mocap_report(models, measured, list(trials))
     # whether predictions stay alive, next to those of motion codes
     writer = load_as(CodesModel, "generate")

@@ -22,6 +22,7 @@ from motet_train.data.store import Entry, Store
 from motet_train.evaluate.predict.floors import (
     FLOORS,
     REPORTED,
+    ZERO,
     Decays,
     Windows,
     apart,
@@ -32,6 +33,7 @@ from motet_train.evaluate.predict.floors import (
     key,
     places,
 )
+from motet_train.evaluate.predict.plain_mlp import PLAIN_MLP, PlainMLP, positions_after, trained, training_clips
 from motet_train.evaluate.tables import aligned
 
 TITLES = {"place_cm": "joints in the world, cm", "pose_cm": "joints relative to the root, cm"}
@@ -54,6 +56,12 @@ MOTION_KINDS: Mapping[str, str] = {
 it before its first comma. A record without an action belongs to the first kind with a word in half of its sentences."""
 
 EVERYTHING_ELSE = "everything else"
+
+GOING = 0.5
+"""Mean speed of the hips through the seed, m/s, above which a figure is going somewhere."""
+
+ANIMALS = "29"
+"""The person of CMU who acts like animals, on the spot or nearly."""
 
 
 def kind_of(entry: Entry) -> str:
@@ -86,26 +94,41 @@ def by_kind(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
 class Measured:
     """The distances of all systems in each window, floors first.
 
-    names: each window's recording. distances: system -> measure -> (W, N) in centimetres. seeds: each window's input.
+    names: each window's recording. distances: system -> measure -> (W, N) in centimetres; the floors, and the plain MLP
+    if it was trained, before the models. seeds: each window's input. speeds: (W,) of the hips through it on average,
+    m/s.
     """
 
     names: tuple[str, ...]
     distances: Mapping[str, Mapping[str, Array]]
     seeds: tuple[Motion, ...]
+    speeds: Array
 
     def windows(self, entries: Collection[Entry]) -> NDArray[np.intp]:
         """The indices of the windows of some recordings."""
         return np.flatnonzero(np.isin(self.names, [entry.name for entry in entries]))
 
-    def part(self, name: str, entries: Sequence[Entry]) -> dict[str, Any]:
-        """The figures of a system, and of floors by their names, in the windows of some recordings."""
-        windows = self.windows(entries)
+    def by_going(self, entries: Sequence[Entry]) -> dict[str, NDArray[np.intp]]:
+        """The indices of the windows that begin on the way somewhere, of the others by :data:`ANIMALS`, and of the
+        rest; only those that there are."""
+        going = self.speeds > GOING
+        animal = np.isin(self.names, [entry.name for entry in entries if entry.subject == ANIMALS])
+        parts = {"going": going, "animals": animal & ~going, "others": ~animal & ~going}
+        return {name: np.flatnonzero(part) for name, part in parts.items() if part.any()}
+
+    def part(self, name: str, entries: Sequence[Entry], windows: NDArray[np.intp]) -> dict[str, Any]:
+        """The figures of a system, and of floors by their names, in some windows of recordings."""
         # how much is measured, then the system and the floors
-        people = {entry.subject for entry in entries}
-        counts = dict(zip(COUNTS, (len(people), len(entries), len(windows)), strict=True))
+        names = {self.names[window] for window in windows.tolist()}
+        people = {entry.subject for entry in entries if entry.name in names}
+        counts = dict(zip(COUNTS, (len(people), len(names), len(windows)), strict=True))
         figures: dict[str, Any] = {**counts, **self._means(name, windows)}
-        for floor in FLOORS:
-            figures[key(floor)] = self._means(floor, windows)
+        for floor in (*FLOORS, PLAIN_MLP):
+            if floor in self.distances:
+                figures[key(floor)] = self._means(floor, windows)
+        # and how often standing still is nearer in the end
+        last = self.distances[name][PLACE][windows, REPORTED[-1]]
+        figures["behind_standing"] = float((last > self.distances[ZERO][PLACE][windows, REPORTED[-1]]).mean())
         return figures
 
     def _means(self, system: str, windows: NDArray[np.intp]) -> dict[str, Any]:
@@ -117,13 +140,14 @@ def mocap_report(models: Mapping[str, PredictModel], results: Measured, trials: 
     """The figures of each model: mean distances of joints in the world, "place_cm", and relative to the root,
     "pose_cm", in all windows, those of the floors, and both by "kinds" of motions; and for models that predict their
     errors the "calibration"."""
-    # the kinds of trials that have windows
+    # the kinds of trials that have windows, and those of windows
     kinds = by_kind([entry for entry in trials if entry.name in results.names])
-    kind_windows = {kind: results.windows(members) for kind, members in kinds.items()}
+    kind_windows = {kind: results.windows(members) for kind, members in kinds.items()} | results.by_going(trials)
     reports: dict[str, Any] = {}
     for name, model in models.items():
-        reports[name] = results.part(name, trials)
-        reports[name]["kinds"] = {kind: results.part(name, members) for kind, members in kinds.items()}
+        reports[name] = results.part(name, trials, results.windows(trials))
+        parts = {kind: results.part(name, trials, windows) for kind, windows in kind_windows.items()}
+        reports[name]["kinds"] = parts
         if model.knows_errors:
             expected = model.expected_errors(results.seeds).astype(np.float64)
             true = results.distances[name][PLACE]
@@ -209,10 +233,13 @@ def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
     rows = [[f"{kind}: {counts}"]]
     for measure in TITLES if kind == "all" else (PLACE,):
         rows.append([TITLES[measure]])
-        for floor in FLOORS:
-            rows.append([f"  {floor}", *cells(first[key(floor)][measure], 1)])
+        for floor in (*FLOORS, PLAIN_MLP):
+            if key(floor) in first:
+                rows.append([f"  {floor}", *cells(first[key(floor)][measure], 1)])
         for name, part in parts.items():
             rows.append([f"  {name}", *cells(part[measure], 1)])
+    for name, part in parts.items():
+        rows.append([f"  windows in which {name} ends behind standing still: {part['behind_standing']:.0%}"])
     return rows
 
 
@@ -237,8 +264,27 @@ def _tested(model: PredictModel) -> set[str]:
     return set(model.manifest.training.get("data", {}).get("test", ()))
 
 
-def measured(models: Mapping[str, PredictModel], motions: Mapping[str, Motion], decays: Decays) -> Measured:
-    """All systems in the windows that begin every ``horizon`` frames, floors first.
+def plain_mlp(models: Mapping[str, PredictModel], store: Store) -> PlainMLP:
+    """The plain MLP, trained on the motions of a store that no model holds out, for the seed and horizon of the
+    first."""
+    first = next(iter(models.values()))
+    held = set.union(*map(_held, models.values()))
+    if store.fps != first.fps:
+        raise DataError(f"the plain MLP needs data at {first.fps:g} fps, as the model, not {store.fps:g}")
+    return trained(training_clips(store, sorted(held)), first.seed_frames, first.horizon)
+
+
+def _held(model: PredictModel) -> set[str]:
+    return _tested(model) | set(model.manifest.training.get("data", {}).get("validation", ()))
+
+
+def measured(
+    models: Mapping[str, PredictModel],
+    motions: Mapping[str, Motion],
+    decays: Decays,
+    rival: PlainMLP | None = None,
+) -> Measured:
+    """All systems in the windows that begin every ``horizon`` frames, floors first, then the plain MLP if there is one.
 
     All models must have the same frame rate, seed and horizon; DataError if the motions are too short.
     """
@@ -248,6 +294,9 @@ def measured(models: Mapping[str, PredictModel], motions: Mapping[str, Motion], 
     seeds = [window[: first.seed_frames] for window in windows]
     recorded = Windows.of(windows, first.horizon)
     predictions = floors(recorded, decays)
+    if rival is not None:
+        seed_places = np.stack(list(map(places, seeds)))
+        predictions[PLAIN_MLP] = 100 * positions_after(rival, seed_places / 100)
     for name, model in models.items():
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
@@ -256,7 +305,13 @@ def measured(models: Mapping[str, PredictModel], motions: Mapping[str, Motion], 
     for name, predicted in predictions.items():
         in_world, relative = apart(predicted, recorded.truth)
         distances[name] = {PLACE: in_world, POSE: relative}
-    return Measured(tuple(names), distances, tuple(seeds))
+    return Measured(tuple(names), distances, tuple(seeds), np.array(list(map(_speed, seeds))))
+
+
+def _speed(seed: Motion) -> float:
+    """The mean speed of the hips through a seed, m/s."""
+    hips = places(seed)[:, 0] / 100
+    return float(np.linalg.norm(hips[-1] - hips[0])) * seed.fps / (len(hips) - 1)
 
 
 def _cut(motions: Mapping[str, Motion], model: PredictModel) -> tuple[list[str], list[Motion]]:

@@ -1,0 +1,158 @@
+"""A plain rival of predictors: a residual MLP on the positions of joints alone, trained when it is compared.
+
+It knows no bones, no rotations and no representation: joints as seen from the last seed frame, its hips at the origin
+and facing z, go in, and their steps from that frame come out. So it says what a predictor has to beat with the same
+data, in some five minutes of one processor. Letters in shapes: W windows, L seed frames, N predicted frames, J joints.
+Positions are metres, y up.
+"""
+
+from collections.abc import Sequence
+from copy import deepcopy
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, sided
+from motet.motion.kinematics import positions
+from motet.motion.rotations import Array
+from motet.motion.skeleton import partners_of
+from motet.representation.contract import named
+from motet_train.data.store import Store
+from motet_train.models.net import zero_linear
+from motet_train.models.predictor import Block
+
+PLAIN_MLP = "plain MLP"
+"""Its name in tables."""
+
+STEPS = 7_000
+"""Batches of training."""
+
+BATCH = 128
+RATE = 1.5e-3
+"""The largest learning rate: it falls to 0 along a cosine."""
+
+AVERAGED = 0.995
+"""Of the averaged weights, the share that stays at each step."""
+
+HIDDEN = 512
+BLOCKS = 3
+
+PLACE_SCALE = 3.0
+"""Factor on metres, so that inputs are of the order of 1."""
+
+STEP_SCALE = 20.0
+"""Factor on metres a frame, likewise."""
+
+ACROSS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
+"""Left and right hip joint: the facing is at right angles to the line through them."""
+
+PARTNERS = partners_of(HUMANOID.names)
+MIRROR = torch.tensor([-1.0, 1.0, 1.0])
+
+
+class PlainMLP(nn.Module):
+    """Positions (W, L, J, 3) to those of the next frames (W, N, J, 3), both seen from the last seed frame."""
+
+    time: Tensor
+
+    def __init__(self, seed: int, frames: int) -> None:
+        super().__init__()
+        width = 3 * len(HUMANOID.names)
+        self.inward = nn.Linear(seed * width, HIDDEN)
+        self.blocks = nn.Sequential(*(Block(HIDDEN, 0.0) for _ in range(BLOCKS)))
+        self.outward = zero_linear(HIDDEN, frames * width)
+        # steps grow with time, so that those of early frames are small
+        self.register_buffer("time", torch.arange(1.0, frames + 1) / (frames / 3), persistent=False)
+
+    def forward(self, seed: Tensor) -> Tensor:
+        """Positions (W, L, J, 3) to (W, N, J, 3)."""
+        last = seed[:, -1:]
+        inputs = [PLACE_SCALE * last.flatten(1), STEP_SCALE * seed.diff(dim=1).flatten(1)]
+        hidden = self.blocks(self.inward(torch.cat(inputs, dim=1)))
+        steps = torch.unflatten(self.outward(hidden), 1, (-1, *seed.shape[2:])) / PLACE_SCALE
+        moved: Tensor = last + steps * self.time[:, None, None]
+        return moved
+
+
+def seen_from_last(windows: Tensor, seed: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Windows (W, T, J, 3) seen from the frame before frame ``seed``; its hips (W, 1, 1, 3) on the ground, and the
+    rotation (W, 3, 3) from its facing to the world."""
+    frame = windows[:, seed - 1]
+    origin = (frame[:, :1] * torch.tensor([1.0, 0.0, 1.0]))[:, None]
+    across = frame[:, ACROSS[0]] - frame[:, ACROSS[1]]
+    length = torch.hypot(across[:, 0], across[:, 2]).clamp_min(1e-6)
+    cos = across[:, 0] / length
+    sin = across[:, 2] / length
+    zero = torch.zeros_like(cos)
+    one = torch.ones_like(cos)
+    rows = [torch.stack(row, -1) for row in ((cos, zero, -sin), (zero, one, zero), (sin, zero, cos))]
+    turned = torch.stack(rows, dim=1)
+    return (windows - origin) @ turned[:, None], origin, turned
+
+
+def mirrored(places: Tensor) -> Tensor:
+    """Positions (..., J, 3) with left and right exchanged."""
+    return places[..., PARTNERS, :] * MIRROR
+
+
+def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) -> PlainMLP:
+    """The net after training on windows of clips (T, J, 3), half of them mirrored; always the same for the same
+    clips."""
+    torch.manual_seed(0)
+    rng = np.random.default_rng(0)
+    places = torch.from_numpy(np.concatenate(clips)).float()
+    starts = _starts([len(clip) for clip in clips], seed + frames)
+    net = PlainMLP(seed, frames)
+    averaged = deepcopy(net)
+    descent = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=1e-3)
+    rates = torch.optim.lr_scheduler.OneCycleLR(descent, RATE, steps, pct_start=min(0.3, 100 / steps))
+    for _ in range(steps):
+        # windows as they are seen at prediction
+        drawn = torch.from_numpy(rng.choice(starts, BATCH))[:, None] + torch.arange(seed + frames)
+        windows, _, _ = seen_from_last(places[drawn], seed)
+        flipped = torch.from_numpy(rng.random(BATCH) < 0.5)[:, None, None, None]
+        windows = torch.where(flipped, mirrored(windows), windows)
+
+        # distances, and how they change from frame to frame
+        apart = net(windows[:, :seed]) - windows[:, seed:]
+        loss = apart.norm(dim=-1).mean() + apart.diff(dim=1).norm(dim=-1).mean()
+        descent.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+        descent.step()
+        rates.step()
+        for mean, weight in zip(averaged.parameters(), net.parameters(), strict=True):
+            mean.data.lerp_(weight.data, 1 - AVERAGED)
+    return averaged.eval()
+
+
+def _starts(lengths: Sequence[int], window: int) -> Array:
+    """The first rows of all windows in clips of these lengths, one after the other."""
+    starts = []
+    first = 0
+    for length in lengths:
+        starts.append(np.arange(first, first + length - window + 1))
+        first += length
+    return np.concatenate(starts)
+
+
+@torch.no_grad()
+def positions_after(net: PlainMLP, seeds: Array) -> Array:
+    """Positions (W, N, J, 3) after seeds (W, L, J, 3), in the world: the mean of those for them and for their mirror
+    images."""
+    count = seeds.shape[1]
+    seen, origin, turned = seen_from_last(torch.from_numpy(seeds).float(), count)
+    both = (net(seen) + mirrored(net(mirrored(seen)))) / 2
+    in_world: Array = (both @ turned[:, None].transpose(-1, -2) + origin).double().numpy()
+    return in_world
+
+
+def training_clips(store: Store, held_out: Sequence[str]) -> list[Array]:
+    """Positions (T, J, 3) in metres in the records of a store on the humanoid that are not held out."""
+    playable = named(store.representation).motion
+    clips = []
+    for number, entry in enumerate(store.records):
+        if entry.name not in held_out:
+            clips.append(positions(playable(store.motion(number))))
+    return clips
