@@ -85,8 +85,8 @@ def seen_from_last(windows: Tensor, seed: int) -> tuple[Tensor, Tensor, Tensor]:
     cos = across[:, 0] / length
     sin = across[:, 2] / length
     zero = torch.zeros_like(cos)
-    one = torch.ones_like(cos)
-    rows = [torch.stack(row, -1) for row in ((cos, zero, -sin), (zero, one, zero), (sin, zero, cos))]
+    unit = torch.ones_like(cos)
+    rows = [torch.stack(row, -1) for row in ((cos, zero, -sin), (zero, unit, zero), (sin, zero, cos))]
     turned = torch.stack(rows, dim=1)
     return (windows - origin) @ turned[:, None], origin, turned
 
