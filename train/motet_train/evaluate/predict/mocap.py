@@ -300,12 +300,14 @@ def measured(
     for name, model in models.items():
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
-    # how far they are from what was recorded
-    distances = {}
-    for name, predicted in predictions.items():
-        in_world, relative = apart(predicted, recorded.truth)
-        distances[name] = {PLACE: in_world, POSE: relative}
+    distances = {name: _distances(predicted, recorded.truth) for name, predicted in predictions.items()}
     return Measured(tuple(names), distances, tuple(seeds), np.array(list(map(_speed, seeds))))
+
+
+def _distances(predicted: Array, truth: Array) -> dict[str, Array]:
+    """How far predicted joints (W, N, J, 3) are from recorded ones, by measure."""
+    in_world, relative = apart(predicted, truth)
+    return {PLACE: in_world, POSE: relative}
 
 
 def _speed(seed: Motion) -> float:

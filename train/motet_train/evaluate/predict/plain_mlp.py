@@ -6,12 +6,13 @@ data, in some five minutes of one processor. Letters in shapes: W windows, L see
 Positions are metres, y up.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
 
 import numpy as np
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, sided
 from motet.motion.kinematics import positions
@@ -80,15 +81,16 @@ def seen_from_last(windows: Tensor, seed: int) -> tuple[Tensor, Tensor, Tensor]:
     rotation (W, 3, 3) from its facing to the world."""
     frame = windows[:, seed - 1]
     origin = (frame[:, :1] * torch.tensor([1.0, 0.0, 1.0]))[:, None]
-    across = frame[:, ACROSS[0]] - frame[:, ACROSS[1]]
-    length = torch.hypot(across[:, 0], across[:, 2]).clamp_min(1e-6)
-    cos = across[:, 0] / length
-    sin = across[:, 2] / length
-    zero = torch.zeros_like(cos)
-    unit = torch.ones_like(cos)
-    rows = [torch.stack(row, -1) for row in ((cos, zero, -sin), (zero, unit, zero), (sin, zero, cos))]
-    turned = torch.stack(rows, dim=1)
+    turned = _turn_along(frame[:, ACROSS[0]] - frame[:, ACROSS[1]])
     return (windows - origin) @ turned[:, None], origin, turned
+
+
+def _turn_along(across: Tensor) -> Tensor:
+    """The turns (W, 3, 3) about the vertical that take x to where vectors (W, 3) point over the ground."""
+    cos, _, sin = functional.normalize(across * torch.tensor([1.0, 0.0, 1.0]), dim=-1).unbind(-1)
+    zero = torch.zeros_like(cos)
+    rows = [cos, zero, -sin, zero, torch.ones_like(cos), zero, sin, zero, cos]
+    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
 
 
 def mirrored(places: Tensor) -> Tensor:
@@ -100,20 +102,11 @@ def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) 
     """The net after training on windows of clips (T, J, 3), half of them mirrored; always the same for the same
     clips."""
     torch.manual_seed(0)
-    rng = np.random.default_rng(0)
-    places = torch.from_numpy(np.concatenate(clips)).float()
-    starts = _starts([len(clip) for clip in clips], seed + frames)
     net = PlainMLP(seed, frames)
     averaged = deepcopy(net)
     descent = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=1e-3)
     rates = torch.optim.lr_scheduler.OneCycleLR(descent, RATE, steps, pct_start=min(0.3, 100 / steps))
-    for _ in range(steps):
-        # windows as they are seen at prediction
-        drawn = torch.from_numpy(rng.choice(starts, BATCH))[:, None] + torch.arange(seed + frames)
-        windows, _, _ = seen_from_last(places[drawn], seed)
-        flipped = torch.from_numpy(rng.random(BATCH) < 0.5)[:, None, None, None]
-        windows = torch.where(flipped, mirrored(windows), windows)
-
+    for windows in _batches(clips, seed, seed + frames, steps):
         # distances, and how they change from frame to frame
         apart = net(windows[:, :seed]) - windows[:, seed:]
         loss = apart.norm(dim=-1).mean() + apart.diff(dim=1).norm(dim=-1).mean()
@@ -125,6 +118,18 @@ def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) 
         for mean, weight in zip(averaged.parameters(), net.parameters(), strict=True):
             mean.data.lerp_(weight.data, 1 - AVERAGED)
     return averaged.eval()
+
+
+def _batches(clips: Sequence[Array], seed: int, length: int, count: int) -> Iterator[Tensor]:
+    """Windows (B, length, J, 3) of clips as they are seen at prediction, half of them mirrored, so many times."""
+    rng = np.random.default_rng(0)
+    places = torch.from_numpy(np.concatenate(clips)).float()
+    starts = _starts([len(clip) for clip in clips], length)
+    for _ in range(count):
+        drawn = torch.from_numpy(rng.choice(starts, BATCH))[:, None] + torch.arange(length)
+        windows, _, _ = seen_from_last(places[drawn], seed)
+        flipped = torch.from_numpy(rng.random(BATCH) < 0.5)[:, None, None, None]
+        yield torch.where(flipped, mirrored(windows), windows)
 
 
 def _starts(lengths: Sequence[int], window: int) -> Array:
