@@ -19,6 +19,7 @@ from motet.predict.model import PredictModel
 from motet.representation.contract import named
 from motet_train.data.errors import DataError
 from motet_train.data.store import Entry, Store
+from motet_train.evaluate.positions import length
 from motet_train.evaluate.predict.floors import (
     FLOORS,
     REPORTED,
@@ -301,7 +302,7 @@ def measured(
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
     distances = {name: _distances(predicted, recorded.truth) for name, predicted in predictions.items()}
-    return Measured(tuple(names), distances, tuple(seeds), np.array(list(map(_speed, seeds))))
+    return Measured(tuple(names), distances, tuple(seeds), _speeds(seeds))
 
 
 def _distances(predicted: Array, truth: Array) -> dict[str, Array]:
@@ -310,10 +311,11 @@ def _distances(predicted: Array, truth: Array) -> dict[str, Array]:
     return {PLACE: in_world, POSE: relative}
 
 
-def _speed(seed: Motion) -> float:
-    """The mean speed of the hips through a seed, m/s."""
-    hips = places(seed)[:, 0] / 100
-    return float(np.linalg.norm(hips[-1] - hips[0])) * seed.fps / (len(hips) - 1)
+def _speeds(seeds: Sequence[Motion]) -> Array:
+    """The mean speeds (W,) of the hips through seeds, m/s."""
+    steps = [places(seed[:: len(seed) - 1])[:, 0] for seed in seeds]
+    seconds = (len(seeds[0]) - 1) / seeds[0].fps
+    return length(np.diff(steps, axis=1)[:, 0]) / 100 / seconds
 
 
 def _cut(motions: Mapping[str, Motion], model: PredictModel) -> tuple[list[str], list[Motion]]:

@@ -107,17 +107,19 @@ def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) 
     descent = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=1e-3)
     rates = torch.optim.lr_scheduler.OneCycleLR(descent, RATE, steps, pct_start=min(0.3, 100 / steps))
     for windows in _batches(clips, seed, seed + frames, steps):
-        # distances, and how they change from frame to frame
-        apart = net(windows[:, :seed]) - windows[:, seed:]
-        loss = apart.norm(dim=-1).mean() + apart.diff(dim=1).norm(dim=-1).mean()
         descent.zero_grad()
-        loss.backward()
+        _loss(net(windows[:, :seed]) - windows[:, seed:]).backward()
         nn.utils.clip_grad_norm_(net.parameters(), 1.0)
         descent.step()
         rates.step()
         for mean, weight in zip(averaged.parameters(), net.parameters(), strict=True):
             mean.data.lerp_(weight.data, 1 - AVERAGED)
     return averaged.eval()
+
+
+def _loss(apart: Tensor) -> Tensor:
+    """The mean distance of joints by vectors (W, N, J, 3) to their true places, and how these change by the frame."""
+    return apart.norm(dim=-1).mean() + apart.diff(dim=1).norm(dim=-1).mean()
 
 
 def _batches(clips: Sequence[Array], seed: int, length: int, count: int) -> Iterator[Tensor]:
