@@ -29,8 +29,8 @@ PLAIN_MLP = "plain MLP"
 STEPS = 7_000
 """Batches of training."""
 
-BATCH = 128
-RATE = 1.5e-3
+WINDOWS_OF_STEP = 128
+LARGEST_RATE = 1.5e-3
 """The largest learning rate: it falls to 0 along a cosine."""
 
 AVERAGED = 0.995
@@ -48,7 +48,7 @@ STEP_SCALE = 20.0
 ACROSS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 """Left and right hip joint: the facing is at right angles to the line through them."""
 
-PARTNERS = partners_of(HUMANOID.names)
+OTHER_SIDE = partners_of(HUMANOID.names)
 MIRROR = torch.tensor([-1.0, 1.0, 1.0])
 
 
@@ -95,7 +95,7 @@ def _turn_along(across: Tensor) -> Tensor:
 
 def mirrored(places: Tensor) -> Tensor:
     """Positions (..., J, 3) with left and right exchanged."""
-    return places[..., PARTNERS, :] * MIRROR
+    return places[..., OTHER_SIDE, :] * MIRROR
 
 
 def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) -> PlainMLP:
@@ -104,8 +104,8 @@ def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) 
     torch.manual_seed(0)
     net = PlainMLP(seed, frames)
     averaged = deepcopy(net)
-    descent = torch.optim.AdamW(net.parameters(), lr=RATE, weight_decay=1e-3)
-    rates = torch.optim.lr_scheduler.OneCycleLR(descent, RATE, steps, pct_start=min(0.3, 100 / steps))
+    descent = torch.optim.AdamW(net.parameters(), lr=LARGEST_RATE, weight_decay=1e-3)
+    rates = torch.optim.lr_scheduler.OneCycleLR(descent, LARGEST_RATE, steps, pct_start=min(0.3, 100 / steps))
     for windows in _batches(clips, seed, seed + frames, steps):
         descent.zero_grad()
         _loss(net(windows[:, :seed]) - windows[:, seed:]).backward()
@@ -128,9 +128,9 @@ def _batches(clips: Sequence[Array], seed: int, length: int, count: int) -> Iter
     places = torch.from_numpy(np.concatenate(clips)).float()
     starts = _starts([len(clip) for clip in clips], length)
     for _ in range(count):
-        drawn = torch.from_numpy(rng.choice(starts, BATCH))[:, None] + torch.arange(length)
+        drawn = torch.from_numpy(rng.choice(starts, WINDOWS_OF_STEP))[:, None] + torch.arange(length)
         windows, _, _ = seen_from_last(places[drawn], seed)
-        flipped = torch.from_numpy(rng.random(BATCH) < 0.5)[:, None, None, None]
+        flipped = torch.from_numpy(rng.random(WINDOWS_OF_STEP) < 0.5)[:, None, None, None]
         yield torch.where(flipped, mirrored(windows), windows)
 
 
