@@ -7,7 +7,7 @@ import torch
 from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.rotations import Array, axis_to_rotmat
 from motet_train.evaluate.predict import plain_mlp
-from motet_train.evaluate.predict.plain_mlp import OTHER_SIDE, positions_after, seen_from_last, trained
+from motet_train.evaluate.predict.plain_mlp import MIRRORED_JOINTS, positions_after, seen_from_last, trained
 
 SEED, FRAMES = 4, 3
 
@@ -59,5 +59,5 @@ def test_the_mirror_image_of_a_seed_is_predicted_as_the_mirror_image() -> None:
     torch.manual_seed(0)
     net = plain_mlp.PlainMLP(SEED, FRAMES)
     torch.nn.init.normal_(net.outward.weight, std=0.01)
-    image = positions_after(net, seeds[:, :, OTHER_SIDE] * (-1, 1, 1))
-    np.testing.assert_allclose(image[:, :, OTHER_SIDE] * (-1, 1, 1), positions_after(net, seeds), atol=1e-5)
+    image = positions_after(net, seeds[:, :, MIRRORED_JOINTS] * (-1, 1, 1))
+    np.testing.assert_allclose(image[:, :, MIRRORED_JOINTS] * (-1, 1, 1), positions_after(net, seeds), atol=1e-5)

@@ -48,7 +48,7 @@ STEP_SCALE = 20.0
 ACROSS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 """Left and right hip joint: the facing is at right angles to the line through them."""
 
-OTHER_SIDE = partners_of(HUMANOID.names)
+MIRRORED_JOINTS = partners_of(HUMANOID.names)
 MIRROR = torch.tensor([-1.0, 1.0, 1.0])
 
 
@@ -95,7 +95,7 @@ def _turn_along(across: Tensor) -> Tensor:
 
 def mirrored(places: Tensor) -> Tensor:
     """Positions (..., J, 3) with left and right exchanged."""
-    return places[..., OTHER_SIDE, :] * MIRROR
+    return places[..., MIRRORED_JOINTS, :] * MIRROR
 
 
 def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) -> PlainMLP:
