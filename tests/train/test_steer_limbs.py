@@ -35,9 +35,9 @@ class Session:
     def control(self, **_: Any) -> None:
         pass
 
-    def act(self, acts: list[Act], who: list[int] | None = None) -> None:
-        self.degrees[who if who is not None else slice(None)] = [len(act) for act in acts]
-        self.cut += who or []
+    def act(self, acts: list[Act], ids: list[int] | None = None) -> None:
+        self.degrees[ids if ids is not None else slice(None)] = [len(act) for act in acts]
+        self.cut += ids or []
 
     def reach(self, hand: str, points: Any) -> None:
         assert hand == "left"

@@ -41,11 +41,11 @@ class TerrainSettings(Settings):
 
     stands: Share = 0.5
     """Contact above which a foot stands."""
-    feet: HalfLife = 0.02
+    feet: HalfLife = 0.015
     """Half-life in which a foot comes to its height; it is never below the ground."""
     tilt: HalfLife = 0.06
     """Half-life in which a foot is tilted to the slope under it."""
-    hips: HalfLife = 0.1
+    hips: HalfLife = 0.09
     """Half-life in which the hips come to the height of the lower foot."""
     steepest: Annotated[float, Range(0, 80, "deg")] = 40.0
     """A foot is tilted to slopes up to this; what is steeper is an edge."""
@@ -57,7 +57,7 @@ class TerrainSettings(Settings):
     """How far ahead a swinging foot looks for edges."""
     swings: Annotated[float, Range(1, 5)] = 1.7
     """How many times as fast as the figure a swinging foot goes."""
-    half_step: Seconds = 0.25
+    half_step: Seconds = 0.35
     """A foot lands as far ahead of the hips as they go in this time."""
     straight: Share = 0.97
     """Share of its length to which a leg is stretched, if it is not straighter already."""

@@ -535,15 +535,15 @@ export const TERRAIN = {
 // motet.steering.terrain.TerrainSettings
 export const terrainSettings = {
   stands: { default: 0.5, low: 0, high: 1, whole: false },
-  feet: { default: 0.02, low: 0.01, high: 10, whole: false },
+  feet: { default: 0.015, low: 0.01, high: 10, whole: false },
   tilt: { default: 0.06, low: 0.01, high: 10, whole: false },
-  hips: { default: 0.1, low: 0.01, high: 10, whole: false },
+  hips: { default: 0.09, low: 0.01, high: 10, whole: false },
   steepest: { default: 40, low: 0, high: 80, whole: false },
   spread: { default: 0.04, low: 0, high: 100, whole: false },
   climbs: { default: 0.9, low: 0.01, high: 10, whole: false },
   foresees: { default: 0.24, low: 0.01, high: 100, whole: false },
   swings: { default: 1.7, low: 1, high: 5, whole: false },
-  half_step: { default: 0.25, low: 0.01, high: 100, whole: false },
+  half_step: { default: 0.35, low: 0.01, high: 100, whole: false },
   straight: { default: 0.97, low: 0, high: 1, whole: false },
   uphill: { default: 0.7, low: 0, high: 10, whole: false },
   slope_span: { default: 0.6, low: 0, high: 100, whole: false },

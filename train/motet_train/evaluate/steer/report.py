@@ -43,6 +43,7 @@ from motet_train.evaluate.steer.following import (
     way_off,
     ways_errors,
 )
+from motet_train.evaluate.steer.ground import GROUNDS, ground_figures
 from motet_train.evaluate.steer.limbs import cut_figures, reach_figures
 from motet_train.evaluate.steer.paths import chase_figures, path_figures, slow_point_figures
 from motet_train.evaluate.steer.players import COMMANDS_SEED, reversal_figures, stick_figures
@@ -366,6 +367,8 @@ def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
     for gait in MEASURED_SPEEDS:
         measures[f"going_{gait}"] = partial(going_figures, gait=gait)
         measures[f"paths_{gait}"] = partial(path_figures, gait=gait)
+        for ground in GROUNDS:
+            measures[f"ground_{ground}_{gait}"] = partial(ground_figures, ground=ground, gait=gait)
     measures["slow_points"] = slow_point_figures
     measures["chase"] = chase_figures
     return measures
