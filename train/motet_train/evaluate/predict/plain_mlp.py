@@ -90,7 +90,7 @@ def _turn_along(across: Tensor) -> Tensor:
     cos, _, sin = functional.normalize(across * torch.tensor([1.0, 0.0, 1.0]), dim=-1).unbind(-1)
     zero = torch.zeros_like(cos)
     rows = [cos, zero, -sin, zero, torch.ones_like(cos), zero, sin, zero, cos]
-    return torch.stack(rows, dim=-1).unflatten(-1, (3, 3))
+    return torch.stack(rows, dim=-1).reshape(*cos.shape, 3, 3)
 
 
 def mirrored(places: Tensor) -> Tensor:
@@ -108,7 +108,7 @@ def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) 
     rates = torch.optim.lr_scheduler.OneCycleLR(descent, LARGEST_RATE, steps, pct_start=min(0.3, 100 / steps))
     for windows in _batches(clips, seed, seed + frames, steps):
         descent.zero_grad()
-        _loss(net(windows[:, :seed]) - windows[:, seed:]).backward()
+        _loss(net(windows[:, :seed]) - windows[:, seed:]).backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(net.parameters(), 1.0)
         descent.step()
         rates.step()
@@ -119,7 +119,9 @@ def trained(clips: Sequence[Array], seed: int, frames: int, steps: int = STEPS) 
 
 def _loss(apart: Tensor) -> Tensor:
     """The mean distance of joints by vectors (W, N, J, 3) to their true places, and how these change by the frame."""
-    return apart.norm(dim=-1).mean() + apart.diff(dim=1).norm(dim=-1).mean()
+    error: Tensor = torch.linalg.vector_norm(apart, dim=-1).mean()
+    change: Tensor = torch.linalg.vector_norm(apart.diff(dim=1), dim=-1).mean()
+    return error + change
 
 
 def _batches(clips: Sequence[Array], seed: int, length: int, count: int) -> Iterator[Tensor]:
