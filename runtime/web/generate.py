@@ -73,6 +73,7 @@ MODULES = (
     "motet.steering.saying",
     "motet.steering.settings",
     "motet.steering.spoken",
+    "motet.steering.stepping",
     "motet.steering.targets",
     "motet.steering.terrain",
     "motet.steering.turn_limit",

@@ -295,6 +295,11 @@ STEERED: list[dict[str, Any]] = [
     {"control": {"gait": "walk", "speed": 1.0, "direction": [80.0, -150.0], "facing": [0.0, -100.0]}},
     *[{}] * 3,
     {"set_ground": None},
+    {"end": {}, "reach": {"hand": "right", "points": None}},
+    {"control": {"speed": [0.3, 0.55], "direction": [120.0, -50.0], "facing": [0.0, 20.0]}},
+    *[{}] * 6,
+    {"control": {"speed": 0.0, "facing": [100.0, 20.0]}},
+    *[{}] * 4,
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
 :func:`turning_about`, and for "crouch" :func:`crouching`."""

@@ -2,15 +2,16 @@
 
 Contacts come from the table being played, by :func:`motet.figures.feet.contacts.contacts_of` of the recordings. While a
 foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, the
-correction fades. Hip, knee and ankle follow (:class:`motet.figures.two_bones.TwoBones`). The offline twin, which knows
-how long a foot will stand, is :mod:`motet.figures.feet.hold`.
+correction fades, unless its steps are planned (:mod:`motet.steering.stepping`). Hip, knee and ankle follow
+(:class:`motet.figures.two_bones.TwoBones`). The offline twin, which knows how long a foot will stand, is
+:mod:`motet.figures.feet.hold`.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -33,7 +34,8 @@ from motet.motion.scalar_or_batch import (
 )
 from motet.motion.springs import Inertializer
 from motet.settings import Range, Settings
-from motet.steering.pose import Pose, hips_of
+from motet.steering.pose import Floats, Pose, hips_of
+from motet.steering.stepping import FREE, Footing, Move, Plan, Step, StepSettings, lift_of, stepped
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,9 @@ class FootLockSettings(Settings):
     """Half-life in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
 
 
+LEFT_THEN_RIGHT = np.array([[True], [False]])
+"""Which of both feet in arrays is the left one."""
+
 HEEL, BALL = SOLE[LEG[2]]
 (TIP,) = SOLE[LEG[3]]
 SOLE_POINTS = [(2, HEEL), (2, BALL), (3, TIP)]
@@ -71,30 +76,52 @@ class FootLock:
     """The lock of B characters; replaced, never written into."""
 
     feet: Array
-    """(B, 2, 15) of the left and the right foot: its offset over the ground, x and z in metres, and how fast that
-    changes; how high it steps, and how fast that changes; and where heel, ball and tip of its sole were in the last
-    tick, x, y and z each, infinite before the first."""
+    """(B, 2, 18) of the left and the right foot: what :class:`motet.steering.stepping.Step` has, its offset over the
+    ground, x and z in metres, and how fast that changes first of all; how high it steps, and how fast that changes; and
+    where heel, ball and tip of its sole were in the last tick, x, y and z each, infinite before the first."""
 
     @staticmethod
     def none(characters: int) -> "FootLock":
         """Feet that have not been held yet."""
-        feet = np.zeros((characters, 2, 15))
-        feet[:, :, 6:] = math.inf
+        feet = np.zeros((characters, 2, 18))
+        feet[:, :, 6] = FREE
+        feet[:, :, 9:] = math.inf
         return FootLock(feet)
 
-    def update(self, pose: Pose, settings: FootLockSettings, seconds: float) -> tuple["FootLock", Pose]:
-        """A tick later, and the pose of that tick with standing feet held in place and above ground."""
+    def update(
+        self, pose: Pose, settings: FootLockSettings, seconds: float, plan: Plan | None = None
+    ) -> tuple["FootLock", Pose]:
+        """A tick later, and the pose of that tick with standing feet held in place and above ground. plan: which
+        figures have their steps planned, None for none of them."""
         hips = _hips(pose)
         place = hips_of(pose)
         feet = list[list[Part]]()
         legs = list[list[Quaternion]]()
-        for foot_before, limb in zip(self._feet, limbs(pose.rotations, pose.contacts), strict=True):
-            foot, leg = _held(foot_before, limb, hips, place, settings, seconds)
+        for foot_before, limb, footing in self._limbs(pose, settings.stands):
+            foot, leg = _held(foot_before, limb, hips, place, Tick(footing, plan, settings, seconds))
             feet.append(foot)
             legs.append(leg)
         numbers: Array = np.array(feet)
         lock = FootLock(numbers[None] if len(pose) == 1 else numbers[0].transpose(2, 1, 0))
-        return lock, replace(pose, rotations=with_legs(pose.rotations, legs))
+        contacts = pose.contacts if plan is None else lock.contacts(pose.contacts, plan.settings)
+        return lock, replace(pose, rotations=with_legs(pose.rotations, legs), contacts=contacts)
+
+    def _limbs(self, pose: Pose, stands: float) -> Iterator[tuple[Sequence[Part], Limb, tuple[Footing, Footing]]]:
+        """The feet, what is played of their legs, and the footing of each foot and of the other one. stands: contact
+        above which a foot does."""
+        feet = self._feet
+        played = list(limbs(pose.rotations, pose.contacts))
+        sides: Sequence[Part] = (True, False) if len(feet) == 2 else (LEFT_THEN_RIGHT,)
+        each = list[Footing]()
+        for foot, limb, is_left in zip(feet, played, sides, strict=True):
+            each.append(Footing(_length(foot[0], foot[1]), foot[6], limb.contact > stands, is_left))
+        others = each[::-1] if len(each) == 2 else [Footing(*(part[::-1] for part in each[0]))]
+        yield from zip(feet, played, zip(each, others, strict=True), strict=True)
+
+    def contacts(self, played: Floats, settings: StepSettings) -> Floats:
+        """Contacts (B, 2) as they are shown, from those that are played: a planned foot stands unless it is lifted."""
+        lifted = np.minimum(self.feet[:, :, 7] / settings.lowest, 1.0)
+        return np.where(self.feet[:, :, 6] == FREE, played, 1 - lifted).astype(np.float32)
 
     @property
     def _feet(self) -> Any:
@@ -110,60 +137,91 @@ def _hips(pose: Pose) -> Quaternion:
     return yawed(parts(pose.rotations[:, 0]), sine, cosine)
 
 
+class Tick(NamedTuple):
+    """What a foot's correction in a tick depends on besides its pose."""
+
+    footing: tuple[Footing, Footing]
+    """Of the foot and of the other one."""
+    plan: Plan | None
+    settings: FootLockSettings
+    seconds: float
+
+
 def _held(
-    foot_before: Sequence[Part],
-    limb: Limb,
-    hips: Quaternion,
-    place: Vector,
-    settings: FootLockSettings,
-    seconds: float,
+    foot_before: Sequence[Part], limb: Limb, hips: Quaternion, place: Vector, tick: Tick
 ) -> tuple[list[Part], list[Quaternion]]:
     """A foot a tick later, and the rotations of thigh, shin and foot in their parents' frames."""
     # the foot as it is played, and how it is corrected
     turned, places = joints_of(limb, hips, place)
     sole = sole_points(turned, places)
-    foot = _corrected(foot_before, sole, limb.contact, place[1], settings, seconds)
-    shift_x, shift_z, _, _, height, *_ = foot
-    # no point of the sole is below the ground
-    lift = larger(height - _lowest(sole), 0.0)
-    moves = (shift_x != 0) | (shift_z != 0) | (lift > 0)
+    foot = _corrected(foot_before, sole, limb.contact, place[1], tick)
+    correction = (foot[0], _lift(foot, sole), foot[1])
+    moves = (correction[0] != 0) | (correction[1] != 0) | (correction[2] != 0)
     if moves is False:
         return foot, limb.local[:3]
     # the leg reaches for the corrected ankle
-    reached = reached_by(hips, turned, places, plus(places[2], (shift_x, lift, shift_z)))
+    reached = reached_by(hips, turned, places, plus(places[2], correction))
     if moves is True or moves.all():
         return foot, reached
     # of several, the legs of those that are not corrected stay as they are, to the bit
     return foot, list(np.where(moves, reached, limb.local[:3]))
 
 
+def _lift(foot: Sequence[Part], sole: Sequence[Vector]) -> Part:
+    """By how much a foot is lifted, so that no point of its sole is below the ground, and that of a planned one is
+    where it is to be."""
+    lift = foot[7] - _lowest(sole)
+    return where(foot[6] == FREE, larger(lift, 0.0), lift)
+
+
 def _corrected(
-    foot_before: Sequence[Part],
-    sole: Sequence[Vector],
-    contact: Part,
-    hips_height: Part,
-    settings: FootLockSettings,
-    seconds: float,
+    foot_before: Sequence[Part], sole: Sequence[Vector], contact: Part, hips_height: Part, tick: Tick
 ) -> list[Part]:
     """The correction of a foot a tick later, as :attr:`FootLock.feet` has it."""
-    contact = where(hips_height > settings.low, contact, 0.0)
-    shift_x, shift_z, drift_x, drift_z, height, rise, *sole_before = foot_before
-    move_x, move_z = _sole_move(sole, sole_before, settings.bears)
-    # hold: a foot that stands stays where it was, so its move since the last tick is taken from its offset; fade: the
-    # offset of one that swings returns to 0
-    held_x = shift_x - move_x
-    held_z = shift_z - move_z
-    slow = _length(move_x, move_z) < settings.swings * seconds
+    settings = tick.settings
+    before = Step(*foot_before[:7])
+    height, rise, *sole_before = foot_before[7:]
+    move = _sole_move(sole, sole_before, settings.bears)
+    is_high = hips_height > settings.low
+    # hold: a foot that stands stays where it was, and the offset of one that swings returns to 0
+    contact = where(is_high, contact, 0.0)
+    step, stands = _free(before, move, contact, settings, tick.seconds)
+    goal = contact * _swing_height(before, step, move, settings, tick.seconds)
+    # step: a foot of a figure that goes slowly does so by plan, once it stands
+    if tick.plan is not None:
+        can_step = is_high & tick.plan.plans
+        is_planned = can_step & (before.clock >= 0)
+        planned = stepped(before, *tick.footing, move, tick.plan, tick.seconds)
+        step = step._replace(clock=where(can_step & stands, 0.0, step.clock))
+        step = Step(*(where(is_planned, *pair) for pair in zip(planned, step, strict=True)))
+        goal = where(is_planned, lift_of(planned, tick.plan), goal)
+    # lift: softly, and a planned foot comes down from where its recording has it
+    error, rise = Inertializer(settings.lifts).update(height - goal, rise, tick.seconds)
+    height = goal + error
+    follows = (step.clock > 0) | ((step.clock == 0) & (before.clock == FREE))
+    height = where(follows, larger(height, _lowest(sole)), height)
+    return [*step, height, rise, *chain.from_iterable(sole)]
+
+
+def _free(before: Step, move: Move, contact: Part, settings: FootLockSettings, seconds: float) -> tuple[Step, Part]:
+    """A foot without planned steps a tick later, and whether it stands. move: how far it has been moved along x and z
+    since the last tick."""
+    # the move of a foot that stands is taken from its offset
+    held_x = before.shift_x - move[0]
+    held_z = before.shift_z - move[1]
+    slow = _length(*move) < settings.swings * seconds
     stands = slow & (contact > settings.stands) & (_length(held_x, held_z) < settings.farthest)
     fade = Inertializer(settings.fade)
-    shift_x, drift_x = _held_or_faded(stands, held_x, shift_x, drift_x, fade, seconds)
-    shift_z, drift_z = _held_or_faded(stands, held_z, shift_z, drift_z, fade, seconds)
+    shift_x, drift_x = _held_or_faded(stands, held_x, before.shift_x, before.drift_x, fade, seconds)
+    shift_z, drift_z = _held_or_faded(stands, held_z, before.shift_z, before.drift_z, fade, seconds)
+    nothing = 0.0 * shift_x
+    return Step(shift_x, shift_z, drift_x, drift_z, nothing, nothing, nothing + FREE), stands
 
-    # step: a foot that moves over the ground while it is marked as a contact is lifted, higher the faster it is
-    moved = _length(shift_x - held_x, shift_z - held_z)
-    goal = contact * smaller(moved * (settings.steps / (settings.swings * seconds)), settings.steps)
-    error, rise = Inertializer(settings.lifts).update(height - goal, rise, seconds)
-    return [shift_x, shift_z, drift_x, drift_z, goal + error, rise, *chain.from_iterable(sole)]
+
+def _swing_height(before: Step, step: Step, move: Move, settings: FootLockSettings, seconds: float) -> Part:
+    """How high a foot is lifted that moves over the ground while its contact is 1: higher the faster it is."""
+    moved = _length(step.shift_x - (before.shift_x - move[0]), step.shift_z - (before.shift_z - move[1]))
+    return smaller(moved * (settings.steps / (settings.swings * seconds)), settings.steps)
 
 
 def _held_or_faded(
@@ -174,7 +232,7 @@ def _held_or_faded(
     return where(stands, held, faded), where(stands, 0.0, fade_rate)
 
 
-def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float) -> tuple[Part, Part]:
+def _sole_move(sole: Sequence[Vector], sole_before: Sequence[Part], bears: float) -> Move:
     """How far the point that bears a foot has moved over the ground since the last tick, along x and z."""
     # the point that bears the foot: its move is what the lock takes away, so heel and toes may turn about it
     heel, ball, tip = sole

@@ -37,6 +37,7 @@ from motet.steering.session import SteerSession
 from motet.steering.settings import SteeringSettings
 from motet.steering.spoken import Reading, words_for
 from motet.steering.step import LOOPS, PoseCodes
+from motet.steering.stepping import StepSettings
 from motet.steering.terrain import TerrainSettings
 from motet.steering.turn_limit import TurnSettings
 from motet.text.clauses import Shown
@@ -63,6 +64,7 @@ class SteerModel(ControlModel):
     SETTINGS = (
         SteeringSettings,
         FootLockSettings,
+        StepSettings,
         TerrainSettings,
         ActSettings,
         IdleSettings,

@@ -12,6 +12,7 @@ from motet.figures.humanoid import BONES, LEFT_RIGHT
 from motet.models.control import LARGEST_CROWD
 from motet.motion.motion import Motion, is_many
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
+from motet.motion.scalar_or_batch import single
 from motet.settings import is_number
 from motet.steering.action_layer import ActionLayer, ActOrder
 from motet.steering.acts import Act, ActSettings
@@ -30,6 +31,7 @@ from motet.steering.saying import Saying
 from motet.steering.scripts import Order, parse_orders
 from motet.steering.spoken import Reading
 from motet.steering.step import tick
+from motet.steering.stepping import Plan, StepSettings, planned
 from motet.steering.targets import CharacterIds, checked_path, chosen_ids, numbers_of
 from motet.steering.terrain import GroundHeight, Terrain, TerrainLayer, TerrainSettings
 from motet.steering.turn_limit import TurnLimit, TurnSettings
@@ -290,7 +292,8 @@ class SteerSession:
         # idle, again: breath; foot lock: standing feet stay in place
         if state.lock is not None:
             pose = state.idle.breathe(pose, settings(IdleSettings), seconds)
-            state.lock, pose = state.lock.update(pose, settings(FootLockSettings), seconds)
+            plan = self._plan(target, gait, acts)
+            state.lock, pose = state.lock.update(pose, settings(FootLockSettings), seconds, plan)
         # terrain: feet, legs and hips follow the ground
         if self._terrain is not None:
             state.terrain, pose = state.terrain.update(pose, self._terrain, settings(TerrainSettings), seconds)
@@ -302,6 +305,18 @@ class SteerSession:
         state.turns, pose = state.turns.update(pose, settings(TurnSettings), seconds)
         # what has happened since the last tick
         return replace(pose, events=self._events(pose)).read_only()
+
+    def _plan(self, target: Array, gait: Rows, acts: Flags) -> Plan | None:
+        """Whose steps are planned in a tick, None for nobody's. acts: (characters,) whether an act leads the body."""
+        state = self._state
+        settings = self.model.settings(StepSettings)
+        slow = self.model.settings(IdleSettings).slow
+        creeps, stops = planned(self.model.matcher, state.playback, target, gait, slow)
+        plans = (creeps | stops) & ~acts
+        if not plans.any():
+            return None
+        settled = stops & (state.idle.share > settings.rests)
+        return Plan(settings, single(plans), single(settled))
 
     def _face_as_acted(self) -> None:
         """After a full-body act an idle character keeps the act's final facing."""

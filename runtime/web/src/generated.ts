@@ -519,6 +519,25 @@ export const SPOKEN = {
   STEP: 0.6,
 } as const;
 
+// motet.steering.stepping
+export const STEPPING = {
+  FREE: -1,
+} as const;
+
+// motet.steering.stepping.StepSettings
+export const stepSettings = {
+  swing: { default: 0.4, low: 0.05, high: 5, whole: false },
+  lowest: { default: 0.045, low: 0.001, high: 1, whole: false },
+  highest: { default: 0.07, low: 0.001, high: 1, whole: false },
+  longest: { default: 0.4, low: 0.001, high: 1, whole: false },
+  stray: { default: 0.15, low: 0.001, high: 1, whole: false },
+  settles: { default: 0.03, low: 0.001, high: 1, whole: false },
+  leads: { default: 0.4, low: 0, high: 5, whole: false },
+  lead: { default: 0.1, low: 0.001, high: 1, whole: false },
+  mean: { default: 0.2, low: 0.001, high: 10, whole: false },
+  rests: { default: 0.5, low: 0, high: 1, whole: false },
+} as const;
+
 // motet.steering.targets
 export const TARGETS = {
   LARGEST_COMMAND: 1000000,

@@ -98,7 +98,8 @@ export class Matcher {
   private readonly features: Int16Array;
   readonly goals: Goals[];
   /** Which gaits are faster than a creep. */
-  private readonly creeps: boolean[];
+  /** Of each gait whether it can go slower than its recordings. */
+  readonly creeps: boolean[];
   private readonly query = new Int16Array(MATCHING.FEATURES);
   private readonly image = new Int16Array(MATCHING.FEATURES);
 

@@ -12,6 +12,7 @@ import {
   lookSettings,
   reachSettings,
   steeringSettings,
+  stepSettings,
   terrainSettings,
   turnSettings,
 } from "../generated.js";
@@ -47,6 +48,7 @@ export class ControlModel extends Model {
   readonly abilities: Gaits;
   readonly steerer: Steerer;
   readonly lock: Settings<typeof footLockSettings>;
+  readonly steps: Settings<typeof stepSettings>;
   readonly acts: Settings<typeof actSettings>;
   readonly idle: Settings<typeof idleSettings>;
   readonly look: Settings<typeof lookSettings>;
@@ -64,6 +66,7 @@ export class ControlModel extends Model {
     this.abilities = new Gaits(names, speeds, steering);
     this.gaits = names;
     this.lock = settingsOf("foot_lock", footLockSettings, manifest.settings.foot_lock);
+    this.steps = settingsOf("stepping", stepSettings, manifest.settings.stepping);
     this.acts = settingsOf("acting", actSettings, manifest.settings.acting);
     this.idle = settingsOf("idle", idleSettings, manifest.settings.idle);
     this.look = settingsOf("look", lookSettings, manifest.settings.look);

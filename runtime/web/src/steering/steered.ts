@@ -6,6 +6,7 @@ import type {
   idleSettings,
   lookSettings,
   reachSettings,
+  stepSettings,
   terrainSettings,
   turnSettings,
 } from "../generated.js";
@@ -21,6 +22,7 @@ import { idle, type Reach, reached } from "./reachLayer.js";
 import { breathed, kept, notYet, type Standing } from "./idle.js";
 import type { Settings } from "../settings.js";
 import type { Played, Steerer } from "./step.js";
+import { planOf } from "./stepping.js";
 import { grounded, type GroundHeight, newTerrain, slowed, type Terrain } from "./terrain.js";
 import { type Joints, limited } from "./turnLimit.js";
 
@@ -28,6 +30,7 @@ import { type Joints, limited } from "./turnLimit.js";
 export interface SteeringModel extends ActingModel {
   readonly abilities: Gaits;
   readonly lock: Settings<typeof footLockSettings>;
+  readonly steps: Settings<typeof stepSettings>;
   readonly idle: Settings<typeof idleSettings>;
   readonly look: Settings<typeof lookSettings>;
   readonly reach: Settings<typeof reachSettings>;
@@ -118,8 +121,19 @@ export function tick(
     : played;
   const pose = laid(model, acting, stood, playback, root, changed);
   if (whole && !command.speed) stand(figure);
+  const plan = whole
+    ? null
+    : planOf(
+        steerer.matcher,
+        playback,
+        target,
+        command.gait,
+        settings.slow,
+        figure.standing.share,
+        model.steps,
+      );
   const footed = holdFeet
-    ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt)
+    ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt, plan)
     : pose;
   const stepped = ground ? grounded(figure.terrain, footed, ground, model.terrain, dt) : footed;
   return limited(figure.joints, guided(model, figure, stepped, dt), model.turns, dt);

@@ -26,6 +26,13 @@ from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import Flags, mean_and_tail
 from motet_train.evaluate.steer.commands import act_figures, going_figures, said_acts
+from motet_train.evaluate.steer.edges import (
+    minute_figures,
+    slow_side_figures,
+    spot_turn_figures,
+    stop_figures,
+    wild_stick_figures,
+)
 from motet_train.evaluate.steer.following import (
     MEASURED_SPEEDS,
     WAYS_PACES,
@@ -349,6 +356,11 @@ def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Meas
         measures[f"ways_{gait}"] = partial(ways_errors, gait=gait)
     measures["reversals"] = reversal_figures
     measures["stick"] = stick_figures
+    measures["slow_side"] = slow_side_figures
+    measures["spot_turn"] = spot_turn_figures
+    measures["wild_stick"] = wild_stick_figures
+    measures["stops"] = stop_figures
+    measures["standing"] = minute_figures
     # for the minutes that a user waits longest
     measures["random"] = partial(wandering, limits=limits, seconds=60 * minutes, characters=characters)
     return measures
