@@ -4,7 +4,8 @@
       -> session.py: within what the gaits allow (gaits.py), along paths (paths.py), around others (avoidance.py)
       -> matching.py: the recorded row that fits is searched
       -> step.py: the row is played, warped (warping.py) and smoothed, and the root moved
-      -> layers over that pose: action_layer.py, idle.py, foot_lock.py, look_layer.py, reach_layer.py, turn_limit.py
+      -> layers over that pose: action_layer.py, idle.py, foot_lock.py (stepping.py), terrain.py, look_layer.py,
+         reach_layer.py, turn_limit.py
       -> Pose (pose.py) with what happened (events.py)
 
 Main names: SteerModel (model.py), SteerSession (session.py), Matcher (matching.py), tick (step.py), Pose (pose.py).

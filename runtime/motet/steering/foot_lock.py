@@ -8,7 +8,7 @@ correction fades, unless its steps are planned (:mod:`motet.steering.stepping`).
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -35,7 +35,7 @@ from motet.motion.scalar_or_batch import (
 from motet.motion.springs import Inertializer
 from motet.settings import Range, Settings
 from motet.steering.pose import Floats, Pose, hips_of
-from motet.steering.stepping import FREE, Footing, Move, Plan, Step, StepSettings, lift_of, stepped
+from motet.steering.stepping import FREE, Footing, Move, Plan, Step, lift_of, stepped
 
 
 @dataclass(frozen=True)
@@ -97,30 +97,21 @@ class FootLock:
         place = hips_of(pose)
         feet = list[list[Part]]()
         legs = list[list[Quaternion]]()
-        for foot_before, limb, footing in self._limbs(pose, settings.stands):
-            foot, leg = _held(foot_before, limb, hips, place, Tick(footing, plan, settings, seconds))
+        played = list(limbs(pose.rotations, pose.contacts))
+        stepping = _stepping(self._feet, played, plan, settings.stands)
+        for foot_before, limb, step in zip(self._feet, played, stepping, strict=True):
+            foot, leg = _held(foot_before, limb, hips, place, Tick(step, settings, seconds))
             feet.append(foot)
             legs.append(leg)
         numbers: Array = np.array(feet)
         lock = FootLock(numbers[None] if len(pose) == 1 else numbers[0].transpose(2, 1, 0))
-        contacts = pose.contacts if plan is None else lock.contacts(pose.contacts, plan.settings)
-        return lock, replace(pose, rotations=with_legs(pose.rotations, legs), contacts=contacts)
+        return lock, replace(pose, rotations=with_legs(pose.rotations, legs), contacts=lock._shown(pose.contacts, plan))
 
-    def _limbs(self, pose: Pose, stands: float) -> Iterator[tuple[Sequence[Part], Limb, tuple[Footing, Footing]]]:
-        """The feet, what is played of their legs, and the footing of each foot and of the other one. stands: contact
-        above which a foot does."""
-        feet = self._feet
-        played = list(limbs(pose.rotations, pose.contacts))
-        sides: Sequence[Part] = (True, False) if len(feet) == 2 else (LEFT_THEN_RIGHT,)
-        each = list[Footing]()
-        for foot, limb, is_left in zip(feet, played, sides, strict=True):
-            each.append(Footing(_length(foot[0], foot[1]), foot[6], limb.contact > stands, is_left))
-        others = each[::-1] if len(each) == 2 else [Footing(*(part[::-1] for part in each[0]))]
-        yield from zip(feet, played, zip(each, others, strict=True), strict=True)
-
-    def contacts(self, played: Floats, settings: StepSettings) -> Floats:
+    def _shown(self, played: Floats, plan: Plan | None) -> Floats:
         """Contacts (B, 2) as they are shown, from those that are played: a planned foot stands unless it is lifted."""
-        lifted = np.minimum(self.feet[:, :, 7] / settings.lowest, 1.0)
+        if plan is None:
+            return played
+        lifted = np.minimum(self.feet[:, :, 7] / plan.settings.lowest, 1.0)
         return np.where(self.feet[:, :, 6] == FREE, played, 1 - lifted).astype(np.float32)
 
     @property
@@ -137,14 +128,36 @@ def _hips(pose: Pose) -> Quaternion:
     return yawed(parts(pose.rotations[:, 0]), sine, cosine)
 
 
+class Stepping(NamedTuple):
+    """What a planned step depends on."""
+
+    footing: Footing
+    other: Footing
+    """Of the other foot."""
+    plan: Plan
+
+
 class Tick(NamedTuple):
     """What a foot's correction in a tick depends on besides its pose."""
 
-    footing: tuple[Footing, Footing]
-    """Of the foot and of the other one."""
-    plan: Plan | None
+    stepping: Stepping | None
     settings: FootLockSettings
     seconds: float
+
+
+def _stepping(
+    feet: Sequence[Sequence[Part]], played: Sequence[Limb], plan: Plan | None, stands: float
+) -> Sequence[Stepping | None]:
+    """What the planned steps of feet depend on, which are as :attr:`FootLock._feet` has them; None without a plan.
+    stands: contact above which a foot does."""
+    if plan is None:
+        return [None] * len(feet)
+    sides: Sequence[Part] = (True, False) if len(feet) == 2 else (LEFT_THEN_RIGHT,)
+    each = list[Footing]()
+    for foot, limb, is_left in zip(feet, played, sides, strict=True):
+        each.append(Footing(_length(foot[0], foot[1]), foot[6], limb.contact > stands, is_left))
+    others = each[::-1] if len(each) == 2 else [Footing(*(part[::-1] for part in each[0]))]
+    return [Stepping(footing, other, plan) for footing, other in zip(each, others, strict=True)]
 
 
 def _held(
@@ -188,18 +201,21 @@ def _corrected(
     step, stands = _free(before, move, contact, settings, tick.seconds)
     goal = contact * _swing_height(before, step, move, settings, tick.seconds)
     # step: a foot of a figure that goes slowly does so by plan, once it stands
-    if tick.plan is not None:
-        can_step = is_high & tick.plan.plans
+    if tick.stepping is not None:
+        plan = tick.stepping.plan
+        can_step = is_high & plan.plans
         is_planned = can_step & (before.clock >= 0)
-        planned = stepped(before, *tick.footing, move, tick.plan, tick.seconds)
+        planned = stepped(before, tick.stepping.footing, tick.stepping.other, move, plan, tick.seconds)
         step = step._replace(clock=where(can_step & stands, 0.0, step.clock))
         step = Step(*(where(is_planned, *pair) for pair in zip(planned, step, strict=True)))
-        goal = where(is_planned, lift_of(planned, tick.plan), goal)
-    # lift: softly, and a planned foot comes down from where its recording has it
+        goal = where(is_planned, lift_of(planned, plan), goal)
+    # lift: softly
     error, rise = Inertializer(settings.lifts).update(height - goal, rise, tick.seconds)
     height = goal + error
-    follows = (step.clock > 0) | ((step.clock == 0) & (before.clock == FREE))
-    height = where(follows, larger(height, _lowest(sole)), height)
+    # a planned foot comes down from where its recording has it
+    if tick.stepping is not None:
+        follows = (step.clock > 0) | ((step.clock == 0) & (before.clock == FREE))
+        height = where(follows, larger(height, _lowest(sole)), height)
     return [*step, height, rise, *chain.from_iterable(sole)]
 
 
