@@ -27,7 +27,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.steer import commands, following, limbs, players
+from motet_train.evaluate.steer import commands, following, ground, limbs, players
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
 from motet_train.runs import Run
@@ -80,6 +80,7 @@ def report(model: SteerModel, store: Store) -> Any:
         patch.setattr(limbs, "STARTING_DISTANCE", 0.2)
         patch.setattr(limbs, "REACHED_POINTS", 3)
         patch.setattr(players, "STEERED_SECONDS", 1.0)
+        patch.setattr(ground, "GROUND_SECONDS", 0.5)
         return steer_report(model, Recorded.of(store), minutes=0.02, characters=3)
 
 
@@ -87,7 +88,9 @@ def test_all_is_measured_beside_recordings_and_the_rival(report: Any) -> None:
     groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "creep", "ways_walk", "ways_run"]
     groups += ["reversals", "stick", "random", "act_standing", "act_walk", "act_run"]
     groups += ["cut_standing", "cut_walk", "cut_run", "reach"]
-    groups += ["going_walk", "paths_walk", "going_run", "paths_run", "slow_points", "chase"]
+    for gait in ("walk", "run"):
+        groups += [f"going_{gait}", f"paths_{gait}", *(f"ground_{name}_{gait}" for name in ground.GROUNDS)]
+    groups += ["slow_points", "chase"]
     kinds = [f"{gait}_{kind}" for gait in ("walk", "run") for kind in ("recorded", "held")]
     assert list(report) == [*groups, *(f"{group}_seldom" for group in groups), *kinds, "random_held"]
     for group in groups:
