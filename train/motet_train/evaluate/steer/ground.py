@@ -7,6 +7,7 @@ import numpy as np
 from motet.motion.rotations import Array
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
+from motet.steering.terrain import TerrainSettings
 from motet_train.evaluate.positions import mean_and_tail, slides, stances
 from motet_train.evaluate.steer.following import MEASURED_SPEEDS, SETTLE, Track, turns
 
@@ -33,24 +34,29 @@ def _stairs(x: Array, z: Array) -> Array:
 
 GROUNDS: Mapping[str, Callable[[Array, Array], Array]] = {
     "flat": lambda x, z: 0 * x,
+    "flat_slow": lambda x, z: 0 * x,
     "up": lambda x, z: GENTLE * z,
     "down": lambda x, z: -GENTLE * z,
     "across": lambda x, z: GENTLE * x,
     "stairs_up": _stairs,
     "stairs_down": lambda x, z: -_stairs(x, z),
 }
-"""Heights at places x and z of figures that go along z."""
+"""Heights at places x and z of figures that go along z; on the slow plane as fast as uphill."""
+
+UPHILL_SHARE = 1 / (1 + TerrainSettings().uphill * GENTLE)
+"""Share of its speed that a figure has uphill."""
 
 
 def ground_figures(model: SteerModel, ground: str, gait: str) -> dict[str, float]:
-    """Figures that go straight on over ground in a gait, at the speed of :data:`MEASURED_SPEEDS`.
+    """Figures that go straight on over ground in a gait, at the speed of :data:`MEASURED_SPEEDS`, less uphill.
 
     off_cm, off_p95_cm: how far the lowest point of a sole is from the ground while its contact is above a half, which
     includes the begin of leaving it. slide_cm, slide_p95_cm: of heels, balls and tips in their stances. turn: the
     largest turn of a joint in a tick, degrees. hips: the largest acceleration of the hips up or down, m/s^2.
     """
     height = GROUNDS[ground]
-    poses = _poses(model, height, gait)
+    speed = MEASURED_SPEEDS[gait] * (UPHILL_SHARE if ground == "flat_slow" else 1)
+    poses = _poses(model, height, gait, speed)
     track = Track.of(poses, model.fps)
     soles = track.soles.astype(np.float64)
     above = soles[..., 1] - height(soles[..., 0], soles[..., 2])
@@ -75,13 +81,13 @@ def _off(poses: Sequence[Pose], above: Array) -> Array:
     return off
 
 
-def _poses(model: SteerModel, height: Callable[[Array, Array], Array], gait: str) -> Sequence[Pose]:
-    """The poses of figures that begin somewhere in a step of stairs, once they go."""
+def _poses(model: SteerModel, height: Callable[[Array, Array], Array], gait: str, speed: float) -> Sequence[Pose]:
+    """The poses of figures that begin somewhere in a step of stairs, once they go at a speed in m/s."""
     begins = np.random.default_rng(GROUND_SEED).uniform(0, TREAD, GROUND_FIGURES)
     session = model.start(gait, characters=GROUND_FIGURES)
     session.put(np.column_stack([np.arange(GROUND_FIGURES), begins, np.zeros(GROUND_FIGURES)]))
     session.set_ground(height)
-    session.control(speed=MEASURED_SPEEDS[gait], direction=0.0)
+    session.control(speed=speed, direction=0.0)
     poses = [session.tick() for _ in range(round((SETTLE + GROUND_SECONDS) * model.fps))]
     return poses[round(SETTLE * model.fps) :]
 

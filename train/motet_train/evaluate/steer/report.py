@@ -26,6 +26,7 @@ from motet_train.data.recorded import Recording, gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import Flags, mean_and_tail
 from motet_train.evaluate.steer.commands import act_figures, going_figures, said_acts
+from motet_train.evaluate.steer.crowds import CROWDS, crowd_figures
 from motet_train.evaluate.steer.edges import (
     minute_figures,
     slow_side_figures,
@@ -383,6 +384,8 @@ def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
             measures[f"ground_{ground}_{gait}"] = partial(ground_figures, ground=ground, gait=gait)
     measures["slow_points"] = slow_point_figures
     measures["chase"] = chase_figures
+    for crowd in CROWDS:
+        measures[f"crowd_{crowd}"] = partial(crowd_figures, crowd=crowd)
     return measures
 
 
