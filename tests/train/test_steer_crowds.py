@@ -31,6 +31,10 @@ class Session:
     points: Array
     room: float | None = None
 
+    @property
+    def characters(self) -> int:
+        return len(self.places)
+
     def keep_apart(self, room: float | None) -> None:
         self.room = room
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from motet.motion.rotations import Array
 from motet.steering.model import SteerModel
+from motet.steering.session import SteerSession
 from motet_train.evaluate.positions import length
 from motet_train.evaluate.steer.following import floats
 
@@ -33,7 +34,7 @@ JITTER = 0.25
 FILES = np.array([-1.5, 0.0, 1.5])
 """x of the files of each stream."""
 
-RANKS = np.arange(3.0, 12.0, 1.8)
+RANK_DISTANCES = np.arange(3.0, 12.0, 1.8)
 """Distances of the ranks of each stream from the middle, metres."""
 
 
@@ -47,7 +48,7 @@ def _crossing(rng: np.random.Generator) -> Array:
 
 def _streams(rng: np.random.Generator) -> Array:
     """Places (B, 2) of two groups in files, a metre apart at least."""
-    x, z = np.meshgrid(FILES, RANKS)
+    x, z = np.meshgrid(FILES, RANK_DISTANCES)
     group = np.column_stack([x.ravel(), z.ravel()])
     places = np.concatenate([group, -group])
     deviation: Array = rng.uniform(-JITTER, JITTER, places.shape)
@@ -96,20 +97,26 @@ def _figures(model: SteerModel, crowd: str, room: float | None) -> dict[str, flo
 def _met(model: SteerModel, crowd: str, room: float | None, rng: np.random.Generator) -> tuple[Array, Array]:
     """The distances (T,) of the two figures that are nearest to each other in each tick, and the seconds (B,) until
     figures arrive, infinite for those that do not."""
-    begins, mirrors = CROWDS[crowd]
-    places = begins(rng)
-    points = mirrors * places
-    way = points - places
-    facings = np.degrees(np.arctan2(way[:, 0], way[:, 1]))
-    session = model.start("walk", characters=len(places), places=np.column_stack([places, facings]))
+    session = _begun(model, crowd, rng)
     session.keep_apart(room)
-    session.go_to(points)
     distances = list[float]()
-    arrival = np.full(len(places), np.inf)
+    arrival = np.full(session.characters, np.inf)
     for tick in range(round(CROWD_SECONDS * model.fps)):
         distances.append(_smallest_distance(session.tick().ground[:, :2]))
         arrival = np.where(session.arrived, np.minimum(arrival, (tick + 1) / model.fps), arrival)
     return np.array(distances), arrival
+
+
+def _begun(model: SteerModel, crowd: str, rng: np.random.Generator) -> SteerSession:
+    """Figures of a crowd that begin to go, each facing its point."""
+    begins, mirrors = CROWDS[crowd]
+    places = begins(rng)
+    points = mirrors * places
+    x, z = (points - places).T
+    facings = np.degrees(np.arctan2(x, z))
+    session = model.start("walk", characters=len(places), places=np.column_stack([places, facings]))
+    session.go_to(points)
+    return session
 
 
 def _smallest_distance(places: Array) -> float:

@@ -55,8 +55,8 @@ def ground_figures(model: SteerModel, ground: str, gait: str) -> dict[str, float
     largest turn of a joint in a tick, degrees. hips: the largest acceleration of the hips up or down, m/s^2.
     """
     height = GROUNDS[ground]
-    speed = MEASURED_SPEEDS[gait] * (UPHILL_SHARE if ground == "flat_slow" else 1)
-    poses = _poses(model, height, gait, speed)
+    share = UPHILL_SHARE if ground == "flat_slow" else 1
+    poses = _poses(model, height, gait, share * MEASURED_SPEEDS[gait])
     track = Track.of(poses, model.fps)
     soles = track.soles.astype(np.float64)
     above = soles[..., 1] - height(soles[..., 0], soles[..., 2])

@@ -384,9 +384,7 @@ def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
             measures[f"ground_{ground}_{gait}"] = partial(ground_figures, ground=ground, gait=gait)
     measures["slow_points"] = slow_point_figures
     measures["chase"] = chase_figures
-    for crowd in CROWDS:
-        measures[f"crowd_{crowd}"] = partial(crowd_figures, crowd=crowd)
-    return measures
+    return measures | {f"crowd_{crowd}": partial(crowd_figures, crowd=crowd) for crowd in CROWDS}
 
 
 def seldom(model: SteerModel) -> SteerModel:
