@@ -27,7 +27,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store, prepare
-from motet_train.evaluate.steer import commands, crowds, following, ground, limbs, players
+from motet_train.evaluate.steer import commands, crowds, edges, following, ground, limbs, players
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
 from motet_train.runs import Run
@@ -80,6 +80,9 @@ def report(model: SteerModel, store: Store) -> Any:
         patch.setattr(limbs, "STARTING_DISTANCE", 0.2)
         patch.setattr(limbs, "REACHED_POINTS", 3)
         patch.setattr(players, "STEERED_SECONDS", 1.0)
+        patch.setattr(edges, "SLOW_SECONDS", 1.0)
+        patch.setattr(edges, "WILD_SECONDS", 1.0)
+        patch.setattr(edges, "WATCHED_SECONDS", 1.0)
         patch.setattr(ground, "SETTLE", 0.2)
         patch.setattr(ground, "GROUND_SECONDS", 0.5)
         patch.setattr(crowds, "CROWD_SEEDS", (1,))
@@ -89,7 +92,8 @@ def report(model: SteerModel, store: Store) -> Any:
 
 def test_all_is_measured_beside_recordings_and_the_rival(report: Any) -> None:
     groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "creep", "ways_walk", "ways_run"]
-    groups += ["reversals", "stick", "random", "act_standing", "act_walk", "act_run"]
+    groups += ["reversals", "stick", "slow_side", "spot_turn", "wild_stick", "stops", "standing", "random"]
+    groups += ["act_standing", "act_walk", "act_run"]
     groups += ["cut_standing", "cut_walk", "cut_run", "reach"]
     for gait in ("walk", "run"):
         groups += [f"going_{gait}", f"paths_{gait}", *(f"ground_{kind}_{gait}" for kind in ground.GROUNDS)]
