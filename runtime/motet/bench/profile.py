@@ -127,11 +127,14 @@ def operations_of(kernel: Mapping[str, Any]) -> float:
     name = kernel["op_name"].removeprefix("Fused")
     inputs = [next(iter(shape.values())) for shape in kernel["input_type_shape"]]
     outputs = [next(iter(shape.values())) for shape in kernel["output_type_shape"]]
+    # each element of a product sums over the last axis of its first factor
     if name in PRODUCTS:
         return 2.0 * float(math.prod(outputs[0])) * float(inputs[0][-1])
+    # each gate of a recurrent unit sees the input and the state
     if name in GATES_BY_CELL:
         directions, batch, units = outputs[-1][-3:]  # of all states or of the last ones
         return 2.0 * float(inputs[0][0] * directions * batch * units * GATES_BY_CELL[name] * (inputs[0][2] + units))
+    # each element of a convolution sums over a filter
     if name == "Conv":
         return 2.0 * float(math.prod(outputs[0])) * float(math.prod(inputs[1][1:]))
     return 0.0

@@ -221,14 +221,17 @@ class _Drawing:
         fps = self.model.fps
         motion: Motion | None = None
         passages: list[Passage] = []
+        # a walk alone, or neighbouring prompts together
         for _, run in groupby(parts, lambda part: part.start if part.walk else -1):
             together = list(run)
             begin = together[0].start / fps
             walk = together[0].walk
+            # walks are steered from where the motion ends
             if walk is not None:
                 motion = self._led(motion, walked(self.steer, walk, motion), together)
                 passages.append(Passage(walk.text, begin, walk.stop / fps, f"{walk.gait.name}, steered"))
                 continue
+            # prompts are drawn as one story that goes on from there
             motion, story = self._story(motion, together, seed)
             for passage in story.passages:
                 passages.append(replace(passage, start=passage.start + begin, stop=passage.stop + begin))

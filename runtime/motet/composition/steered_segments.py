@@ -139,9 +139,11 @@ def _command(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: A
     """Command a session to go to a place in the seconds left, but no slower than the gait, and to stand there."""
     gait = walk.gait
     backwards = math.pi * gait.back
+    # no place: go on the way of the facing
     if leg.place is None and leg.facing is not None:
         _go(session, gait, gait.usual, leg.facing + backwards)
         return
+    # turn towards the place first, if that takes time
     gap = np.zeros(2) if leg.place is None else leg.place - ground[:2]
     distance = float(np.hypot(*gap))
     direction = float(np.arctan2(*gap))
@@ -149,6 +151,7 @@ def _command(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: A
     if distance < ARRIVAL_DISTANCE or left <= 0:
         session.control(speed=0, facing=None if leg.facing is None else math.degrees(leg.facing))
         return
+    # as fast as it takes to be there in time
     speed = float(np.clip(distance / max(left, AGAIN), gait.low, gait.high))
     _go(session, gait, speed, direction)
 
@@ -175,6 +178,7 @@ def _check(walk: Walk, ground: Array, fps: float) -> None:
     for leg in walk.legs:
         if leg.place is None:
             continue
+        # how long the way takes at the gait's top speed, with starting and turning
         gap = leg.place - place
         far = float(np.hypot(*gap))
         then = (leg.frame + 1) / fps

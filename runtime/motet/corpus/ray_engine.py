@@ -37,6 +37,7 @@ def answers(verb: Verb, sources: Sequence[Source], workers: int | None, address:
     """
     ray = _connected(workers, address)
     count = workers or int(ray.cluster_resources().get("CPU", 2)) - 1
+    # answers come in order, without Ray's own progress and log
     context = ray.data.DataContext.get_current()
     context.execution_options.preserve_order = True
     context.enable_progress_bars = False
@@ -44,6 +45,7 @@ def answers(verb: Verb, sources: Sequence[Source], workers: int | None, address:
     items = [{"source": pickle.dumps(source)} for source in sources]
     if not items:
         return
+    # blocks are small, so that all actors end at once
     size = max(1, min(verb.most, len(items) // (16 * count)))  # small, so that all actors end at once
     rows = ray.data.from_items(items, override_num_blocks=-(-len(items) // size)).map_batches(
         Actor,

@@ -112,14 +112,17 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     the humanoid's joints, of which those of arms are x and of legs and trunk y."""
     body = figure.fitted.body
     places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
+    # limbs, along their bones
     scales = np.ones((len(HUMANOID.joints), 3))
     for bone, end, axis in BONE_ENDS:
         for side in LEFT_RIGHT:
             if sided(side, end) in body.joints:
                 ratio = _length_ratio(places, body.joints, sided(side, bone), sided(side, end))
                 scales[HUMANOID.index(sided(side, bone)), axis] = ratio
+    # the trunk, upwards
     trunk = body.middle(places, "UpperArm") - body.middle(places, "UpperLeg")
     scales[_indices("spine", "chest", "upperChest"), 1] = _ratio(trunk, np.array([0.48]))
+    # shoulders and hips, sideways
     for part, bones in WIDTHS.items():
         usual_wide = 2 * HUMANOID.rest_positions[HUMANOID.index(sided("left", part)), :1]
         scales[_indices(*bones), 0] = _ratio(body.to_left(places, part), usual_wide)

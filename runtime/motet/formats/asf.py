@@ -164,10 +164,12 @@ def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
     entries = {"dof": (0, [""]), "name": (0, [""])} | _entries(lines)
     if missing := [word for word in ("direction", "length", "axis") if word not in entries]:
         raise FormatError(path, f"this bone has no {' or '.join(missing)}", begin)
+    # the offset of its child is its direction times its length
     line, length_words = entries["length"]
     length = number((*length_words, "")[1], path, line)
     line, direction = entries["direction"]
     reach = [repr(value * length) for value in triple(direction[1:], path, line)]
+    # its degrees of freedom, its name, and the axis that they turn about
     line, dof_words = entries["dof"]
     dofs = _dofs(path, line, dof_words, known=("rx", "ry", "rz"))
     _, name_words = entries["name"]

@@ -477,6 +477,7 @@ def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
         if node not in nodes:
             continue
         sampler = samplers[channel["sampler"]]
+        # a value for each time, three for splines
         times = gltf.array(sampler["input"])
         values = gltf.array(sampler["output"])
         interpolation = sampler.get("interpolation", "LINEAR")

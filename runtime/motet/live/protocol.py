@@ -105,6 +105,7 @@ class ClientSession:
 
     def frame(self, pose: Pose) -> str:
         """The message that gives a pose: hundredths of millimetres, thousandths of degrees."""
+        # what a client is told of each figure
         parts: dict[str, NDArray[Any]] = {
             "position": pose.place,
             "rotation": pose.heading,
@@ -117,6 +118,7 @@ class ClientSession:
         columns = [np.round(values.astype(np.float64), 5).tolist() for values in parts.values()]
         for values in zip(*columns, strict=True):
             characters.append(dict(zip(parts, values, strict=True)))
+        # when, and what has happened
         time = round(self.ticks / self.model.fps, 5)
         events = [[event.kind, event.character, *([event.name] if event.name else [])] for event in pose.events]
         happened = {"events": events} if events else {}
@@ -141,6 +143,7 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
     def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is no number")
 
+    # a JSON object of a known type
     if not isinstance(text, str):
         raise ProtocolError("messages must be text, not binary")
     try:
@@ -150,12 +153,14 @@ def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
     kind = document.pop("type", None) if isinstance(document, dict) else None
     if not isinstance(kind, str) or kind not in KEYS:
         raise ProtocolError(f'a message must be an object whose "type" is one of {", ".join(KEYS)}')
+    # whose values are known and fit
     arguments = {name: value for name, value in document.items() if value is not None}
     for name, value in arguments.items():
         if name not in KEYS[kind]:
             raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
         if wanted := _unfit(kind, name, value):
             raise ProtocolError(f"{kind}, {name}: expected {wanted}")
+    # and that says what its type needs
     if kind in REQUIRED_FIELDS and REQUIRED_FIELDS[kind] not in arguments:
         raise ProtocolError(f"{kind}: expected {REQUIRED_FIELDS[kind]}")
     return kind, arguments

@@ -400,10 +400,12 @@ def near_scores(
     from the start to the end. near: how many windows before and after a window are scored for its sentence; the others
     get minus infinity. progress: counts windows. at_once: pairs scored in one batch.
     """
+    # each sentence once, and which pairs with windows are near enough to be scored
     places = {ids: place for place, ids in enumerate(sorted(set(sentences)))}
     words = padded([np.array(ids) for ids in places], "int64")[0]
     rows, columns = _near_pairs(np.array([places[ids] for ids in sentences]), near)
     scores = np.full((len(sentences), len(places)), -np.inf)
+    # batch after batch; the others stay at minus infinity
     for start in range(0, len(rows), at_once):
         row = rows[start : start + at_once]
         column = columns[start : start + at_once]

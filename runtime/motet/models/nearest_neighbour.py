@@ -173,9 +173,11 @@ class Known:
             counted, (similarity,) = self.near(motion.vector[None])
             (row,) = counted
             (share,) = self.shares(counted)
+            # too short, or like nothing that is known
             if motion.seconds < settings.shortest or similarity < settings.outside:
                 answers.append([Answer(NOTHING, 0.0)])
                 continue
+            # the likeliest kinds of action, and a sentence of a near motion for each
             best = [int(q) for q in np.argsort(-share, kind="stable")[:count] if share[q] > 0]
             chances = self.probability(share[best])
             sentences = [self._sentence(q, row, motion) for q in best]
@@ -212,6 +214,7 @@ class Known:
         side = GOES_LEFT if turn > 0 else GOES_RIGHT
         turned = abs(turn) >= self.settings.turned
         ways, degrees, _ = self.ways[rows].T
+        # a clear turn: its side fits, the other side and straight ahead do not
         if turned:
             fits[ways == side] = 1
             fits[(ways == -side) | (ways == GOES_STRAIGHT)] = -1
@@ -220,6 +223,7 @@ class Known:
             fits[(ways == GOES_LEFT) | (ways == GOES_RIGHT)] = -1
         else:  # neither is certain, but the other side is wrong
             fits[ways == -side] = -1
+        # a sentence that names degrees is wrong by more than 30
         fits[(degrees > 0) & (np.abs(degrees - abs(turn)) > 30)] = -1
         return fits, side if turned else 0
 

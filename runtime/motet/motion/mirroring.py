@@ -103,6 +103,7 @@ def _same_channels(
     other = skeleton_of(motion).joints[partner]
     if letter == "r" and not _turns_alike(joint, other, signs):
         return None
+    # each channel needs the partner's of the same unit, or neither exists
     columns = {name: column for column, name in enumerate(motion.channels)}
     names = zip(channels_of(joint.name, letter), channels_of(other.name, letter), strict=True)
     channels = []

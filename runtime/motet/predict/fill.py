@@ -168,6 +168,7 @@ class FillModel(BundleModel):
         are used. MotionError for too few frames, another number of channels, or more than twice
         :attr:`longest` frames to fill.
         """
+        # both sides are long enough, and finite
         known = [np.asarray(part, dtype=np.float64) for part in (past, after)]
         for part, name in zip(known, ("before", "after"), strict=True):
             if part.ndim != 2 or part.shape[1] != self.sizes["E"] or len(part) < self.least:
@@ -176,12 +177,14 @@ class FillModel(BundleModel):
             if not np.isfinite(part).all():
                 raise MotionError("frames must be finite numbers")
         frames = checked_int("frames", frames, 0, 2 * self.longest, MotionError)
+        # seen from the last pose before the gap, as the net was trained
         pose = pose_of(known[0][-1])
         past = seen_from(known[0][-self.context :], pose)
         after = seen_from(known[1][: self.context], pose)
         plain = bridge(past, after, frames, pace)
         if not frames:
             return plain
+        # the net corrects the plain transition
         rows = (values[None].astype(np.float32) for values in (past, plain, after))
         filled: Array = put_at(self.loop.run(self.graphs["filler"], *rows)[0], pose)
         return filled
@@ -239,6 +242,7 @@ class FillModel(BundleModel):
     def _sides(self, before: Motion, after: Motion) -> tuple[Motion, Motion, Array, Array]:
         """What is known about a gap, at the model's rate: both sides on their own figure, the same on the humanoid, and
         placed frames (P, E) before the gap and (A, E) after it. MotionError for too few frames."""
+        # a few seconds on both sides, at the model's rate
         seen = round(SEEN * before.fps)
         past = before[-seen:].continuous().resample(self.fps, to_end=True)
         behind = after[:seen].continuous().resample(self.fps)
@@ -246,6 +250,7 @@ class FillModel(BundleModel):
             if len(part) < self.least:
                 need = f"at least {self.least / self.fps:.2g} s of motion ({self.least} frames at {self.fps:g} fps)"
                 raise MotionError(f"a gap needs {need} {name} it, but there are {side.duration:.2g} s")
+        # both in one motion, so that they come to the humanoid alike
         sides = replace(past, values=np.concatenate([past.values, behind.values]))
         figure = on_humanoid(sides)
         frames = placed(figure)

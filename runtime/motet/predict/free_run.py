@@ -28,13 +28,16 @@ def free_run(encoder: Graph, step: Graph, seed: Floats, count: int, horizon: int
     """
     seed_count = seed.shape[1]
     frames = np.concatenate([seed, np.empty((len(seed), count, seed.shape[2]), dtype=np.float32)], axis=1)
+    # one horizon after the other, each from the last seed_count frames
     for n in range(0, count, horizon):
         encoded = encoder({"frames": np.ascontiguousarray(frames[:, n : n + seed_count])})
         coming = frames[:, n + seed_count : n + seed_count + horizon]
+        # predictors that give all frames at once need no steps
         whole = encoded.get("trajectory", seed[:, :0])[:, : coming.shape[1]]
         if whole.shape == coming.shape:
             coming[:] = whole
             continue
+        # the others go on frame by frame from what the encoder gives
         state = zero_state(step, len(seed), encoded) | {k: v for k, v in encoded.items() if k in step.spec.feedback}
         constant = {k: v for k, v in encoded.items() if k not in state and step.spec.takes(k)}
         for frame in np.moveaxis(coming, 1, 0):

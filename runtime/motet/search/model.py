@@ -182,6 +182,7 @@ class Index:
         """
         if unit is not None:
             metres(unit)
+        # the index that was kept before, if any
         place = Path(place)
         kept = place if place.is_file() else Path(file or place / INDEX_FILE)
         before = _read(kept, model) if kept.is_file() else None
@@ -191,12 +192,14 @@ class Index:
         else:
             folder = place
             shard = shard or Shard()
+        # vectors of files that have not changed are taken from it, and from other indexes
         known = [] if before is None else [before]
         for path in merge:
             merged = _read(Path(path), model)
             if merged is not None:
                 known.append(merged)
         index = _renewed(folder, model, known, unit, jobs, shard, progress)
+        # it is written only if something has changed
         if before is None or _state(before) != _state(index):
             _keep(index, kept, needed=file is not None)
         return _usable(index)

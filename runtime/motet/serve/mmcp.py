@@ -134,12 +134,14 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         texts = [getattr(segment, "prompt", IDLE_PROMPT) for segment in request.segments]
         seconds = [segment.duration_frames / fps for segment in request.segments]
         seconds[-1] += 2 / self.model.fps  # what the last frame is interpolated from
+        # places on the way are walked to
         if steps.keys() - {0}:
             starts = accumulate(seconds, initial=0.0)
             prompts = [Moment(at, text) for at, text in zip(starts, [*texts, None], strict=True)]
             plan = _line(prompts, steps, fps, self.model.fps)
             composed = compose(self.model, plan, steer=self.steer, seed=seed)
             return composed.motion.resample(fps)[: request.total_frames]
+        # prompts alone are a story
         plant = request.options is None or request.options.post_processing
         story = self.model.story(texts, seconds=seconds, seed=seed)
         return story.playable(fps, plant)[: request.total_frames]
@@ -164,6 +166,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
             raise MotionError("without a prompt, motet goes from key pose to key pose: give two, or a prompt")
         motion = _humanoid(figure, posed, fps)
         poses = placed(motion)
+        # the first pose is held until its frame, then each gap is filled, then the last is held
         pieces = [np.repeat(poses[:1], min(posed), axis=0)]
         for (start, stop), (before, after) in zip(pairwise(posed), pairwise(poses), strict=True):
             if (stop - start) / fps > self.fill.seconds:
@@ -187,6 +190,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
     def _notes(self, request: GenerateRequest, seed: int) -> list[dict[str, str]]:
         """What the client cannot see: the seed that was drawn, and what was not understood."""
         notes = [("seed", "info", f"drawn with the seed {seed}")]
+        # each prompt once: words left out, unknown words, prompts unlike the training data
         for text in dict.fromkeys(getattr(segment, "prompt", IDLE_PROMPT) for segment in request.segments):
             understood = self.model.understood(text)
             unknown = self.model.unknown(text)

@@ -23,11 +23,13 @@ def picked(states: Sequence[Any], counts: Sequence[int], characters: Rows) -> An
     lists of B, and dataclasses and tuples of these. Anything else, such as the time of the display, is the first
     one's."""
     first = states[0]
+    # arrays and lists have an entry for each character
     if isinstance(first, np.ndarray):
         return np.concatenate(states)[characters]
     if isinstance(first, list):
         joined = list(chain.from_iterable(states))
         return [joined[character] for character in characters.tolist()]
+    # tuples and dataclasses have parts that do
     if isinstance(first, tuple):
         return tuple(picked(parts, counts, characters) for parts in zip(*states, strict=True))
     if isinstance(first, Paths):

@@ -94,6 +94,7 @@ class Happenings:
 
     def _moved(self, before: "Happenings", gaits: Sequence[str]) -> Iterator[Event]:
         """Steps, flights, gaits and ways, of figures that had a tick before."""
+        # what has changed for each figure since the tick before
         flies = self.air >= FLIES
         flew = before.air >= FLIES
         flags: dict[Happening, NDArray[np.bool_]] = {
@@ -104,6 +105,7 @@ class Happenings:
             "gait": self.gait != before.gait,
             "arrived": self.arrived > before.arrived,
         }
+        # an event for each change, kind by kind
         kinds = list(flags)
         numbers, characters = (np.array(list(flags.values())) & (before.air >= 0)).nonzero()
         for number, character in zip(numbers.tolist(), characters.tolist(), strict=True):

@@ -468,6 +468,7 @@ class Matcher:
         row = np.empty(len(gait), np.int64)
         mirror = np.empty(len(gait), np.int64)
         cost = np.empty(len(gait), np.float32)
+        # gait by gait, in blocks that stay in the cache
         for kind in set(gait.tolist()):
             goals = self.goals[kind]
             figures = np.flatnonzero(gait == kind)
@@ -475,6 +476,7 @@ class Matcher:
                 block = figures[start : start + self.BLOCK]
                 costs = self._costs(query, goals, block)
                 column = costs.argmin(axis=1)
+                # columns hold the rows, then their mirror images
                 mirror[block], goal = np.divmod(column, len(goals.rows))
                 row[block] = goals.rows[goal]
                 cost[block] = costs[np.arange(len(block)), column]

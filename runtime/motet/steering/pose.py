@@ -75,15 +75,18 @@ class Pose:
 
     def global_transforms(self) -> tuple[Floats, Array]:
         """Rotations (B, J', 4) and positions (B, J', 3) of all joints of the humanoid in the world."""
+        # rotations in the parents' frames, none for joints that are no bones
         count = len(HUMANOID.names)
         turned = np.zeros((count, len(self), 4), dtype=np.float32)
         turned[..., 3] = 1
         turned[BONE_JOINTS] = np.swapaxes(self.rotations, 0, 1)
         places = np.empty((count, len(self), 3))
+        # the hips stand in the world
         turned[0] = quat_product(self.heading, turned[0])
         places[0] = self.place
         places[0, :, 1] = self.height
         offsets = HUMANOID.offsets.astype(np.float32)[:, None]
+        # then level by level, each joint from its parent
         for level in HUMANOID.levels:
             parents = HUMANOID.parents[level]
             places[level] = places[parents] + quat_rotated(turned[parents], offsets[level])

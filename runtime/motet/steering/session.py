@@ -156,9 +156,11 @@ class SteerSession:
         before = self._state.command
         numbers = self._command_numbers(speed, direction, facing)
         gaits = self._gaits(gait)
+        # a direction is faced until a facing is given
         faces_way = before.faces_way
         if direction is not None:
             faces_way = np.ones_like(faces_way)
+        # a velocity is a speed and a direction; standing figures keep theirs
         if velocity is not None:
             if speed is not None or direction is not None:
                 raise ControlError("give a velocity, or speed and direction, not both")
@@ -652,10 +654,12 @@ class SteerSession:
         total = self.characters + count
         if not 0 < count <= LARGEST_CROWD - self.characters:
             raise ControlError(f"a session has 1 to {LARGEST_CROWD} characters; places of {count} make it {total}")
+        # new characters search in the turns that follow those of the present ones
         turns = self.model.phases(total) if phases is None else None
         phases = phases if turns is None else turns[self.characters :]
         state = self._state
         hold_feet = state.lock is not None
+        # a session of their own, whose state is joined to this one
         more = self.model.start(gait, characters=count, places=new_places, hold_feet=hold_feet, phases=phases)
         if state.poses is not None:
             more.advance(0)
@@ -705,9 +709,11 @@ class SteerSession:
         if order.goal is not None:
             self.go_to(order.goal, order.facing, speed=order.speed)
             return
+        # a turn and a way are relative to the present facing
         before = self._state.command
         facing = np.where(before.faces_way, before.direction, before.facing)
         aside = wrapped(before.direction - facing) if order.way is None else np.radians(order.way)
+        # a gait alone means its usual speed; a negative speed keeps the present one
         if order.speed is None:
             gaits = before.gait if order.gait is None else self._gaits(order.gait)
             speed = self.model.abilities.speeds[gaits, 1]

@@ -165,6 +165,7 @@ def _spring_update(playback: Playback, target: Vector, settings: SteeringSetting
     spring_x, spring_z, spring_facing = parts(playback.spring)
     rate_x, rate_z, rate_facing = parts(playback.spring_rate)
     target_x, target_z, target_facing = target
+    # critically damped towards the target: velocity along x and z, and facing
     velocity_damping = damping_of(settings.velocity)
     facing_damping = damping_of(settings.facing)
     error_x, rate_x = damped(spring_x - target_x, rate_x, velocity_damping, dt)
@@ -173,6 +174,7 @@ def _spring_update(playback: Playback, target: Vector, settings: SteeringSetting
     x = target_x + error_x
     z = target_z + error_z
     facing = target_facing + error_facing
+    # kept for the next tick
     playback.spring = joined((x, z, facing))
     playback.spring_rate = joined((rate_x, rate_z, rate_facing))
     return Springs(x, z, facing, computed(np.hypot, x, z))

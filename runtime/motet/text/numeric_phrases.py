@@ -159,6 +159,7 @@ def numerals(sentence: str) -> str:
 
 def quantities_of(sentence: str) -> Quantities:
     """The quantities of a sentence, the first of each kind; TextError for an impossible one: "-3 jumps"."""
+    # the first phrase of each kind, left to right; phrases do not overlap
     text = numerals(sentence)
     amounts: dict[Kind, float] = {}
     phrases: list[_Phrase] = []
@@ -166,8 +167,10 @@ def quantities_of(sentence: str) -> Quantities:
         if phrase.kind not in amounts and all(phrase.start >= earlier.stop for earlier in phrases):
             amounts[phrase.kind] = _sensible(phrase.kind, phrase.amount, sentence)
             phrases.append(phrase)
+    # what is left of the sentence without their numbers; from the end, so that places stay
     for phrase in reversed(phrases):
         text = text[: phrase.start] + phrase.rest + text[phrase.stop :]
+    # sides and paces have no numbers
     sides = {1 if left else -1 for left, _ in SIDE_PHRASES.findall(text)}
     _turned(text, amounts, sides)
     if pace := PACE_PHRASES.search(text):

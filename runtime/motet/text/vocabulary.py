@@ -208,6 +208,7 @@ class Vocabulary:
         """
         if len(sentence) > MAX_LETTERS:
             raise TextError(f"the sentence has {len(sentence)} letters, but at most {MAX_LETTERS} are allowed")
+        # each word as it is known, by its stem, or as the nearest spelling
         words = self.rules.words(sentence)
         meant = list(map(self.meant, words))
         unknown = [word for word, known in zip(words, meant, strict=True) if not known]

@@ -170,6 +170,7 @@ def recordings(
     seen: set[str] = set()
     for file, motion_name in _motions(archive, motion_files(archive) if files is None else files):
         clip = _clip_name(file, motion_name, table or {})
+        # a file is left out that has no sentence, or whose name has been read
         described = Described() if table is None else table.get(clip)
         if described is None:
             yield Skipped(clip, "no sentence")
@@ -184,6 +185,7 @@ def recordings(
                 item = Skipped(clip, archive.reason(error))
             yield item
         seen.add(clip)
+    # sentences without a motion
     for clip in table or ():
         if clip not in seen:
             yield Skipped(clip, NO_MOTION)

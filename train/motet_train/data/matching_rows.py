@@ -151,6 +151,7 @@ def _trajectory(way: Array, times: list[float], fps: float) -> Array:
 
     Beyond the last frame the root goes straight on at its final velocity.
     """
+    # beyond its end a recording goes on as in its last tenth of a second
     last = len(way) - 1
     tenth = round(fps / 10)  # of a second, in frames
     final_velocity = (way[last] - way[max(0, last - tenth)]) * fps / max(1, min(last, tenth))
@@ -160,6 +161,7 @@ def _trajectory(way: Array, times: list[float], fps: float) -> Array:
         seconds_beyond = np.maximum(frame - last, 0)[:, None] / fps
         recorded = way[np.minimum(frame, last)] - way
         offsets.append(recorded + seconds_beyond * final_velocity * (1, 1, 0))
+    # seen from each row's facing
     places = [seen(offset[:, :2], way[:, 2]) for offset in offsets]
     facings = [_direction(offset[:, 2]) for offset in offsets]
     return np.concatenate(places + facings, axis=1)

@@ -74,6 +74,7 @@ def read_word_vectors(path: Path, words: Collection[str], first: int = 0) -> dic
     for number, line in _lines(path):
         if _is_header(number, line):
             continue
+        # the first line says how many numbers a word has
         size = size or line.count(" ")
         word, *numbers = line.rsplit(" ", size)  # some files have words with spaces inside
         place = f"{path}, line {number}"
@@ -81,6 +82,7 @@ def read_word_vectors(path: Path, words: Collection[str], first: int = 0) -> dic
             raise DataError(f"{place}: expected a word and {size or 'some'} numbers, not {len(numbers)}")
         if word in vectors:
             continue
+        # the wanted words, and the first further ones
         is_further = word not in wanted and first > 0 and _is_word(word)
         if word in wanted or is_further:
             vectors[word] = _vector(numbers, place)

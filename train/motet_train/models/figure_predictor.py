@@ -125,12 +125,14 @@ class ErrorHead(nn.Module):
 @torch.enable_grad()
 def _likeliest_law(signs: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
     """The weights (N, S) and the bias (N,) by which normalised signs (B, N, S) explain errors (B, N) best."""
+    # weights and bias in one tensor; the bias begins at the mean error
     law = torch.zeros(signs.shape[1], signs.shape[2] + 1, dtype=torch.float64, requires_grad=True)
     law.data[:, -1] = errors.double().mean(0).log()
     descent = torch.optim.LBFGS([law], max_iter=200, line_search_fn="strong_wolfe")
 
     def loss() -> Tensor:
         descent.zero_grad()
+        # errors are exponentially distributed about exp(log)
         log = (signs * law[:, :-1]).sum(-1) + law[:, -1]
         lost = (log + errors * torch.exp(-log)).mean() + 1e-2 * law[:, :-1].square().mean()
         lost.backward()  # type: ignore[no-untyped-call]

@@ -173,6 +173,7 @@ def coded(
         entry = store.records[record]
         parts = acts(store.motion(record))
         cut = parts[0][1] < len(store.sequence(record))  # a long take that repeats an act
+        # each act in each span, as it is and mirrored
         for (begin, end), (start, stop) in product(entry.spans, parts):
             frames = store.values(begin + start, min(begin + stop, end))
             first = begin == entry.spans[0][0]

@@ -94,6 +94,7 @@ def made(acts: Mapping[str, Any], maker: Maker) -> dict[str, Any]:
     documents = dict[str, dict[str, Any]]()
     rows = list[Array]()
     for act in acts["act"]:
+        # a mirror image shares the frames of another act
         if "mirror_of" in act:
             shown = documents[act["mirror_of"]]
             more = {key: shown[key] for key in ("arms", "first", "frames")} | {"mirror": True}
@@ -102,6 +103,7 @@ def made(acts: Mapping[str, Any], maker: Maker) -> dict[str, Any]:
             more = {"arms": arms_alone(act, kept), "first": sum(map(len, rows)), "frames": len(kept)}
             rows.append(kept)
         documents[act["name"]] = {key: act[key] for key in KEPT_COLUMNS if key in act} | more
+    # all frames as one block of small differences
     frames = packed({"frames": differences(np.concatenate(rows))})
     return {"words": words(acts["words"]), "acts": [*documents.values()], "steps": STEPS_OF_UNIT, **frames}
 

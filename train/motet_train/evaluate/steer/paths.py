@@ -93,12 +93,14 @@ def _mean_of_finite(values: Array) -> float:
 def _along(model: SteerModel, gait: str, paths: Array) -> tuple[Array, Array]:
     """How many seconds figures (B,) are late at the ends of paths (B, P, 2), infinite if they do not arrive; and the
     distances (N,) from the paths until they do, metres."""
+    # all figures begin at the origin and go along their paths
     count = len(paths)
     facings = np.resize(FACINGS, count)
     session = model.start(gait, characters=count, places=np.column_stack([np.zeros((count, 2)), facings]))
     session.go_along(paths, gait=gait)
     places, arrived = _gone(session, model.fps)
     seconds = _arrival(arrived, model.fps)
+    # what the length takes at the gait's usual speed, and how far they are from the path until they arrive
     usual = length(np.diff(paths, axis=1)).sum(axis=1) / model.usual[gait]
     distances = list[Array]()
     for figure, path in enumerate(paths):

@@ -225,8 +225,10 @@ def sampled_runs(study: ControlStudy, variety: float = 1.0, runs: int = 4) -> Fi
     """
     reference = study.reference
     history = study.phases("walk", 1)[0].repeat(runs, axis=0)
+    # from four phases of walking: to a run, and on walking for a minute
     frames = study.hold(history, "run", 2.0, variety=variety).frames
     walk = study.hold(history, "walk", 60.0, variety=variety).frames
+    # the last 20 seconds of that minute
     ends = np.moveaxis(walk[-study.frames(20.0) :], 1, 0)
     periods = [period(reference.leg_angles(end)) for end in ends]
     energies = [reference.energy_ratio(end, study.walk) for end in ends]

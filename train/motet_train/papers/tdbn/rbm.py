@@ -320,11 +320,13 @@ def transitions(
     first window of a sequence is drawn as its last, geometric between: a motion that ends must be entered at its
     start; 1 for a motion that repeats. extra: number of additional frames and controls before these, see :class:`Past`.
     """
+    # windows of past codes with the next one, and of the controls beside them
     reach = taps + extra
     windows = [sequence.unfold(0, reach + 1, 1) for sequence in chain.from_iterable(codes)]
     units = [track[taps:].unfold(0, extra + 1, 1) for track in chain.from_iterable(controls)]
     every = torch.cat(windows).transpose(1, 2)
     control = torch.cat(units).transpose(1, 2).flatten(1)
+    # rare onsets weigh more, and pasts of other labels stand in for some body parts
     weights = [_window_weights(group, reach, onset) for group, onset in zip(codes, onsets, strict=True)]
     rival, repeats = _rivals(control, list(map(len, weights)), [onset == 1 for onset in onsets])
     return Transitions(every[:, :reach].flatten(1), every[:, reach], control, balanced(weights), rival, repeats)
