@@ -15,12 +15,12 @@ from motet.formats import read_motion
 from motet.models.load import load, load_as, verify
 from motet.representation.contract import MotionContract, named
 from motet.steering.model import SteerModel
+from motet.steering.recorded import Recording
+from motet.steering.rows import rows_of
 from motet.steering.settings import SteeringSettings
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.matching_rows import rows_of
-from motet_train.data.recorded import Recording
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import Matching, MatchingConfig
 from motet_train.recipes.matching import take

@@ -20,9 +20,10 @@ from motet.motion.kinematics import positions
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
+from motet.representation.root_block import poses_of
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_train.data.errors import DataError
-from motet_train.data.sixd_windows import SixdWindows, poses_of, window_of, with_way
+from motet_train.data.sixd_windows import SixdWindows, window_of, with_way
 from motet_train.data.store import Store
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import SixdPlaces, tree_of

@@ -1,11 +1,13 @@
 """Training of a figure that is steered: rows of recordings, their mirror images, poses in few codes, the step."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+import motet
 from motet import to_humanoid
 from motet.figures.humanoid import sole_points
 from motet.figures.humanoid.bones import BONES, HUMANOID
@@ -15,17 +17,22 @@ from motet.motion.mirroring import mirror
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, axis_to_rotmat
 from motet.representation.contract import MotionContract, named
+from motet.steering.from_clips import EVEN_CODES, ODD_CODES
 from motet.steering.matching import TRAJECTORY, Matcher, Playback, Table, mirrored_features
-from motet.steering.model import FEATURE_STEPS
 from motet.steering.pose import Pose
+from motet.steering.recorded import COLLAR_SLOPE, Recording, levelled, with_even_collars
+from motet.steering.rows import MatchingRows, _leaps, mirrored_poses, rows_of
 from motet.steering.settings import SteeringSettings
 from motet.steering.step import PoseCodes, tick
+from motet.steering.tables import DTYPE_OF_TABLE, FEATURE_STEPS, speeds_of
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.matching_rows import MatchingRows, _leaps, mirrored_poses, rows_of
-from motet_train.data.recorded import COLLAR_SLOPE, Recording, _levelled, _with_even_collars
+from motet_train.data.corpus import Record
+from motet_train.data.preparation import SIXD
+from motet_train.data.recorded import gaits_of, recordings
+from motet_train.data.store import prepare
 from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
-from motet_train.models.matching import DTYPE_OF_TABLE, Matching, MatchingConfig
+from motet_train.models.matching import Matching, MatchingConfig
 from motet_train.recipes.matching import take
 
 CLIPS = CMU_FOLDER
@@ -65,10 +72,10 @@ def net(walk: Motion, rows: MatchingRows) -> Matching:
 
 def test_a_floor_that_rises_and_falls_is_made_level(walk: Motion) -> None:
     features = named("root_sixd").features(walk)
-    level, height = _levelled(features), features.channels.index("root.height")
+    level, height = levelled(features), features.channels.index("root.height")
     values = features.values.copy()
     values[:, height] += 0.04 * np.sin(np.arange(len(values)) / 40)
-    found = _levelled(replace(features, values=values))
+    found = levelled(replace(features, values=values))
     assert np.abs(found.values - level.values).max() < 0.004
     soles = sole_points(*global_transforms(named("root_sixd").motion(found)))
     assert np.percentile(np.abs(soles[..., 1].min(axis=1)), 90) < 0.01
@@ -81,7 +88,7 @@ def test_collars_slope_alike_whoever_is_recorded_and_arms_stay(walk: Motion, dro
     ways = axis_to_rotmat("z", np.radians([-droops, droops]))
     turned = {HUMANOID.names[joint]: way @ local[:, joint] for way, joint in zip(ways, collars, strict=True)}
     before = named("root_sixd").features(posed(walk, turned, {}))
-    found = named("root_sixd").motion(_with_even_collars(before))
+    found = named("root_sixd").motion(with_even_collars(before))
     bones = np.einsum("tjab,jb->tja", local_rotations(found, collars), HUMANOID.offsets[arms])
     slopes = np.degrees(np.arctan2(-bones[..., 1], np.abs(bones[..., 0])))
     assert slopes.mean(axis=0) == pytest.approx(COLLAR_SLOPE, abs=0.1)
@@ -220,3 +227,42 @@ def test_the_table_of_gaits() -> None:
     assert not gaits["walk"].shown("walk stealthily", "ACCAD_Male2")
     assert gaits["run"].shown("run/jog", "16")
     assert not Gait("a", ("x*",), ("y",)).shown("xa", "z")
+
+
+def test_a_folder_of_clips_gives_the_rows_that_training_has(tmp_path: Path) -> None:
+    """The database of SteerModel.from_clips beside that of the recipe: the same functions, by another way."""
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    records = []
+    for name, gaits, fps in (("idle", ("walk", "run"), 30.0), ("run_1", ("run",), 60.0), ("walk_1", ("walk",), 120.0)):
+        motion = named("root_sixd").motion(_recorded(name)).resample(fps)
+        motet.write(folder / f"{name}.bvh", motion)
+        records.append(Record(name, "a", read_motion(folder / f"{name}.bvh"), (), gaits=gaits))
+    model = motet.SteerModel.from_clips(folder)
+
+    # the recipe's way: a store, its recordings, their rows, and a net that is filled with them
+    store = prepare(records, tmp_path / "store", SIXD)
+    gaits = gaits_of(store)
+    names = tuple(gait.name for gait in gaits)
+    assert model.gaits == names
+    stored = rows_of(recordings(store, gaits), names, SteeringSettings())
+    contract = store.contract(range(len(records)))
+    config = MatchingConfig(len(contract.channels), tree_of(contract), len(stored), EVEN_CODES, ODD_CODES)
+    net = Matching(replace(config, features=stored.features.shape[1], gaits=names))
+    take(net, stored)
+    speeds = speeds_of(stored, SteeringSettings())
+    np.testing.assert_allclose(model.abilities.speeds, speeds, atol=0.011)
+    expected = net.tables()
+    for name in ("shows", "left"):
+        np.testing.assert_array_equal(model.tables[name], expected[name])
+    for name, off in (("features", 1), ("moves", 1e-3), ("feature_mean", 1e-4), ("pose_mean", 1e-4)):
+        np.testing.assert_allclose(model.tables[name].astype(float), expected[name].astype(float), atol=off)
+    # codes have any signs, poses have not
+    poses = [np.einsum("nk,kp->np", tables["codes"], tables["pose_basis"]) for tables in (model.tables, expected)]
+    np.testing.assert_allclose(poses[0], poses[1], atol=0.02)
+
+
+def _recorded(name: str) -> Motion:
+    """Features of the shipped figure on the way."""
+    scripts = {"walk_1": "walk 5s speed 1.2, turn left 90, walk 3s", "run_1": "run 5s speed 2.5", "idle": "stop 2s"}
+    return named("root_sixd").features(motet.load("control").run(scripts[name]))

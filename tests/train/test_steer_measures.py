@@ -14,10 +14,10 @@ from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.representation.contract import named
 from motet.steering.pose import Pose
+from motet.steering.recorded import Recording
+from motet.steering.rows import rows_of
 from motet.steering.settings import SteeringSettings
 from motet_train.data.cmu_trials import CMU_FOLDER
-from motet_train.data.matching_rows import rows_of
-from motet_train.data.recorded import Recording
 from motet_train.evaluate.positions import mean_and_tail, slides
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.following import (

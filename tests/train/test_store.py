@@ -14,6 +14,7 @@ from motet.errors import OutputError
 from motet.figures.humanoid import on_humanoid
 from motet.figures.humanoid.bones import HUMANOID, MIXAMO
 from motet.figures.humanoid.retarget import from_humanoid, to_humanoid
+from motet.figures.trimming import trim
 from motet.formats import read_motion, write_motion
 from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
@@ -22,7 +23,7 @@ from motet.representation.root_block import ROOT_BLOCK, from_root_block
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record, Skipped, read_corpus
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation, trim
+from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation
 from motet_train.data.store import Entry, Store, prepare, split
 
 PLAIN = Preparation("root_angles", humanoid=False, trim=False, cut=False)

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import bundle_option, naming, noted, session_options
+from motet.cli.options import bundle_option, clips_option, naming, noted, session_options, steered
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, size, write_options
 from motet.errors import ControlError
@@ -23,6 +23,7 @@ from motet.steering.scripts import parse_orders
 @click.argument("script")
 @out_option
 @bundle_option("control")
+@clips_option
 @click.option("--start", help="Where to start: a gait or label, or a motion file to continue.")
 @click.option("--seed", type=click.IntRange(0), help="Seed, for models with noise.  [default: 0]")
 @click.option(
@@ -46,6 +47,7 @@ def control(
     script: str,
     out: Path,
     bundle: str,
+    clips: Path | None,
     start: str | None,
     output: Output,
     session: SessionOptions,
@@ -60,7 +62,8 @@ def control(
     With --bundle tdbn: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     output.check(out)
-    model = load_as(ControlModel, bundle, session)
+    with noted():
+        model = steered(ControlModel, bundle, clips, session)
     chosen = {name: value for name, value in settings.items() if value is not None}
     if unknown := chosen.keys() - signature(model.run).parameters.keys():
         raise ControlError(f"{model!r} has no setting {', '.join(map(repr, sorted(unknown)))}")

@@ -7,7 +7,7 @@ import click
 
 from motet.bundle.graph import SessionOptions
 from motet.cli import missing
-from motet.cli.options import bundle_option, session_options
+from motet.cli.options import bundle_option, clips_option, session_options, steered
 from motet.files import check_place
 from motet.generate.base import GenerateModel
 from motet.live.page import write_live_page
@@ -28,6 +28,7 @@ from motet.steering.model import SteerModel
 )
 @click.option("--characters", type=click.IntRange(1), default=1, show_default=True, help="Initial number of figures.")
 @bundle_option("control")
+@clips_option
 @session_options
 def live(
     out: Path | None,
@@ -38,6 +39,7 @@ def live(
     origins: tuple[str, ...],
     characters: int,
     bundle: str,
+    clips: Path | None,
     session: SessionOptions,
 ) -> None:
     """Steer figures live: in a page (-o), by a server (--port), or onto an avatar (--osc).
@@ -51,13 +53,13 @@ def live(
     _check(out, port, osc, script)
     if out is not None:
         check_place(out)
-        write_live_page(out, load_as(SteerModel, bundle, session), characters)
+        write_live_page(out, steered(SteerModel, bundle, clips, session), characters)
         click.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB")
         return
     if lacking := missing("live"):
         raise click.UsageError(f"this needs {', '.join(lacking)}: install the extra with  pip install 'motet[live]'")
     target = None if osc is None else _address(osc)
-    model = load_as(SteerModel, bundle, session)
+    model = steered(SteerModel, bundle, clips, session)
     if port is not None:
         words = load_as(GenerateModel, "generate", session).ready()
         _serve(model, target, host, port=port, characters=characters, origins=origins, words=words)

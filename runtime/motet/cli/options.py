@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 
@@ -22,6 +22,7 @@ from motet.errors import (
     each_once,
     quoted,
 )
+from motet.models.load import Kind, load_as
 from motet.settings import Progress, silent
 
 log = logging.getLogger("motet")
@@ -30,6 +31,21 @@ log = logging.getLogger("motet")
 def bundle_option(default: str) -> Callable[..., Any]:
     """The option ``--bundle`` of a command that has a model by default."""
     return click.option("--bundle", default=default, show_default=True, help="Name or path of a bundle.")
+
+
+def clips_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command of steered figures ``--clips``, for :func:`steered`."""
+    help_text = "Folder of motion files, named walk_*, run_*, idle_*, to steer a figure by instead of a bundle."
+    return click.option("--clips", type=click.Path(path_type=Path), help=help_text)(command)
+
+
+def steered(kind: Callable[..., Kind], bundle: str, clips: Path | None, session: SessionOptions) -> Kind:
+    """The model of a bundle, or the one that is made of clips."""
+    if clips is None:
+        return load_as(kind, bundle, session)
+    from motet.steering.model import SteerModel  # here, as other commands do not need it
+
+    return cast(Kind, SteerModel.from_clips(clips))
 
 
 def session_options(command: Callable[..., Any]) -> Callable[..., Any]:

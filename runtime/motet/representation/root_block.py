@@ -203,6 +203,15 @@ def way(steps: Array, start: ArrayLike = (0.0, 0.0, 0.0), facing: float = 0.0) -
     return facings[1:], x[1:], z[1:]
 
 
+def poses_of(frames: Array, fps: float) -> Array:
+    """Where the root is and faces (T, 3) in frames (T, D) that begin with its velocities: x and z in metres, and facing
+    in radians; the first is at the origin."""
+    steps = frames[:, :3] / fps
+    steps[:1] = 0
+    facing, x, z = way(steps)
+    return np.stack([x, z, facing], axis=-1)
+
+
 def last_place(motion: Motion) -> Array:
     """The root's place (3,) in a motion's last frame, in metres."""
     return np.asarray(local_translations(motion[-1])[0, 0] * skeleton_of(motion).unit_factor(1.0))

@@ -1,13 +1,15 @@
 """Steer: figures that follow live controls over the ground."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from motet.bundle.bundle import write_bundle
 from motet.bundle.fields import LARGEST_NUMBER, Fields
 from motet.bundle.graph import Arrays, Floats, Graph
 from motet.bundle.manifest import Manifest
@@ -19,10 +21,11 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import rotmat_to_quat
 from motet.representation.root_block import way
 from motet.representation.root_sixd import ROOT_SIXD, SIXD_KINDS, joint_rotations
-from motet.settings import checked_int
+from motet.settings import Progress, checked_int, silent
 from motet.steering.acts import Act, ActSettings
 from motet.steering.avoidance import AvoidanceSettings
 from motet.steering.foot_lock import FootLockSettings
+from motet.steering.from_clips import Tags, bundled, made_of
 from motet.steering.gaits import Gaits
 from motet.steering.idle import IdleSettings
 from motet.steering.look_layer import LookSettings
@@ -38,6 +41,7 @@ from motet.steering.settings import SteeringSettings
 from motet.steering.spoken import Reading, words_for
 from motet.steering.step import LOOPS, PoseCodes
 from motet.steering.stepping import StepSettings
+from motet.steering.tables import FEATURE_STEPS
 from motet.steering.terrain import TerrainSettings
 from motet.steering.turn_limit import TurnSettings
 from motet.text.clauses import Shown
@@ -46,9 +50,6 @@ SPREAD_FROM = 32
 """Number of characters from which the searches of a session are spread over the ticks."""
 
 POSE_CHANNELS = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone, kind in product(BONES, SIXD_KINDS)))
-
-FEATURE_STEPS = 16
-"""Steps of a scaled unit of a feature in a table, whose features have 8 bits."""
 
 
 class SteerModel(ControlModel):
@@ -89,6 +90,34 @@ class SteerModel(ControlModel):
         self.sizes |= {"G": len(self.gaits), "F": FEATURES, "P": 4 * len(BONES) + 1}
         self.matcher = self._matcher(config, settings)
         self.pose_codes = self._pose_codes()
+
+    @classmethod
+    def from_clips(
+        cls,
+        clips: str | Path | Sequence[str | Path],
+        *,
+        tags: Tags | None = None,
+        progress: Progress = silent,
+    ) -> "SteerModel":
+        """The model of a figure that is steered by motion files of any human figures: no training, some seconds.
+
+        clips: a folder with all below it, or a list of files. Each clip shows what its name says: "walk", "run" (or
+            "jog"), "idle" (or "stand", "turn") for all gaits, "jump"; other names, such as "wave_02", are acts by their
+            words if they hardly travel, else gaits. A clip in place gets the path that its feet imply, with a
+            TravelWarning; one with "loop" in its name is repeated.
+        tags: of clips by their name without extension, or a pattern of it; None leaves them out:
+            ``{"take_07": "walk, run", "z_*": "limp", "broken": None}``.
+        progress: called with the number of clips done and in total.
+        FormatError for a folder without motion files; ArgumentError for tags of no clip; MotionError that names the
+        clips that cannot be read, are of no human or shorter than 1.5 s, and where nothing walks, or there is more than
+        an hour or 2,000 clips.
+        """
+        manifest, tables = made_of(clips, tags, progress)
+        return cls(manifest, {}, tables)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model as a bundle, a zip or a new folder, for :func:`motet.load`; OutputError if it cannot be."""
+        write_bundle(path, *bundled(self))
 
     def _pose_codes(self) -> PoseCodes:
         mean = self.table("pose_mean", "P", "float32")

@@ -13,7 +13,7 @@ from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.contract import named
-from motet_train.data.sixd_windows import poses_of
+from motet.representation.root_block import poses_of
 
 SHORTEST_ACT = 4.0
 """Shortest act, in seconds."""

@@ -16,7 +16,7 @@ from motet.generate.codec import nearest_moves, seen_from
 from motet.motion.rotations import Array
 from motet.representation import placed
 from motet.representation.base import FrameMirror
-from motet.representation.root_block import way
+from motet.representation.root_block import poses_of
 from motet_train.data.batches import Rows
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
@@ -111,14 +111,6 @@ def window_of(frames: Array, fps: float, book: Array, hop: int) -> Window:
 
 def _float_tensor(values: Array) -> Tensor:
     return torch.from_numpy(values.astype(np.float32))
-
-
-def poses_of(frames: Array, fps: float) -> Array:
-    """The root poses (T, 3) of frames (T, D) of ``root_sixd``: x, z and facing; the first is at the origin."""
-    steps = frames[:, :3] / fps
-    steps[:1] = 0
-    facing, x, z = way(steps)
-    return np.stack([x, z, facing], axis=-1)
 
 
 def with_way(frames: Array, poses: Array, book: Array, hop: int) -> tuple[Array, Codes, Array]:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotetError, MotionError
+from motet.figures.trimming import repeated
 from motet.files import new_folder
 from motet.jobs import Shard
 from motet.motion.motion import Motion
@@ -25,7 +26,7 @@ from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract, living, sequences
 from motet_train.data.corpus import Record, Skipped
 from motet_train.data.errors import DataError
-from motet_train.data.preparation import Preparation, repeated
+from motet_train.data.preparation import Preparation
 
 Floats = NDArray[np.float32]
 Item = Record | Skipped

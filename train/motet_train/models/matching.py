@@ -5,30 +5,13 @@ See :mod:`motet.steering.matching`, whose letters are used here; P = 4 J + 1 are
 
 from dataclasses import dataclass, field
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from motet.steering.tables import DTYPE_OF_TABLE, Speeds
 from motet_train.models.kinematics import SixdPlaces, Tree
 from motet_train.models.net import Graphs, Net, Tables
-
-Speeds = tuple[float, float, float, float, float]
-"""Of a gait in m/s: the slowest, the usual one, and the fastest forward, sideways and backwards; 0 where it does not go
-that way."""
-
-DTYPE_OF_TABLE = {
-    "codes": np.float16,
-    "moves": np.float32,
-    "features": np.int8,
-    "shows": np.uint8,
-    "left": np.int32,
-    "feature_mean": np.float32,
-    "feature_scale": np.float32,
-    "pose_mean": np.float32,
-    "pose_basis": np.float16,
-}
-"""Of the tables of a bundle, by name: :class:`motet.steering.model.SteerModel`."""
 
 
 @dataclass(frozen=True)

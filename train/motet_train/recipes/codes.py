@@ -12,11 +12,12 @@ from torch import Tensor
 
 from motet.generate.memory import Memory, MemorySettings, squared_distances
 from motet.representation.base import FrameMirror
+from motet.representation.root_block import poses_of
 from motet_train.data.acts import acts
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import Actions
-from motet_train.data.sixd_windows import CodeBatch, CodedMotion, Codes, CodeWindows, memory_of, poses_of, with_way
+from motet_train.data.sixd_windows import CodeBatch, CodedMotion, Codes, CodeWindows, memory_of, with_way
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms
 from motet_train.models.action_net import ActionNet

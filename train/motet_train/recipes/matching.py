@@ -5,21 +5,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.steering.foot_lock import FootLockSettings
-from motet.steering.matching import LEAST_PACE, is_faster, stride_velocities
-from motet.steering.model import FEATURE_STEPS
+from motet.steering.rows import MatchingRows, rows_of
 from motet.steering.settings import SteeringSettings
-from motet_train.data.matching_rows import MatchingRows, mirrored_poses, rows_of, scaling
+from motet.steering.tables import speeds_of, tables_of
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Terms
-from motet_train.models.kinematics import Tree, joint_weights, tree_of
-from motet_train.models.matching import Matching, MatchingConfig, Speeds
+from motet_train.models.kinematics import joint_weights, tree_of
+from motet_train.models.matching import Matching, MatchingConfig
 from motet_train.recipes.recipe import ADAMW, Job, Recipe
 from motet_train.runs import Run
 
@@ -75,7 +72,7 @@ def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, gai
         rows=len(rows),
         features=rows.features.shape[1],
         gaits=gaits,
-        speeds=tuple(_speeds(rows, in_gait, STEERING) for in_gait in rows.gaits.T),
+        speeds=speeds_of(rows, STEERING),
     )
     net = Matching(config)
     net.measure_by(contract.mean, contract.std)
@@ -107,115 +104,8 @@ def _learner(net: Matching, job: Job, contract: MotionContract, rows: MatchingRo
 @torch.no_grad()
 def take(net: Matching, rows: MatchingRows) -> None:
     """Fill a net with rows: their table, and as codes the principal components of poses and mirrored poses."""
-    mean, scale = (part.round(6) for part in scaling(rows.features))
-    values = {
-        **_pose_codes(rows.poses, net.config),
-        "moves": np.column_stack([rows.moves, rows.speed, rows.contacts]),
-        "features": np.clip(np.round((rows.features - mean) * scale * FEATURE_STEPS), -127, 127),
-        "shows": rows.gaits,
-        "left": rows.left,
-        "feature_mean": mean,
-        "feature_scale": scale,
-    }
-    for name, value in values.items():
+    for name, value in tables_of(rows, net.config.even, net.config.odd).items():
         getattr(net, name).copy_(torch.from_numpy(value))
-
-
-def _pose_codes(poses: Array, config: MatchingConfig) -> dict[str, Array]:
-    """Codes of poses (N, P), and the mean and the basis from which they are decoded."""
-    # relative to the mean of all poses and their mirror images, weighted by reach
-    columns, signs = mirrored_poses()
-    mean_pose = poses.mean(axis=0)
-    pose_mean = (mean_pose + mean_pose[columns] * signs) / 2
-    offsets = poses - pose_mean
-    weights = _reach(config.tree)
-
-    # components that a mirror image has alike, and with the other sign
-    mirrored = offsets[:, columns] * signs
-    even = _components((offsets + mirrored) / 2 * weights, config.even)
-    odd = _components((offsets - mirrored) / 2 * weights, config.odd)
-    basis = np.concatenate([even, odd])
-    return {"codes": offsets * weights @ basis.T, "pose_mean": pose_mean, "pose_basis": basis / weights}
-
-
-def _components(offsets: Array, count: int) -> Array:
-    """The first ``count`` principal components (count, P) of offsets (N, P), by about 4,000 of them."""
-    every = max(1, len(offsets) // 4000)
-    _, _, components = np.linalg.svd(offsets[::every], full_matrices=False)
-    first: Array = components[:count]
-    return first
-
-
-def _reach(tree: Tree) -> Array:
-    """The weight (P,) of each number of a pose: for a bone's quaternion the metres to the farthest joint that it
-    carries, at least 5 cm."""
-    # places of joints at rest
-    places = np.zeros((len(tree.parents), 3))
-    for joint, parent in enumerate(tree.parents):
-        if parent >= 0:
-            places[joint] = places[parent] + tree.offsets[joint]
-    # the farthest joint that each bone carries
-    reach = []
-    for bone in tree.bones:
-        carried = [bone]
-        for joint, parent in enumerate(tree.parents):
-            if parent in carried:
-                carried.append(joint)
-        reach.append(np.linalg.norm(places[carried] - places[bone], axis=1).max())
-    return np.append(np.repeat(np.maximum(reach, 0.05), 4), 1.0)
-
-
-def _speeds(rows: MatchingRows, in_gait: NDArray[np.bool_], settings: SteeringSettings) -> Speeds:
-    """The speeds that a gait allows, as its rows can be played slower and faster; all 0 if it has no moving rows.
-
-    The lowest is the 30th percentile of its moving rows, with shorter strides, or the slowest pace if that is a creep.
-    The highest in each direction is the 90th percentile of its rows, or, if that is less, as for side steps, of means
-    over a stride, with the longest strides; 0 for directions with at most a second of rows.
-    """
-    speed = rows.speed[in_gait]
-    moving = speed > settings.idle
-    if not moving.any():
-        return (0.0,) * 5
-
-    # rows, and means over a stride, by their direction: ahead, aside or back
-    sectors = _sectors(rows.moves[in_gait], settings, right=True)
-    strides = stride_velocities(rows.moves[:, :2], rows.left)[in_gait]
-    stride_speeds = np.hypot(*strides.T)
-    stride_moving = stride_speeds > settings.idle
-    stride_sectors = _sectors(strides, settings, right=False)
-    fastest = []
-    for sector in range(3):
-        row_speeds = speed[moving & (sectors == sector)]
-        long_speeds = stride_speeds[stride_moving & (stride_sectors == sector)]
-        fastest.append(_fastest(row_speeds, long_speeds, settings))
-    ahead, aside, back = fastest
-    return _slowest(speed, moving, settings), _median(speed[moving & (sectors == 0)]), ahead, aside, back
-
-
-def _median(speeds: Array) -> float:
-    """The median of speeds, m/s."""
-    return round(float(np.median(speeds)), 2)
-
-
-def _sectors(velocities: Array, settings: SteeringSettings, right: bool) -> NDArray[np.intp]:
-    """The direction (N,) of velocities (N, 2 or more), forward and left: 0 ahead, 1 aside, 2 back. right: whether an
-    angle on a bound counts as the smaller one."""
-    angles = np.abs(np.arctan2(velocities[:, 1], velocities[:, 0]))
-    return np.digitize(angles, (settings.aside, settings.back), right=right)
-
-
-def _slowest(speed: Array, moving: NDArray[np.bool_], settings: SteeringSettings) -> float:
-    """The lowest speed of a gait by the speeds of its rows, m/s."""
-    slowest = round(float(np.percentile(speed[moving], 30.0)) * settings.slowest * settings.shortest, 2)
-    return LEAST_PACE if slowest <= settings.creep and is_faster(speed, settings) else slowest
-
-
-def _fastest(row_speeds: Array, stride_speeds: Array, settings: SteeringSettings) -> float:
-    """The highest speed of a direction by the speeds of its rows and strides, m/s; 0 for too few."""
-    if len(row_speeds) <= 30 or not len(stride_speeds):
-        return 0.0
-    by_strides = np.percentile(stride_speeds, 90.0) * settings.longest
-    return round(float(min(np.percentile(row_speeds, 90.0), by_strides) * settings.fastest), 2)
 
 
 def _rotations(poses: Tensor) -> Tensor:

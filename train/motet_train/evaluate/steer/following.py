@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from motet.bundle.graph import Floats
 from motet.figures.humanoid import sole_points
 from motet.motion.rotations import Array, quat_to_rotmat, wrapped
+from motet.representation.root_block import poses_of
 from motet.representation.root_sixd import ROOT_SIXD
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
+from motet.steering.recorded import Recording
+from motet.steering.rows import MatchingRows
 from motet.steering.session import SteerSession
-from motet_train.data.matching_rows import MatchingRows
-from motet_train.data.recorded import Recording
-from motet_train.data.sixd_windows import poses_of
 from motet_train.evaluate.positions import (
     BALLS,
     Flags,

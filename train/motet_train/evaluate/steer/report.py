@@ -19,10 +19,11 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
+from motet.steering.recorded import Recording
+from motet.steering.rows import rows_of
 from motet.steering.settings import SteeringSettings
 from motet_train.data.errors import DataError
-from motet_train.data.matching_rows import rows_of
-from motet_train.data.recorded import Recording, gaits_of, recordings
+from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import Flags, mean_and_tail
 from motet_train.evaluate.steer.commands import act_figures, going_figures, said_acts

@@ -22,8 +22,9 @@ from motet.representation.contract import MotionContract, living
 from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
 from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.pose import Pose
+from motet.steering.recorded import Recording
 from motet_train.data.errors import DataError
-from motet_train.data.recorded import Recording, gaits_of, recordings
+from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.data.table import Gait
 from motet_train.papers.tdbn.rbm import Learning

@@ -15,13 +15,13 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
+from motet.representation.root_block import poses_of
 from motet.representation.root_sixd import ROOT_SIXD, joint_rotations
 from motet.steering.acts import foot_contacts, pose_features
 from motet.steering.matching import HORIZONS, horizons, mirrored_features, speed_feature
 from motet.steering.pose import seen
+from motet.steering.recorded import Recording
 from motet.steering.settings import SteeringSettings
-from motet_train.data.recorded import Recording
-from motet_train.data.sixd_windows import poses_of
 
 GROUPS = {
     "places": (2 * HORIZONS, 1.0),
@@ -73,8 +73,8 @@ class MatchingRows:
 def rows_of(recordings: list[Recording], gaits: tuple[str, ...], settings: SteeringSettings) -> MatchingRows:
     """The rows of recordings on the humanoid; quaternions of a bone lie on one half of their sphere where possible.
 
-    Jumps have speed 0, so that they are never time-stretched: a falling body has its own rate. Rows of leaps within
-    other gaits belong to no gait, so that no search ends in them.
+    Recordings that are played as recorded, such as jumps, have speed 0, so that they are never time-stretched: a
+    falling body has its own rate. Rows of leaps within other gaits belong to no gait, so that no search ends in them.
     """
     # compute each recording on its own, and concatenate
     parts = [_rows(recording.features, settings) for recording in recordings]
@@ -84,11 +84,11 @@ def rows_of(recordings: list[Recording], gaits: tuple[str, ...], settings: Steer
     # the gaits of each recording, for each of its rows
     gait_table = [_shown_gaits(recording, gaits) for recording in recordings]
     shown = np.repeat(gait_table, lengths, axis=0)
-    # jumps have no speed, and leaps no gait
-    jumps = np.repeat([recording.gaits <= {"jump"} for recording in recordings], lengths)
+    # what is played as recorded has no speed, and leaps no gait
+    as_recorded = np.repeat([recording.as_recorded for recording in recordings], lengths)
     airborne = contacts.max(axis=1) < settings.stands
-    shown[~jumps & _leaps(airborne, recordings[0].features.fps)] = False
-    speed = np.where(jumps, 0.0, speed)
+    shown[~as_recorded & _leaps(airborne, recordings[0].features.fps)] = False
+    speed = np.where(as_recorded, 0.0, speed)
     return MatchingRows(_aligned(poses), moves, speed, contacts, features, shown, left)
 
 
@@ -99,17 +99,17 @@ def _shown_gaits(recording: Recording, gaits: tuple[str, ...]) -> list[bool]:
 def _leaps(airborne: NDArray[np.bool_], fps: float) -> NDArray[np.bool_]:
     """The rows (N,) of flights of :data:`LEAP_DISTANCE` seconds and more, and of :data:`LEAP_MARGIN_SECONDS` seconds
     before and after."""
-    from scipy.ndimage import binary_dilation, binary_opening  # here, so that other trainings do not load scipy
+    # rows in the middle of a long enough flight, all of that flight, and what is around it
+    flight = round(LEAP_DISTANCE * fps / 2)
+    middle = np.asarray(_near(airborne, flight).all(axis=1))
+    margin = round(LEAP_MARGIN_SECONDS * fps)
+    return np.asarray(_near(middle, flight + margin).any(axis=1))
 
-    shortest = _window(LEAP_DISTANCE, fps)
-    around = _window(2 * LEAP_MARGIN_SECONDS, fps)
-    leaps: NDArray[np.bool_] = binary_dilation(binary_opening(airborne, shortest), around)
-    return leaps
 
-
-def _window(seconds: float, fps: float) -> NDArray[np.bool_]:
-    """A window of an odd number of frames."""
-    return np.ones(2 * round(seconds * fps / 2) + 1, dtype=bool)
+def _near(flags: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """For each of the flags (N,) those from ``reach`` before to ``reach`` after it (N, 2 reach + 1), false beyond the
+    ends."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(flags, reach), 2 * reach + 1)
 
 
 def _rows(features: Motion, settings: SteeringSettings) -> tuple[Array, Array, Array, Array, Array]:
