@@ -258,6 +258,7 @@ def crouching(frames: int = 24) -> list[list[float]]:
 GROUNDS: dict[str | None, Callable[[Array, Array], Array]] = {
     "stairs": lambda x, z: 0.17 * np.clip(np.floor((z - 2.3) / 0.29), 0, 8),
     "hills": lambda x, z: 0.3 * np.sin(0.7 * x) + 0.02 * z * z,
+    "ridges": lambda x, z: 0.15 * np.sin(6 * z),
 }
 """Heights of the ground, which tests/cases.ts has, too."""
 
@@ -300,6 +301,16 @@ STEERED: list[dict[str, Any]] = [
     *[{}] * 6,
     {"control": {"speed": 0.0, "facing": [100.0, 20.0]}},
     *[{}] * 4,
+    # head on, and then from too near
+    {"put": [[0.0, -1.5, 0.0], [0.1, 1.5, 180.0]], "keep_apart": 0.8, "go_to": {"points": [[0.0, 1.5], [0.1, -1.5]]}},
+    *[{}] * 3,
+    {"put": [[0.0, 0.0, 0.0], [0.35, 0.1, 10.0]], "go_to": {"points": [[0.3, 2.0], [0.1, 2.0]]}},
+    {},
+    # looks up and far behind; slopes about as steep as feet are tilted to
+    {"put": [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]], "keep_apart": None, "go_to": {"points": None}},
+    {"look_at": {"points": [[0.3, 4.0, 0.6], [2.3, 1.5, -1.5]]}, "set_ground": "ridges"},
+    {"control": {"gait": "walk", "speed": 1.0, "direction": 0.0}},
+    {},
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
 :func:`turning_about`, and for "crouch" :func:`crouching`."""

@@ -298,6 +298,7 @@ async function steersTargets(read: Read): Promise<void> {
 const GROUNDS = {
   stairs: (_: number, z: number) => 0.17 * Math.min(Math.max(Math.floor((z - 2.3) / 0.29), 0), 8),
   hills: (x: number, z: number) => 0.3 * Math.sin(0.7 * x) + 0.02 * z * z,
+  ridges: (_: number, z: number) => 0.15 * Math.sin(6 * z),
 };
 
 /** The calls of python.json, and some pictures of each, with the feet held and without. */
