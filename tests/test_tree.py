@@ -99,7 +99,7 @@ CEILINGS = {
     "motet.serve": 17_100,
     "motet.steering": 57_400,
     "motet.text": 5_400,
-    "motet_export": 11_400,
+    "motet_export": 11_800,
     "motet_train": 9_500,
     "motet_train.cli": 8_600,
     "motet_train.data": 18_900,

@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -90,6 +90,7 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
     model.doc_string = ""
     del model.metadata_props[:]
     _strip(model.graph)
+    _flatten(model.graph, _ranks(model))
     for key, value in metadata.items():
         model.metadata_props.add(key=key, value=value)
     # the first IR version with this opset, which every ONNX Runtime from 1.14 on reads
@@ -120,6 +121,46 @@ def _strip(graph: onnx.GraphProto) -> None:
             for body in (attribute.g, *attribute.graphs):
                 if body.node:
                     _strip(body)
+
+
+def _flatten(graph: onnx.GraphProto, ranks: Mapping[str, int]) -> None:
+    """Store the weights (1, I, O) of products as (I, O): when it loads a graph, ONNX Runtime packs only matrices.
+
+    ranks: the number of axes of each tensor in between. A factor of three axes or more keeps them in the product.
+    """
+    # the tensors by the names that nodes read them by: those in 16 bits by the name of their cast
+    tensors = {tensor.name: tensor for tensor in graph.initializer}
+    for node in graph.node:
+        if node.op_type == "Cast" and node.input[0] in tensors:
+            tensors[node.output[0]] = tensors[node.input[0]]
+    for name in _factors(graph.node, ranks) & tensors.keys():
+        if len(tensors[name].dims) == 3 and tensors[name].dims[0] == 1:
+            del tensors[name].dims[0]
+    # shapes that were inferred before
+    kept = [value for value in graph.value_info if value.name not in tensors]
+    del graph.value_info[:]
+    graph.value_info.extend(kept)
+
+
+def _factors(nodes: Iterable[onnx.NodeProto], ranks: Mapping[str, int]) -> set[str]:
+    """What nodes read only as the second factor of a product whose first one has three axes or more."""
+    factors: set[str] = set()
+    others: set[str] = set()
+    for node in nodes:
+        is_product = node.op_type == "MatMul" and ranks.get(node.input[0], 0) > 2
+        (factors if is_product else others).update(node.input[1:])
+        if node.op_type != "Cast":
+            others.add(node.input[0] if node.input else "")
+        for attribute in node.attribute:
+            for inner in attribute.g.node:
+                others.update(inner.input)
+    return factors - others
+
+
+def _ranks(model: onnx.ModelProto) -> dict[str, int]:
+    """The number of axes of each tensor between a graph's inputs and outputs."""
+    values = onnx.shape_inference.infer_shapes(model).graph.value_info
+    return {value.name: len(value.type.tensor_type.shape.dim) for value in values}
 
 
 @torch.no_grad()

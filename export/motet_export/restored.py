@@ -90,7 +90,7 @@ def _restore(
         if weight.numel() > like.numel():
             # a bias followed by zeros
             weight = weight[:, None, : like.shape[-1]]
-        elif not np.array_equal(random[tensor], like.numpy()):
+        elif random[tensor].tobytes() != like.numpy().tobytes():
             weight = weight.mT
         # a scale of 0 is stored as the infinity by which the exporter divides
         state[name].copy_(torch.where(weight.isinf(), 0, weight))

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
-from motet_export.exporter import ExportError, export_graph, self_contained
+from motet_export.exporter import ExportError, export_graph, halved, round_weights, self_contained
 from motet_export.parity import check_carried, check_one_step, error
 from motet_train.runs import TorchGraph
 
@@ -78,6 +78,36 @@ def test_error_is_relative_to_large_outputs_and_refuses_what_is_not_finite() -> 
         error({"a": np.array([np.nan])}, {"a": np.array([0.0])})
     with pytest.raises(ExportError, match="shape"):
         error({"a": np.zeros(2)}, {"a": np.zeros(3)})
+
+
+class Stacked(nn.Module):
+    """Products with a stack of one matrix: of a stack of rows, and of the rows alone, whose product gets an axis."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        torch.manual_seed(0)
+        self.packed, self.spread = nn.Parameter(torch.randn(1, 4, 4)), nn.Parameter(torch.randn(1, 3, 4))
+
+    def forward(self, state: Tensor, push: Tensor) -> tuple[Tensor, Tensor]:
+        next_state = (state[None] @ self.packed + push @ self.spread)[0]
+        return next_state[:, :2], next_state
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_a_stack_of_one_matrix_is_stored_as_a_matrix(half: bool) -> None:
+    # large enough to be stored in 16 bits
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("motet_export.exporter.SMALLEST_QUANTISED", 12)
+        net = Stacked()
+        round_weights(net)
+        data = export_graph(net, SPEC, {})
+        if half:
+            data = halved(data)
+    shapes = {tensor.name: list(tensor.dims) for tensor in onnx.load_from_string(data).graph.initializer}
+    ending = ".small" if half else ""
+    assert shapes[f"packed{ending}"] == [4, 4]
+    assert shapes[f"spread{ending}"] == [1, 3, 4]
+    assert check_one_step("step", OnnxGraph(data, SPEC), TorchGraph(net, SPEC))["error"] <= 1e-6
 
 
 def test_the_bodies_of_loops_are_stripped(exported: bytes) -> None:
