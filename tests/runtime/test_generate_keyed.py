@@ -8,7 +8,7 @@ import pytest
 import motet
 import motet.keyed
 from motet.figures.humanoid import HUMANOID
-from motet.generate.keyed_acts import act_named
+from motet.generate.keyed_acts import act_named, without_subject
 from motet.motion.kinematics import global_transforms
 
 
@@ -34,6 +34,32 @@ def model() -> motet.CodesModel:
 def test_an_act_is_named_by_all_words_and_no_others(words: str, name: str | None) -> None:
     named = act_named(words.split())
     assert (named and named.act.name) == name
+
+
+@pytest.mark.parametrize(
+    ("words", "left"),
+    [
+        ("my avatar nods", "nods"),
+        ("the old wizard bows", "bows"),
+        ("the robot salutes", "salutes"),  # there is a robot dance
+        ("avatar shakes its head", "shakes its head"),
+        ("she claps her hands excitedly", "claps her hands"),
+        ("she claps quickly", "claps quickly"),  # a pace
+        ("a man on a horse claps", "a man on a horse claps"),
+        ("the nod", "the nod"),
+        ("drum claps", "drum claps"),
+        ("nod", "nod"),
+    ],
+)
+def test_who_acts_and_in_which_manner_names_no_act(words: str, left: str) -> None:
+    assert without_subject(words.split()) == left.split()
+
+
+def test_whoever_does_it_an_act_is_shown(model: motet.CodesModel) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert model.generate("My avatar nods three times.", seconds=5)[0].action == "nod"
+        assert model.generate("the presenter points to the left")[0].action == "point left"
 
 
 def test_a_side_is_that_of_the_hand() -> None:

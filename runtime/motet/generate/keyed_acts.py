@@ -1,7 +1,7 @@
 """Acts by key poses (:mod:`motet.keyed`) as generated motions: which sentences name one, and how it is laid over a
 figure that stands."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -13,6 +13,7 @@ from motet.keyed.keys import mirrored_keys
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, stem
+from motet.text.numeric_phrases import PACE_PHRASES
 
 BASE_SENTENCE = "a person stands still"
 """The sentence of what they are laid over."""
@@ -22,6 +23,11 @@ IDLE_STEMS = frozenset(map(stem, (*FUNCTION_WORDS, "does", "makes", "gives", "hu
 
 BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
 """Stems of words that orders may begin with, and that are no verbs: "hands on hips"."""
+
+ARTICLES = frozenset(("a", "an", "the", "my", "our", "your"))
+
+LONGEST_SUBJECT = 3
+"""Words before a verb that may say who acts: "the old wizard"."""
 
 MOST_HURRIED = 2.0
 """How many times as fast an act is played at most."""
@@ -89,6 +95,31 @@ def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozens
         for sentence, of_sentence in sentences.items():
             if of_sentence and of_sentence <= stems:
                 yield name, sentence, of_sentence
+
+
+def without_subject(words: Sequence[str]) -> list[str]:
+    """Lower-case words without who acts and in which manner: of "the elf claps its hands happily" claps its hands.
+
+    A subject has up to :data:`LONGEST_SUBJECT` words, before the verb of an act in the third person; without an article
+    none of them is a word of acts. A manner is an adverb that is neither a pace nor a word of acts.
+    """
+    of_acts = _stems_of_acts()
+    kept = list(words)
+    for count in range(1, min(LONGEST_SUBJECT, len(words) - 1) + 1):
+        is_subject = words[0] in ARTICLES or stems_of(words[:count]).isdisjoint(of_acts)
+        if is_subject and stem(words[count]) in verbs() and words[count].endswith("s"):
+            kept = kept[count:]
+            break
+    return [word for word in kept if not word.endswith("ly") or PACE_PHRASES.search(word) or stem(word) in of_acts]
+
+
+@cache
+def _stems_of_acts() -> frozenset[str]:
+    """The stems of all words of all acts."""
+    of_acts = set[str]()
+    for sentences in _sentences().values():
+        of_acts.update(*sentences.values())
+    return frozenset(of_acts)
 
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:

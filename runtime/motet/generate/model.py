@@ -29,7 +29,7 @@ from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecode
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
-from motet.generate.keyed_acts import BASE_SENTENCE, NamedAct, act_named, stems_of
+from motet.generate.keyed_acts import BASE_SENTENCE, NamedAct, act_named, stems_of, without_subject
 from motet.generate.keyed_acts import verbs as keyed_verbs
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
@@ -255,6 +255,10 @@ class CodesModel(GenerateModel):
         words = self.vocabulary.rules.words(sentence)
         act = act_named(words) or self._keyed_counted(sentence)
         if act is None:
+            words = without_subject(words)
+            sentence = " ".join(words)
+            act = act_named(words)
+        if act is None:
             return None
         if act.is_small:
             return act
@@ -273,7 +277,9 @@ class CodesModel(GenerateModel):
             return None
         if quantities.amounts.keys() != {"times"}:
             return None
-        named = act_named(self.vocabulary.rules.words(quantities.text), quantities.amounts["times"])
+        words = self.vocabulary.rules.words(quantities.text)
+        times = quantities.amounts["times"]
+        named = act_named(words, times) or act_named(without_subject(words), times)
         # One that cannot be repeated gives way to a command's, which can.
         if named and not named.act.repeat and self._commands.act(quantities.text) is not None:
             return None
