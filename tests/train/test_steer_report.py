@@ -92,7 +92,7 @@ def report(model: SteerModel, store: Store) -> Any:
 
 def test_all_is_measured_beside_recordings_and_the_rival(report: Any) -> None:
     groups = ["walk", "run", "speed", "turn_walk", "turn_run", "aside", "creep", "ways_walk", "ways_run"]
-    groups += ["reversals", "stick", "slow_side", "spot_turn", "wild_stick", "stops", "standing", "random"]
+    groups += ["reversals", "stick", "random", "slow_side", "spot_turn", "wild_stick", "stops", "standing"]
     groups += ["act_standing", "act_walk", "act_run"]
     groups += ["cut_standing", "cut_walk", "cut_run", "reach"]
     for gait in ("walk", "run"):

@@ -163,7 +163,7 @@ def test_the_presets_are_the_papers_and_its_codes(data: Path) -> None:
     assert settings(paper) == (64, 2e-4, 0.001)
     assert settings(code) == (16, 5e-5, 0.0005)
     assert sized(paper, material) == Config(70)
-    assert sized(code, material) == Config(70, dropout=(0.2, 0.2, 0.5), own=0.95)
+    assert sized(code, material) == Config(70, dropout=(0.2, 0.2, 0.5), predicted_share=0.95)
     human = replace(material, layout=H36M_LAYOUT)
     assert sized(paper, human) == Config(70, padding="same")
     assert sized(code, human).padding == "same"

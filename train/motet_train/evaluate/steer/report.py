@@ -358,20 +358,22 @@ def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Meas
         measures[f"ways_{gait}"] = partial(ways_errors, gait=gait)
     measures["reversals"] = reversal_figures
     measures["stick"] = stick_figures
-    measures["slow_side"] = slow_side_figures
-    measures["spot_turn"] = spot_turn_figures
-    measures["wild_stick"] = wild_stick_figures
-    measures["stops"] = stop_figures
-    measures["standing"] = minute_figures
     # for the minutes that a user waits longest
     measures["random"] = partial(wandering, limits=limits, seconds=60 * minutes, characters=characters)
     return measures
 
 
 def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
-    """Group -> its measure, for models that act, reach, and go to points."""
+    """Group -> its measure, for models that plan steps, act, reach, and go to points."""
     acts = said_acts(model)
-    measures: dict[str, Measure] = {"act_standing": partial(act_figures, acts=acts, leap=limits.leap, gait=None)}
+    measures: dict[str, Measure] = {
+        "slow_side": slow_side_figures,
+        "spot_turn": spot_turn_figures,
+        "wild_stick": wild_stick_figures,
+        "stops": stop_figures,
+        "standing": minute_figures,
+        "act_standing": partial(act_figures, acts=acts, leap=limits.leap, gait=None),
+    }
     for gait in MEASURED_SPEEDS:
         measures[f"act_{gait}"] = partial(act_figures, acts=acts, leap=limits.leap, gait=gait)
     measures["cut_standing"] = partial(cut_figures, acts=acts, gait=None)
