@@ -346,6 +346,16 @@ def _parts(model: SteerModel, recorded: Recorded, minutes: float, characters: in
     yield {"random_held": {"largest_turn": float(limits.turn.max()), "largest_leap": 1.0}}
 
 
+STEP_MEASURES: Mapping[str, Measure] = {
+    "slow_side": slow_side_figures,
+    "spot_turn": spot_turn_figures,
+    "wild_stick": wild_stick_figures,
+    "stops": stop_figures,
+    "standing": minute_figures,
+}
+"""Of models that plan steps."""
+
+
 def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Measure]:
     """Group -> its measure, for all steered models."""
     measures: dict[str, Measure] = {gait: partial(gait_figures, gait=gait) for gait in MEASURED_SPEEDS}
@@ -366,14 +376,8 @@ def _measures(limits: Limits, minutes: float, characters: int) -> dict[str, Meas
 def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
     """Group -> its measure, for models that plan steps, act, reach, and go to points."""
     acts = said_acts(model)
-    measures: dict[str, Measure] = {
-        "slow_side": slow_side_figures,
-        "spot_turn": spot_turn_figures,
-        "wild_stick": wild_stick_figures,
-        "stops": stop_figures,
-        "standing": minute_figures,
-        "act_standing": partial(act_figures, acts=acts, leap=limits.leap, gait=None),
-    }
+    measures = dict(STEP_MEASURES)
+    measures["act_standing"] = partial(act_figures, acts=acts, leap=limits.leap, gait=None)
     for gait in MEASURED_SPEEDS:
         measures[f"act_{gait}"] = partial(act_figures, acts=acts, leap=limits.leap, gait=gait)
     measures["cut_standing"] = partial(cut_figures, acts=acts, gait=None)
