@@ -26,6 +26,8 @@ def model() -> motet.CodesModel:
         ("waves with left", "wave"),
         ("walk", None),
         ("nod and walk", None),
+        ("a person stands", None),
+        ("stand on your toes", "rise on tiptoes"),
         ("salute the flag", None),
         ("a person", None),
         ("", None),

@@ -18,8 +18,11 @@ from motet.text.numeric_phrases import PACE_PHRASES
 BASE_SENTENCE = "a person stands still"
 """The sentence of what they are laid over."""
 
-IDLE_STEMS = frozenset(map(stem, (*FUNCTION_WORDS, "does", "makes", "gives", "human", "subject", "please")))
-"""Stems of words that name no act."""
+IDLE_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
+"""Stems of verbs that name no act."""
+
+IDLE_WORDS = FUNCTION_WORDS | {"human", "humans", "subject", "subjects", "persons", "please"}
+"""Words that name no act; not their stems, as that of toes is to."""
 
 BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
 """Stems of words that orders may begin with, and that are no verbs: "hands on hips"."""
@@ -124,7 +127,7 @@ def _stems_of_acts() -> frozenset[str]:
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
     """The stems of words that name an act."""
-    return frozenset(map(stem, words)) - IDLE_STEMS
+    return frozenset(stem(word) for word in words if word not in IDLE_WORDS) - IDLE_VERBS
 
 
 @cache

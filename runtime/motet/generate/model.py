@@ -309,7 +309,7 @@ class CodesModel(GenerateModel):
 
     def _shown_at_once(self, quantities: Quantities, parts: Sequence[str]) -> bool:
         """Whether the likeliest action of a sentence shows all its parts, and no part has numbers of its own."""
-        if self.lacking(quantities.text) or any(map(self._keyed, parts)):
+        if self.lacking(quantities.text):
             return False
         for part in parts:
             amounts = dict(quantities_of(part).amounts)
