@@ -18,10 +18,10 @@ from motet.text.numeric_phrases import PACE_PHRASES
 BASE_SENTENCE = "a person stands still"
 """The sentence of what they are laid over."""
 
-IDLE_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
+FILLER_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
 """Stems of verbs that name no act."""
 
-IDLE_WORDS = FUNCTION_WORDS | {"human", "humans", "subject", "subjects", "persons", "please"}
+FILLER_WORDS = FUNCTION_WORDS | {"human", "humans", "subject", "subjects", "persons", "please"}
 """Words that name no act; not their stems, as that of toes is to."""
 
 BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
@@ -127,7 +127,7 @@ def _stems_of_acts() -> frozenset[str]:
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
     """The stems of words that name an act."""
-    return frozenset(stem(word) for word in words if word not in IDLE_WORDS) - IDLE_VERBS
+    return frozenset(stem(word) for word in words if word not in FILLER_WORDS) - FILLER_VERBS
 
 
 @cache
