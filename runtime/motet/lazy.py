@@ -27,6 +27,7 @@ def lazily(package: str, places: Mapping[str, str]) -> Callable[[str], Any]:
             value = import_module(f"{package}.{name}")
         else:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        # found at once from the second time on
         setattr(sys.modules[package], name, value)
         return value
 

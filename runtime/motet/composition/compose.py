@@ -327,6 +327,7 @@ def _through(motion: Motion, poses: Mapping[int, Array]) -> Motion:
     """The motion that comes to poses (1, E), wherever the figure is at their frames, and leaves them."""
     moves = _moves(motion)
     keys = {}
+    # the pose where the figure is at its frame, at its own height
     for at, pose in poses.items():
         place_of_figure = pose_of(placed(motion[at])[0])
         pose_there = unplaced(put_at(seen_from(pose, pose_of(pose[0])), place_of_figure), motion)

@@ -69,6 +69,7 @@ class Moment:
             motions_of([self.pose])
         place = self.place
         motion = self.pose
+        # a time and at least what is asked for at it, each within its range
         if not (is_number(self.at) and 0 <= self.at <= LONGEST_COMPOSITION):
             raise SettingError(f"at must be 0 to {LONGEST_COMPOSITION:g} s, not {self.at!r}")
         if self.text is not None and not (isinstance(self.text, str) and self.text.strip()):
@@ -129,6 +130,7 @@ def parse_plan(script: str, read: Reader = read_motion) -> list[Moment]:
         if not match or re.match(r"(at|facing|pose)\b", match["text"] or ""):
             where = "expected a time, then at X Z, facing DEGREES, pose FILE@SECONDS, a prompt, in this order"
             raise ScriptError(script, start, f'{where}, such as "3s at 0 3 facing 90 a person waves"')
+        # what the part says, in its own types
         numbers = {key: float(match[key]) for key in ("at", "facing", "pose_at") if match[key]}
         place = (float(match["x"]), float(match["z"])) if match["x"] else None
         pose = read(Path(match["pose"])) if match["pose"] else None

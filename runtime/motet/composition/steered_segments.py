@@ -94,6 +94,7 @@ def gait_of(text: str, model: SteerModel) -> Gait | None:
     named = [GAIT_STEMS[word] for word in words if GAIT_STEMS.get(word) in model.gaits]
     if not named or not all(word in GAIT_STEMS or word in EASY or word in BACKWARD_STEMS for word in words):
         return None
+    # backwards has a top speed of its own
     back = not BACKWARD_STEMS.isdisjoint(words)
     low, usual, ahead, _, backwards = model.abilities.speeds[model.abilities.number(named[-1])].tolist()
     high = backwards if back else ahead
@@ -126,10 +127,12 @@ def _ticked(session: SteerSession, walk: Walk, ground: Array, fps: float) -> lis
 
 def _take_over(session: SteerSession, model: SteerModel, motion: Motion) -> Array:
     """Put a session's figure where a motion ends, in its pose and at its speed; returns x, z and facing (3,)."""
+    # place and facing of the last frame
     x, z = local_translations(motion[-6:])[:, 0, [0, 2]].T
     ground = np.array([x[-1], z[-1], facing(motion[-60:])[-1]])
     session.take(model.pose_of(motion[-60:]))
     session.put((x[-1], z[-1], math.degrees(ground[2])))
+    # the speed of the last fifth of a second
     direction = np.array([np.sign(x[-1] - x[0]), np.sign(z[-1] - z[0])])
     session.push(np.array([np.ptp(x), np.ptp(z)]) * direction * model.fps / 5)
     return ground

@@ -127,6 +127,7 @@ def _described(motion: Motion, file: str | Path, clip: Clip, figure: Figure, for
     figure = named_figure if figure is None else figure
     path = place_of(unnamed)
     parts = contents_of(path, format=format)
+    # the first clip of several is read where none is named
     if clip is None and figure is None and parts.clips:
         clip = 1
     clip_index, figure_index = choice(path, parts, clip, figure)

@@ -98,13 +98,16 @@ class Part:
         """How many answers it has; what was being written when it was stopped is cut off. OutputError where they are
         not those of the first sources."""
         file.seek(0)
+        # a line without an end was being written
         lines = [line for line in file if line.endswith(b"\n")]
         file.truncate(sum(map(len, lines)))
         file.seek(0, os.SEEK_END)
         if not lines:
             _append(file, json.dumps({**self.about, "answers": len(sources)}))
             return 0
+        # the part is of the same work
         self._check(_checked_head(lines[0], path), path)
+        # and each answer is that of its motion
         kept = lines[1:]
         for number, (line, source) in enumerate(zip(kept, sources, strict=False), start=2):
             answer = _checked_answer(line, path, number)

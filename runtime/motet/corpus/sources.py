@@ -153,6 +153,7 @@ def sources_of(file: Path, clip: str | None = None, figure: str | None = None, e
         figure = named_figure
     if clip != "all" and figure != "all":
         return [Source(path, clip, figure)]
+    # each clip of each figure that is meant
     parts = Source(path).contents()
     titles: list[str | None] = [figure]
     if figure == "all":
@@ -184,6 +185,7 @@ def opened(path: Path) -> Iterator[Path]:
     if member is None and (url is None or path.exists()):
         yield path
         return
+    # unpacked or fetched into a folder of its own, which no message names
     with tempfile.TemporaryDirectory(prefix="motet-") as folder:
         if member is None:
             box = path.parent

@@ -310,12 +310,14 @@ def _leg(start: Array) -> Limb:
 
 def _arm(start: Array) -> Limb:
     """The arm and the palm from corners (16, 3) of the trunk on: its rings begin behind, and go round over the top."""
+    # rings as wide above, below, in front and behind as the arm is there
     up, ahead = np.roll(ring(len(start), 2.2), 2, axis=0).T
     along, over, under, front, back = np.array(ARM_RINGS).T[..., None]
     height = np.where(up > 0, over, -under) * up
     depth = np.where(ahead > 0, front, -back) * ahead
     rings = _hanging(np.stack(np.broadcast_arrays(along, height, depth), axis=-1))
     rings = smoothed(np.concatenate([start[None], rings]))[1:]
+    # each ring belongs to the bone at its distance from the shoulder
     reach = (rings.mean(axis=1) - SHOULDER) @ DOWN_ARM[0]
     bones = np.array(["UpperArm", "LowerArm", "Hand"])[np.searchsorted([0.28, 0.53], reach)]
     return Limb(rings, bones, np.abs(reach - BAND_AT_ARM) < BAND)

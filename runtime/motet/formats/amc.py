@@ -182,6 +182,7 @@ def _check_lines(path: Path, lines: list[str], header: int, layout: Layout) -> N
     expected = cycle(frame.items())
     bone, count = next(expected)
     line = 0
+    # each line names the next bone with as many values, or a frame's number
     for line, words in words_of(lines, header):
         is_number = _is_frame_number(words)
         if bone and is_number:

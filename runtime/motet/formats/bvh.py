@@ -170,6 +170,7 @@ class _Hierarchy:
     def take(self, statement: str, line: int) -> None:
         """Take a statement or brace; FormatError if it does not belong here."""
         keyword, _, rest = statement.replace("\t", " ").partition(" ")
+        # each keyword where it may stand; a brace opens the node that was declared last
         match keyword.lower():
             case "root" | "joint" | "end" as kind:
                 self._add(kind, rest.strip(), statement, line)

@@ -88,6 +88,7 @@ def matrix_of(transform: Any) -> Matrix:
         (2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)),
         (2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)),
     )
+    # each axis as long as its scale
     columns = []
     for axis, size in zip(turn, transform.scale, strict=True):
         columns.append([size * number for number in axis])

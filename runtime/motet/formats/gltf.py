@@ -454,6 +454,7 @@ def _frame_times(gltf: Gltf, name: str, times_of_tracks: list[Array]) -> tuple[A
     """The times (T,) of an animation's frames by the times (K,) of its tracks' keys, and its frame rate."""
     if not all(map(len, times_of_tracks)):
         raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
+    # from the first key of any track to the last
     start = min(times[0] for times in times_of_tracks)
     end = max(times[-1] for times in times_of_tracks)
     if start > LATE_START:
@@ -529,10 +530,12 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
         len(times), -1, len(REST_TRANSFORM[name])
     )  # a key of a spline: in-tangent, value, out-tangent
     before, after = _keys_around(times, frames)
+    # how far each frame is between its keys
     span = np.maximum(times[after] - times[before], 1e-9)[:, None]
     share = np.clip((frames - times[before])[:, None] / span, 0, 1)
     if kind == "CUBICSPLINE":
         return _on_spline(values[before], values[after], span, share)
+    # in steps, on the shortest turn, or on a line
     low = values[before, 0]
     high = values[after, 0]
     if kind == "STEP":

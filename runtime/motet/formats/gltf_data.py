@@ -156,6 +156,7 @@ class Gltf:
         linear = frames_last((frames, len(self.parents), 3, 3))
         turns = frames_last((frames, len(self.parents), 3, 3))
         places = frames_last((frames, len(self.parents), 3))
+        # of each node the animated properties, or what it rests in
         for node in nodes:
             properties = {name: tracks.get((node, name), rest) for name, rest in self.local(node).items()}
             quat = properties["rotation"]

@@ -103,6 +103,7 @@ def _events(file: File) -> Iterator[tuple[str, ElementTree.Element]]:
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(["start", "end"])
     opened = _Opened(path)
     try:
+        # what has been read is let go, piece by piece
         for start in range(0, len(content), PIECE):
             parser.feed(content[start : start + PIECE])
             events: Iterator[Any] = parser.read_events()

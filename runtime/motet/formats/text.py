@@ -236,6 +236,7 @@ def _still_joints(motion: Motion) -> tuple[list[Joint], list[str]]:
     moving: list[str] = []
     translations = local_translations(motion)
     moved = {channel.rpartition(".")[0] for channel in motion.channels if channel[-2] == "t"}
+    # a translation that does not change is an offset
     for i, joint in enumerate(skeleton.joints[1:], start=1):
         if joint.name not in moved or not len(motion):
             continue

@@ -181,6 +181,7 @@ def futures(
     recorded = motion[: len(motion) - round(predicted * motion.fps)]
     motions: list[Motion] = []
     for seed in seeds:
+        # a frame more at the model's rate, for the resampling
         following, before = continuation.follow(math.ceil(count * model.fps / motion.fps) + 1, seed)
         following = at_rate(before, following, motion.fps)[:count]
         if append:

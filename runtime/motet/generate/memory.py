@@ -265,10 +265,12 @@ class Memory:
         rows = self.rows[action]
         lasts = self.lasts[rows]
         motions = [np.flatnonzero(lasts == last) for last in np.unique(lasts)]
+        # pieces in the order in which they begin
         motions.sort(key=lambda motion: int(self.ages[rows[motion[0]]]))
         recordings: list[Recording] = []
         for motion in motions:
             last = int(lasts[motion[0]])
+            # a piece goes on where an earlier one overlaps it
             for i, recording in enumerate(recordings):
                 overlap = self._place_within(motion, recording.places, rows)
                 if overlap is not None:
@@ -297,12 +299,14 @@ class Memory:
         """
         rows = self.rows[action]
         entries = []
+        # of each recording the middle one of the starts that show nearly the most
         for last in np.unique(self.lasts[rows]):
             motion = rows[self.lasts[rows] == last]
             starts = motion[: max(1, len(motion) - steps)]
             shown = self.acts[np.minimum(starts + steps, last)] - self.acts[starts]
             good = np.flatnonzero(shown >= self.settings.good_start * shown.max())
             entries.append(starts[good[len(good) // 2]])
+        # the first step is drawn from these; later ones are near what has been shown
         if not recent:
             return int(entries[int(uniform * len(entries))])
         return self._near(action, recent, 0, False, uniform, self.ages[rows], np.isin(rows, entries))
@@ -316,6 +320,7 @@ class Memory:
             return steps
         act_lengths = []
         whole_lengths = []
+        # of each recording how many steps the act takes at its quickest, and as a whole
         for last in np.unique(self.lasts[self.rows[action]]):
             over = np.append(self.acts[last - self.ages[last] : last + 1], 1.0)
             starts = np.arange(len(over))
@@ -324,6 +329,7 @@ class Memory:
             whole_lengths.append(int(np.searchsorted(over, 1.0)))
         act = int(np.median(act_lengths))
         whole = int(np.median(whole_lengths))
+        # played faster if that shows the act, slower if the whole is nearly as long
         if steps < act <= self.settings.tempo * steps:
             return act
         return whole if steps > whole >= steps / self.settings.tempo else steps

@@ -183,9 +183,11 @@ class CodesModel(GenerateModel):
         self.bind("decoder", {"codes": "*batch steps P"}, {"frames": "batch steps T D", "moves": "batch steps 3"})
         self.sizes |= {"B": self.sizes["P"] - 1, "S": self.sizes["P"] + 2}
         self.bind("tokens", {"frames": "batch steps T D"}, {"codes": "*batch steps B"})
+        # tables and graphs agree on the number of codes
         if self.codec.moves >= self.sizes["K"]:
             most = self.sizes["K"] - 1
             raise BundleError(f"manifest, config.codec.moves: must be at most {most}, to fit the graph part")
+        # the recordings in codes, their moves, and the body's code book
         self.bind_table("memory", "R S", "int16")
         self.bind_table("moves", "M 3", "float32")
         self.bind_table("body", "Q N", "float32")
@@ -448,12 +450,14 @@ class CodesModel(GenerateModel):
         if odd := at_odds(sentence):
             first, second = odd
             warn(f"{sentence!r} combines {first!r} and {second!r}, and only one can be shown", TextWarning)
+        # verbs that only name what the action is about: "a fighter" does not fight
         likeliest = int(context.argmax())
         nouns = self._verbs & self._stems(likeliest) - self._done(likeliest)
         for verb in OWN.findall(self.vocabulary.rules.normalise(sentence)):
             if stem(verb) in nouns:
                 shown = self._sentences[likeliest]
                 warn(f"{shown!r} has no action {verb!r} (in {sentence!r})", TextWarning)
+        # and what is unlike all known sentences
         understood = self._understood(sentence, context)
         if understood.confident:
             return
@@ -552,6 +556,7 @@ class CodesModel(GenerateModel):
         DecodingError for seconds, a seed or a setting out of range, and for several ``hypotheses``; MotionError for a
         motion that is too short to continue or not of a human figure; TextError like :meth:`generate`.
         """
+        # draw and decode all, then tell what each sentence became
         requests, after, drawn = self._telling(sentences, together=DECODED_AT_ONCE, **settings)
         pieces = list(drawn)
         frames = np.concatenate([piece.frames for piece in pieces])
@@ -561,6 +566,7 @@ class CodesModel(GenerateModel):
         for request, passage in zip(requests, passages, strict=True):
             unknown += self.unknown(request.quantities.text)
             lacking += passage.lacking
+        # a story of one sentence has its figures itself
         only = passages[0] if len(passages) == 1 else Passage("", 0, 0)
         return Story(
             contract=self.contract,

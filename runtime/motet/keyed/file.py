@@ -150,6 +150,7 @@ def _hand(table: Any, hand: str) -> HandKey:
     touch = table.get("touch", "palm")
     if touch not in TOUCHES:
         raise _EntryError(f"{hand}.touch: expected {', '.join(TOUCHES)}, not {quoted(str(touch))}")
+    # its distance from there, and where palm and fingers point
     numbers = {name: _span(table[name], HAND[name], f"{hand}.{name}") for name in HAND if name in table}
     palm = _direction(table.get("palm", ""), f"{hand}.palm")
     fingers = _direction(table.get("fingers", ""), f"{hand}.fingers")

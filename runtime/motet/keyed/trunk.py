@@ -125,10 +125,12 @@ def with_trunk(figure: Figure, act: Drawn) -> Figure:
     chest = [act.number("chest", name) for name in ("bend", "turn", "lean")]
     head = [act.number("head", name) for name in ("nod", "turn", "tilt")]
     turned = {}
+    # each bone of the spine and of the neck turns by its share
     for degrees, shares in ((chest, SPINE_SHARES), (head, HEAD_SHARES)):
         for bone, share in shares.items():
             turn = turn_of(*(share * angle for angle in degrees))
             turned[bone] = product(turn, figure.local[:, BONES.index(bone)])
+    # collar bones rise on both sides
     up = np.radians(act.number("shoulders", "up"))
     for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
         bone = sided(side, "Shoulder")

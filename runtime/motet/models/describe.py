@@ -177,6 +177,7 @@ class DescribeModel(LanguageModel):
         if name == "known":
             described = self._answers(motions_of(motions), beams, progress)
             return described[0] if isinstance(motions, Motion) else described
+        # else the net's own words, by the beam or by consensus of draws
         loop = self.LOOPS[name] if name else self.loop
         settings = self._settled(loop, {"beams": beams, "draws": draws}, seed)
         encoded = self._encoded([self.frames(motion) for motion in motions_of(motions)])
@@ -217,6 +218,7 @@ class DescribeModel(LanguageModel):
         count = int(beam.settled(beam.defaults(self.manifest.defaults), {"beams": beams})["beams"])
         least = self.known.settings.sure
         answers = list[list[Description]]()
+        # blocks bound the memory; progress counts motions
         for start in range(0, len(motions), COMPARED_AT_ONCE):
             for row in self.known.answers(self._seen(motions[start : start + COMPARED_AT_ONCE]), count):
                 descriptions = []
@@ -311,6 +313,7 @@ class DescribeModel(LanguageModel):
         limits = self.limits(settings)
         count = sum(len(group.rows) for group in encoded)
         hypotheses: dict[int, list[Hypothesis]] = {}
+        # motions of like length together; rows are in the order of the motions
         for group in encoded:
             for start in range(0, len(group.rows), loop.batch):
                 batch = group[start : start + loop.batch]

@@ -263,6 +263,7 @@ def known_of(model: BundleModel) -> Known:
         table("known_ways", "SENTENCES 3", "int16"),
         model.settings(AnswerSettings),
     )
+    # numbers of actions are those of the table
     for name, rows in (("known_actions", known.actions), ("known_said", known.sentence_actions)):
         if not len(rows) or rows.min() < 0 or rows.max() >= len(known.shown):
             raise BundleError(f"manifest, tables: {name!r} has numbers that are none of {len(known.shown)} actions")

@@ -140,6 +140,8 @@ def rotmats_to_euler(matrices: Array, order: str, leaps: bool = False) -> Array:
     frame.
     """
     angles = rotmat_to_euler(matrices, order)
+    # where the middle angle is a right angle only the sum or difference of the others counts: the last one stays as it
+    # was
     locked = np.abs(angles[..., 1]) > np.pi / 2 - LOCKED
     if locked.any():
         frames = np.arange(len(angles)).reshape(-1, *[1] * (angles.ndim - 2))

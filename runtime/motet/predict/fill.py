@@ -126,6 +126,7 @@ class FillModel(BundleModel):
         whole = f"the motion of {motion.duration:g} s"
         if start < 0 or stop > motion.duration + 0.5 / motion.fps:
             raise MotionError(f"{text} is not within {whole}")
+        # whole frames, with some on both sides
         first = round(start * motion.fps)
         last = round(stop * motion.fps)
         if first == last:
@@ -201,6 +202,7 @@ class FillModel(BundleModel):
         if not is_number(seconds) or not 0 < seconds <= self.seconds:
             raise MotionError(f"a transition takes more than 0 and at most {self.seconds:g} seconds, not {seconds}")
         if None not in (first.skeleton, second.skeleton) and self._in_its_world(first):
+            # in the world of the first: the second turned and placed to follow it
             count = max(1, round(seconds * first.fps))
             other = second if second is first else to_figure_of(second, first)
             _, figure, past, _ = self._sides(first, other)
@@ -209,6 +211,7 @@ class FillModel(BundleModel):
             new = None if after is None else self._between(first, after, count)
             if after is not None and new is not None:
                 return first, new, after
+        # else both on the humanoid, and once more
         first, second = self._elsewhere(first, second)
         return self._joined(first, second, seconds)
 

@@ -116,11 +116,13 @@ class PredictModel(BundleModel):
         count = self.count(seconds, frames)
         travelled = [travelling(motion) for motion in motions_of(motions)]
         needs(beyond, GenerateModel | None, "beyond to be a model, such as motet.load('generate')")
+        # longer than the horizon: a generate model goes on from what is predicted
         if beyond is not None and count > self.horizon:
             seeds = seeds_of(seed, len(travelled), DecodingError)
             predicted = self._beyond(travelled, count, append, progress, beyond, seeds)
         else:
             predicted = []
+            # batches of the loop's size; each comes back to its own figure
             seen = [self._seen(motion) for motion in travelled]
             for start in range(0, len(travelled), self.loop.batch):
                 part = seen[start : start + self.loop.batch]
@@ -220,6 +222,7 @@ class PredictModel(BundleModel):
         seeds = np.zeros((len(travelled), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, travelled, strict=True):
             row[:] = self._seen(motion)[2]
+        # the encoder's output is what the error is estimated from
         known = {"frames": seeds[two_rows(np.arange(len(travelled)))]}
         known |= self.graphs["encoder"](known)
         error = self.graphs["error"]

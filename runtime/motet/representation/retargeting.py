@@ -112,12 +112,14 @@ def in_known_unit(motion: Motion, figure: Skeleton) -> Motion:
     skeleton = motion.skeleton
     if skeleton is None or skeleton.metres_per_unit is not None:
         return motion
+    # the same bones are in the same unit
     shared = [name for name in skeleton.names[1:] if name in figure.places]
     if figure.metres_per_unit is not None and shared:
         offsets = np.array([skeleton.offsets[skeleton.places[name]] for name in shared])
         figure_offsets = np.array([figure.offsets[figure.places[name]] for name in shared])
         if float(np.abs(offsets - figure_offsets).max()) < 1e-5 * figure.height:  # files round lengths
             return motion.with_unit(figure.metres_per_unit)
+    # else the unit that gives the legs a human length
     try:
         unit = unit_by_legs(motion)
     except MotionError:  # it is not human

@@ -345,6 +345,7 @@ def to_joint_vectors(motion: Motion, joints: Sequence[str] | None = None) -> Mot
     lacking = [name for name in joints if name not in skeleton.places]
     if lacking:
         raise MotionError(f"this motion lacks joints of the model's figure: {listed(lacking)}")
+    # the root in radians, joints as rotation vectors
     root_units = tuple(unit.replace("deg", "rad") for unit in ROOT_BLOCK_UNITS)
     block = to_root_block(motion).select(ROOT_BLOCK, root_units)
     vectors = rotmat_to_rotvec(local_rotations(motion, [skeleton.places[name] for name in joints]))

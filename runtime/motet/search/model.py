@@ -245,6 +245,7 @@ class Index:
         else:
             vector = direction(self.model, query)
             least = settings.like_motion
+        # the best window of each motion
         scores = self.vectors @ vector
         hits: dict[str, Hit] = {}
         for row in self._best_first(scores):
@@ -355,11 +356,13 @@ def _embedded_member(path: Path, member: Member, model: SearchModel, unit: str |
     """A member with its windows and their vectors, or with the reason for none."""
     try:
         motion = read_motion(path, unit=unit, clip=member.clip or None)
+        # a clip in place is searched as if it travelled
         in_place = is_in_place(motion)
         motion = with_travel(motion) if in_place else motion
         parts = model.windows(motion, model.settings(IndexSettings).window)
         vectors = model.embed([part for _, part in parts])
     except MotetError as error:
+        # what is wrong with a file is kept, so that it is not read again
         hint = " (Index.open's unit, --unit-in)" if isinstance(error, UnitError) else ""
         fault = str(error).removeprefix(f"{path}: ") + hint
         return replace(member, fault=fault), np.empty((0, model.sizes["E"]), np.float32)

@@ -76,6 +76,7 @@ def app(
         await live.close()
         answers.close()
 
+    # from outside to inside: who may ask, pages of other sites, and how much at once
     cors = Middleware(CORSMiddleware, allow_origins=origins, allow_methods=["*"], expose_headers=[UNDERSTOOD])
     application = Starlette(
         routes=[*routes(answers, version("motet")), *doors],

@@ -150,6 +150,7 @@ class MotetBackbone(Backbone):  # type: ignore[misc]  # the SDK has no types
         """A cycle that ends as it began, at another place: the last half second leads back."""
         whole = max(2, round((frames - 1) / fps * self.fill.fps))
         gap = min(round(LOOP_SECONDS * self.fill.fps), whole // 3)
+        # a story, whose last part is filled from its end to its beginning
         drawn = whole - gap
         prompt = getattr(segment, "prompt", IDLE_PROMPT)
         seconds = (drawn + 2) / self.fill.fps
@@ -281,6 +282,7 @@ def _keys(request: GenerateRequest, skeleton: Skeleton) -> Keys:
     def add(frame: int, key: Key) -> None:
         keys[frame] = key.joined(keys[frame]) if frame in keys else key
 
+    # poses, and places on the ground with or without a facing
     for constraint in request.constraints:
         if constraint.type == "pose_keyframe":
             add(constraint.frame, _pose(constraint, skeleton))
@@ -296,6 +298,7 @@ def _keys(request: GenerateRequest, skeleton: Skeleton) -> Keys:
 def _pose(constraint: schemas.PoseKeyframeConstraint, skeleton: Skeleton) -> Key:
     """A key pose; MotionError for a rotation or a place that is none."""
     where = f"pose_keyframe of frame {constraint.frame}"
+    # joints that are not given are free, or at rest
     turns = {} if constraint.fill_mode == "generate" else dict.fromkeys(range(len(skeleton.joints)), np.eye(3))
     for name, quat in constraint.joint_rotations.items():
         length = float(np.linalg.norm(quat))

@@ -59,6 +59,7 @@ def _operation(door: Door, method: str) -> dict[str, Any]:
             **{status: {"description": meaning, "content": fault} for status, meaning in REFUSALS.items()},
         },
     }
+    # the format is a part of the address
     if door.formats:
         form = {"type": "string", "enum": list(MEDIA)}
         operation["parameters"].insert(0, {"name": "format", "in": "path", "required": True, "schema": form})

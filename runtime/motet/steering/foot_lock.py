@@ -97,12 +97,14 @@ class FootLock:
         place = hips_of(pose)
         feet = list[list[Part]]()
         legs = list[list[Quaternion]]()
+        # what is played, and which feet take planned steps
         played = list(limbs(pose.rotations, pose.contacts))
         stepping = _stepping(self._feet, played, plan, settings.stands)
         for foot_before, limb, step in zip(self._feet, played, stepping, strict=True):
             foot, leg = _held(foot_before, limb, hips, place, Tick(step, settings, seconds))
             feet.append(foot)
             legs.append(leg)
+        # the state of both feet of each character, left and right last in memory
         numbers: Array = np.array(feet)
         lock = FootLock(numbers[None] if len(pose) == 1 else numbers[0].transpose(2, 1, 0))
         return lock, replace(pose, rotations=with_legs(pose.rotations, legs), contacts=lock._shown(pose.contacts, plan))
@@ -152,6 +154,7 @@ def _stepping(
     stands: contact above which a foot does."""
     if plan is None:
         return [None] * len(feet)
+    # each foot knows the other: only one is lifted at a time
     sides: Sequence[Part] = (True, False) if len(feet) == 2 else (LEFT_THEN_RIGHT,)
     each = list[Footing]()
     for foot, limb, is_left in zip(feet, played, sides, strict=True):

@@ -190,6 +190,7 @@ def all_recorded(pairs: Sequence[tuple[Clip, frozenset[str]]], progress: Progres
     recordings: list[Recording] = []
     faults: list[str] = []
     for number, (clip, gaits) in enumerate(pairs, start=1):
+        # go on after a fault, so that all are named at once
         try:
             recordings += recorded(clip, gaits)
         except MotetError as error:
@@ -244,9 +245,11 @@ def made_of(
     pairs = tagged(clips_of(places), tags)
     recordings, gaits = with_gaits(all_recorded(pairs, progress), settings)
     rows = rows_of(recordings, gaits, settings)
+    # as a recipe stores them
     tables = {}
     for name, table in tables_of(rows, EVEN_CODES, ODD_CODES).items():
         tables[name] = table.astype(DTYPE_OF_TABLE[name])
+    # what the loop has to know of them
     config = {"even": EVEN_CODES, "odd": ODD_CODES, "gaits": gaits, "speeds": speeds_of(rows, settings)}
     name = Path(places).resolve().stem if isinstance(places, str | Path) else "clips"
     contract = _contract([recording.features for recording in recordings])
@@ -273,10 +276,12 @@ def bundled(model: ControlModel) -> tuple[dict[str, Any], dict[str, bytes]]:
     """The manifest and the files of a bundle of a model without graphs, with golden vectors of 12 ticks in each of two
     directions."""
     contract = model.contract
+    # straight ahead, then to the side with another facing
     spread = np.linspace(-1, 1, 12)[:, None]
     track = np.repeat([[0.0, 1.2, 0.0], [1.2, 0.0, 1.5]], 12, axis=0).astype(np.float32)
     golden = vectors(model, {}, {"track": track}, {}, contract.mean + spread * contract.std)
 
+    # each table is a file
     files = {"golden.npz": golden}
     entries = {}
     for name in model.tables:

@@ -82,6 +82,7 @@ class _Words:
             return self.go()
         if kind not in (*gaits, *OTHER_VERBS):
             raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHER_VERBS))}")
+        # what an order does not say has the usual value
         details = self.details(self.turn() if kind == "turn" else {})
         turn = details.get("turn", 0.0)
         seconds = details.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)

@@ -406,6 +406,7 @@ class SteerSession:
         state.saying = None
         abilities = self.model.abilities
         count = len(characters)
+        # NaN faces the way
         facings = np.full(count, np.nan)
         if facing is not None:
             facings = np.radians(self._numbers("facing needs a number", facing, count=count))
@@ -414,6 +415,7 @@ class SteerSession:
             speeds = self._numbers("speed needs a number", speed, count=count)
             if not (speeds > 0).all():
                 raise ControlError("speed must be above 0 m/s; points of None let characters stand")
+        # from where each would come to rest
         gaits = self._gaits(gait)[characters]
         usual = abilities.usual(gaits)
         starts = self._resting_places[characters, None]

@@ -273,6 +273,7 @@ class Words:
         """Words as they are said, then without what may be said beside a name: a tempo, a number, a side, "loudly"; how
         often that is then, and whether it has a side."""
         yield words, 1, False
+        # without tempo, then without numbers, then without sides
         timeless, count = self._without_times(words)
         plain = [word for word in timeless if word not in (*self.table["slow"], *self.table["fast"])]
         numbers = [number for number in map(self._number, plain) if number is not None]
@@ -366,13 +367,16 @@ class Words:
 
     def _gone(self, kinds: Sequence[str], side: str, number: int | None, pace: float) -> Step | None:
         """The order of kinds of words, a side, a number and a pace."""
+        # a gait by name; a jog is a slow run
         sign = -1.0 if side == "right" else 1.0
         pace *= JOG if "jog" in kinds else 1.0
         gait = next((kind for kind in kinds if kind in self.gaits), "run" if "jog" in kinds else "")
         steps = "step" in kinds
         degrees = 90.0 if number is None or steps else float(number)
+        # no word of going: a turn
         if not gait and not any(kind in kinds for kind in GOING_KINDS):
             return Step("go", way=sign * (180.0 if "around" in kinds else degrees))
+        # a way seen from the facing, or along a curve
         way, aside = _way(kinds, side, degrees)
         curve = sign * CURVE if "circle" in kinds else 0.0
         gone = Step("go", gait or self.gaits[0], pace=pace, way=way, aside=aside, curve=curve)

@@ -55,6 +55,7 @@ def part_of(bone: str) -> str:
 def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 1.0) -> tuple[Joint, ...]:
     """The joints of a trunk and, mirrored for the right, of a side, whose names lack the side."""
     places = dict(trunk)
+    # the right side is the mirror image of the left
     for side, sign in zip(sides, (1.0, -1.0), strict=True):
         for part, (parent, (x, y, z), order) in left.items():
             places[side + part] = (
@@ -62,6 +63,7 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
                 (sign * x, y, z),
                 order,
             )
+    # in the units of the skeleton
     names = list(places)
     joints = []
     for name, (parent, (x, y, z), order) in places.items():

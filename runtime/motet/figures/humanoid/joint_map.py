@@ -292,6 +292,7 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
 
 def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
     """For each bone of a user's map its joints, each of them one bone's."""
+    # the spine and the neck may have any number of joints
     known = [bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1])] + ["neck"]
     places: dict[str, tuple[int, ...]] = {}
     for bone, names in _entries(path).items():
@@ -304,6 +305,7 @@ def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, .
             places[bone] = tuple(skeleton.index(name) for name in names)
         except MotionError as error:
             raise FormatError(path, f"{bone}: {error}") from error
+    # each joint is one bone's
     twice = repeated(skeleton.names[joint] for joint in chain.from_iterable(places.values()))
     if twice:
         raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
