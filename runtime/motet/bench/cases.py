@@ -140,6 +140,7 @@ def codes_cases(model: CodesModel, _: Path | None = None) -> list[Case]:
 def predict_cases(model: PredictModel, file: Path | None = None) -> list[Case]:
     """For one figure, the first frame after a new one, a whole horizon, that of a motion on the model's figure and of a
     file, and of another figure that is pushed at 100 Hz; and figures' horizons a second."""
+    # seeds as the net was trained on
     size = (512, model.seed_frames, len(model.contract.channels))
     seeds = np.random.default_rng(0).normal(model.contract.mean, model.contract.std, size).astype(np.float32)
     motion = model.contract.motion(np.tile(seeds[0], (10, 1)))
@@ -149,6 +150,7 @@ def predict_cases(model: PredictModel, file: Path | None = None) -> list[Case]:
         Case("predict.motion", lambda: model.predict(motion)),
         *_batches("predict.horizons", lambda size: model.next_frames(seeds[:size]), "figures/s", (128, 512)),
     ]
+    # files and streams need a figure
     if motion.skeleton is None:
         return cases
     path = file or _written("predict.bvh", motion)

@@ -53,6 +53,7 @@ def profiled(options: SessionOptions, call_of: Callable[[SessionOptions], Call],
             session.profile_file_prefix = str(Path(folder) / f"{len(begun):04}")
             begun.append(time.perf_counter())
 
+        # once for the sessions, and a pause that marks where the measured calls begin
         call = call_of(replace(options, configure=configure))
         call()
         time.sleep(PAUSE)

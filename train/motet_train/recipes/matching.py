@@ -83,9 +83,11 @@ def _untrained(recipe: Recipe, contract: MotionContract, rows: MatchingRows, gai
 def _learner(net: Matching, job: Job, contract: MotionContract, rows: MatchingRows) -> GradientLearner[Matching]:
     """Learns codes that reproduce the poses of rows and the points of their joints."""
     visits = job.recipe.visits
+    # what is to be reproduced, and how much each joint counts
     poses = torch.from_numpy(rows.poses).float().to(job.device)
     true = poses, net.points(_rotations(poses), poses[:, -1:])
     weights = joint_weights(contract, ("Foot", "Toes"), visits.feet).to(job.device)
+    # windows lie within a recording
     starts = torch.from_numpy(np.flatnonzero(rows.left >= visits.window))
 
     def batch(rng: np.random.Generator) -> tuple[Tensor]:

@@ -232,11 +232,13 @@ def dragging(track: Track) -> Flags:
 def _slides(track: Track) -> Array:
     """How far balls slide (N,), cm, in stances as seen from outside: runs of a tenth of a second or more in which the
     lowest point of a sole is low and slow, in the frames in which the ball is low."""
+    # the lowest point of a sole bears the foot, and stands if it is low and hardly moves
     soles = _soles(track)
     lowest = soles[..., 1].argmin(axis=3)
     speeds = length(np.gradient(soles[..., [0, 2]], axis=0)) * track.fps
     bearing_speed = np.take_along_axis(speeds, lowest[..., None], axis=3)[..., 0]
     stands = (soles[..., 1].min(axis=3) < STANCE_HEIGHT) & (bearing_speed < STANCE_SPEED)
+    # of the ball, where it is low in a stance
     stances = list[Array]()
     for figure, foot in np.ndindex(stands.shape[1:]):
         for start, stop in spells(stands[:, figure, foot]):

@@ -58,10 +58,12 @@ def ground_figures(model: SteerModel, ground: str, gait: str) -> dict[str, float
     share = UPHILL_SHARE if ground == "flat_slow" else 1
     poses = _poses(model, height, gait, share * MEASURED_SPEEDS[gait])
     track = Track.of(poses, model.fps)
+    # heights above the ground, and how far feet that stand are from it
     soles = track.soles.astype(np.float64)
     above = soles[..., 1] - height(soles[..., 0], soles[..., 2])
     off, off_p95 = mean_and_tail(100 * _off(poses, above))
     slide, slide_p95 = mean_and_tail(100 * slides(_stances(track, soles, above)))
+    # and how the hips go up and down
     jolts = np.diff(track.height.astype(np.float64), 2, axis=0) * model.fps**2
     return {
         "off_cm": off,

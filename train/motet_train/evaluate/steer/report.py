@@ -377,18 +377,21 @@ def _command_measures(model: SteerModel, limits: Limits) -> dict[str, Measure]:
     """Group -> its measure, for models that plan steps, act, reach, and go to points."""
     acts = said_acts(model)
     measures = dict(STEP_MEASURES)
+    # acts, begun from all gaits, and cut
     measures["act_standing"] = partial(act_figures, acts=acts, leap=limits.leap, gait=None)
     for gait in MEASURED_SPEEDS:
         measures[f"act_{gait}"] = partial(act_figures, acts=acts, leap=limits.leap, gait=gait)
     measures["cut_standing"] = partial(cut_figures, acts=acts, gait=None)
     for gait in MEASURED_SPEEDS:
         measures[f"cut_{gait}"] = partial(cut_figures, acts=acts, gait=gait)
+    # hands, ways and ground
     measures["reach"] = reach_figures
     for gait in MEASURED_SPEEDS:
         measures[f"going_{gait}"] = partial(going_figures, gait=gait)
         measures[f"paths_{gait}"] = partial(path_figures, gait=gait)
         for ground in GROUNDS:
             measures[f"ground_{ground}_{gait}"] = partial(ground_figures, ground=ground, gait=gait)
+    # near and moving points, and crowds
     measures["slow_points"] = slow_point_figures
     measures["chase"] = chase_figures
     return measures | {f"crowd_{crowd}": partial(crowd_figures, crowd=crowd) for crowd in CROWDS}

@@ -99,6 +99,7 @@ def _measured(
     rows: dict[str, dict[str, Figures]] = {kind: {} for kind in sources}
     vectors: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
     for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
+        # prompt by prompt, so that motions need not be kept
         for kind, (source, count) in sources.items():
             motions = _motions(source, prompt, count)
             rows[kind][prompt.text] = _figures(prompt, list(map(track_of, motions)))

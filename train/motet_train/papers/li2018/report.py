@@ -270,9 +270,11 @@ def harness_table(models: Models, groups: Groups) -> str:
         trainings = [models[name].manifest.training for name in runs]
         recipe = trainings[0].get("recipe", {})
         data = trainings[0].get("data", {})
+        # what a recipe leaves out stays empty
         cells = ["" if recipe.get(key) is None else f"{recipe[key]:g}" for key in settings]
         files = "" if data.get("files") is None else f"{data['files']:g}"
         held_out = str(len(data.get("validation", ()))) if "files" in data else ""
+        # a range where the runs of a group differ
         seeds, steps, kept = (_range(trainings, key) for key in ("seed", "steps", "kept_step"))
         rows.append((f"  {title}", seeds, files, held_out, *cells, steps, kept, recipe.get("keep", "")))
     return aligned(rows)
