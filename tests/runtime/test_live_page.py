@@ -73,7 +73,8 @@ def test_the_script_of_the_page_does_what_python_does(steer_model: SteerModel) -
         np.testing.assert_allclose(pose["ground"], ours.ground[0], atol=1e-9)
         np.testing.assert_allclose(pose["places"], ours.positions()[0], atol=1e-5)
         np.testing.assert_allclose(pose["rotations"], ours.rotations[0], atol=1e-5)
-        np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-6)
+        # those of planned steps are heights of feet over 4.5 cm, and rounded as these are
+        np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-5)
 
 
 def run_loop(given: dict[str, Any]) -> Any:
