@@ -137,6 +137,14 @@ def test_the_ground_can_be_taken_away_again(model: SteerModel) -> None:
     assert session.tick().height[0] < 1.1
 
 
+def test_who_joins_stands_on_the_ground_at_once(model: SteerModel) -> None:
+    session = model.start()
+    session.set_ground(uphill)
+    session.advance(0.1)
+    session.add((0.0, 4.0, 0.0))
+    assert session.advance(0.0).height[1] == pytest.approx(0.97 + 3 * SLOPE, abs=0.1)
+
+
 def test_acts_looks_and_hands_go_on_over_stairs(model: SteerModel) -> None:
     session = model.start()
     session.put((0, 2.2, 0))
@@ -160,8 +168,8 @@ def raising(x: Array, z: Array) -> Array:
     ("ground", "message"),
     [
         (raising, "failed: RuntimeError: no map here"),
-        (lambda x, z: np.full(x.shape, np.nan), "no number"),
-        (lambda x, z: x + np.inf, "no number"),
+        (lambda x, z: np.full(x.shape, np.nan), "gave nan at x .*, z .*: a height is a number"),
+        (lambda x, z: x + np.inf, "gave inf at x"),
         (lambda x, z: 0 * x + 2e4, "within 10000 m"),
         (lambda x, z: 0.0, r"shape \(\) for places of"),
         (lambda x, z: x[:1], "shape"),

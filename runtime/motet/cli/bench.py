@@ -131,9 +131,8 @@ def _earlier(file: Path) -> dict[str, Any]:
     try:
         report: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         rows = list(chain(*report["bundles"].values()))
-        for row in rows:
-            _ = row["name"], float(row["value"])
-        if not rows or not isinstance(report["machine"], dict):
+        known = [(row["name"], float(row["value"])) for row in rows]
+        if not known or not isinstance(report["machine"], dict):
             raise ValueError("no rows")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise FormatError(file, f"not what motet bench --json prints: {error}") from error

@@ -194,7 +194,7 @@ def confidence_of(shown: Mapping[str, Any]) -> str:
 
 
 def _numbers(hypothesis: Mapping[str, Any]) -> str:
-    """What was asked in numbers beside what was measured: "asked 3 steps: 3"."""
+    """What was requested in numbers beside what was measured: "requested: 3 steps: 3 shown"."""
     shown = {kind: f": {value:.3g} shown" for kind, value in hypothesis["measured"].items()}
     numbers = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in hypothesis["requested"].items())
-    return numbers and f"asked: {numbers}"
+    return numbers and f"requested: {numbers}"

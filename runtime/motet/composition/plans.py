@@ -69,7 +69,7 @@ class Moment:
             motions_of([self.pose])
         place = self.place
         motion = self.pose
-        # a time and at least what is asked for at it, each within its range
+        # each field is of its type and within its range
         if not (is_number(self.at) and 0 <= self.at <= LONGEST_COMPOSITION):
             raise SettingError(f"at must be 0 to {LONGEST_COMPOSITION:g} s, not {self.at!r}")
         if self.text is not None and not (isinstance(self.text, str) and self.text.strip()):

@@ -132,7 +132,7 @@ def _take_over(session: SteerSession, model: SteerModel, motion: Motion) -> Arra
     ground = np.array([x[-1], z[-1], facing(motion[-60:])[-1]])
     session.take(model.pose_of(motion[-60:]))
     session.put((x[-1], z[-1], math.degrees(ground[2])))
-    # the speed of the last fifth of a second
+    # the speed over the last five frames
     direction = np.array([np.sign(x[-1] - x[0]), np.sign(z[-1] - z[0])])
     session.push(np.array([np.ptp(x), np.ptp(z)]) * direction * model.fps / 5)
     return ground
@@ -146,7 +146,7 @@ def _command(session: SteerSession, walk: Walk, leg: Leg, left: float, ground: A
     if leg.place is None and leg.facing is not None:
         _go(session, gait, gait.usual, leg.facing + backwards)
         return
-    # turn towards the place first, if that takes time
+    # the place, and the seconds that are left once it is turned to
     gap = np.zeros(2) if leg.place is None else leg.place - ground[:2]
     distance = float(np.hypot(*gap))
     direction = float(np.arctan2(*gap))

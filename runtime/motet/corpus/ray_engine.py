@@ -45,7 +45,6 @@ def answers(verb: Verb, sources: Sequence[Source], workers: int | None, address:
     items = [{"source": pickle.dumps(source)} for source in sources]
     if not items:
         return
-    # blocks are small, so that all actors end at once
     size = max(1, min(verb.most, len(items) // (16 * count)))  # small, so that all actors end at once
     rows = ray.data.from_items(items, override_num_blocks=-(-len(items) // size)).map_batches(
         Actor,

@@ -13,13 +13,10 @@ from typing import Any
 from motet.corpus.archives import MAX_FILE, ZipFiles, copy_bounded, is_plain_path
 from motet.errors import FormatError, MotetError, MotionError
 from motet.files import files_in, place_of
-from motet.formats import CLIPPED, MOCAP, READABLE, contents_of, read_motion, split_part
+from motet.formats import OF_FOLDERS, READABLE, contents_of, read_motion, split_part
 from motet.formats.amc import skeleton_for
 from motet.formats.text import MARK, Contents, choice, chosen, plain_names, split_clip
 from motet.motion.motion import Motion
-
-EXTENSIONS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
-"""The extensions of what is taken of a folder or zip."""
 
 
 @dataclass(frozen=True)
@@ -118,23 +115,23 @@ def files_of(places: Sequence[Path]) -> list[Path]:
 
 def _files(path: Path) -> list[Path]:
     if path.is_dir():
-        files = files_in(path, EXTENSIONS)
+        files = files_in(path, OF_FOLDERS)
         where = "are in it"
     elif url := url_of(path):
         files = _listed(path, url)
         where = "are there"
     elif path.suffix.lower() == ".zip" and path.is_file():
         with ZipFiles(path) as archive:
-            files = [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in EXTENSIONS]
+            files = [path / name for name in archive.names if PurePosixPath(name).suffix.lower() in OF_FOLDERS]
             where = "are in it"
     elif glob.has_magic(str(path)) and not place_of(split_clip(path, READABLE)[0]).exists():
         matching = sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-        files = [file for file in matching if file.suffix.lower() in EXTENSIONS]
+        files = [file for file in matching if file.suffix.lower() in OF_FOLDERS]
         where = "have such names"
     else:
         return [path]
     if not files:
-        raise FormatError(path, f"no motion files ({' '.join(EXTENSIONS)}) {where}")
+        raise FormatError(path, f"no motion files ({' '.join(OF_FOLDERS)}) {where}")
     return files
 
 
@@ -263,7 +260,7 @@ def _listed(path: Path, url: str) -> list[Path]:
             return [path]
         names = system.glob(name) if glob.has_magic(url) else system.find(name)
     shown = (Path(system.unstrip_protocol(file)) for file in sorted(names))
-    return [file for file in shown if file.suffix.lower() in EXTENSIONS and file.name[0] != "."]
+    return [file for file in shown if file.suffix.lower() in OF_FOLDERS and file.name[0] != "."]
 
 
 def _fetched(path: Path, url: str, folder: Path) -> Path:

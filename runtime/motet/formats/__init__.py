@@ -106,6 +106,8 @@ READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
 WRITABLE = tuple(kind.extension for kind in FORMATS if kind.writer)
 MOCAP = tuple(kind.extension for kind in FORMATS if kind.mocap)
 CLIPPED = tuple(kind.extension for kind in FORMATS if "clip" in kind.options)
+OF_FOLDERS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
+"""The extensions of what is taken of a folder or zip."""
 FIGURED = tuple(kind.extension for kind in FORMATS if "figure" in kind.options)
 READS = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.reader)
 WRITES = ", ".join(f"{kind.extension} ({kind.name})" for kind in FORMATS if kind.writer)

@@ -104,7 +104,7 @@ class FootLock:
             foot, leg = _held(foot_before, limb, hips, place, Tick(step, settings, seconds))
             feet.append(foot)
             legs.append(leg)
-        # the state of both feet of each character, left and right last in memory
+        # both feet of each character, as :attr:`feet` has them
         numbers: Array = np.array(feet)
         lock = FootLock(numbers[None] if len(pose) == 1 else numbers[0].transpose(2, 1, 0))
         return lock, replace(pose, rotations=with_legs(pose.rotations, legs), contacts=lock._shown(pose.contacts, plan))

@@ -26,7 +26,7 @@ from motet.figures.floor import above_floor
 from motet.figures.humanoid import HUMANOID, on_humanoid
 from motet.figures.trimming import repeated, trim
 from motet.files import files_in
-from motet.formats import CLIPPED, MOCAP, clips, read_motion
+from motet.formats import OF_FOLDERS, clips, read_motion
 from motet.formats.text import MARK
 from motet.models.control import ControlModel
 from motet.motion.motion import Motion
@@ -36,9 +36,6 @@ from motet.steering.recorded import SHORTEST_RECORDING, Recording, held_level, p
 from motet.steering.rows import rows_of
 from motet.steering.settings import SteeringSettings
 from motet.steering.tables import DTYPE_OF_TABLE, speeds_of, tables_of
-
-CLIP_EXTENSIONS = tuple(dict.fromkeys((*MOCAP, *CLIPPED)))
-"""The extensions of what is taken of a folder."""
 
 MOST_CLIPS = 2000
 """Of a figure; more are refused before any is read."""
@@ -118,9 +115,9 @@ def clips_of(places: str | Path | Sequence[str | Path]) -> list[Clip]:
         places = [places]
     files: list[Path] = []
     for place in map(Path, places):
-        inside = files_in(place, CLIP_EXTENSIONS) if place.is_dir() else [place]
+        inside = files_in(place, OF_FOLDERS) if place.is_dir() else [place]
         if not inside:
-            raise FormatError(place, f"no motion files ({' '.join(CLIP_EXTENSIONS)}) are in it")
+            raise FormatError(place, f"no motion files ({' '.join(OF_FOLDERS)}) are in it")
         files += inside
     if not files:
         raise MotionError("the list of motion files is empty: name a folder, or files")

@@ -663,6 +663,7 @@ class SteerSession:
         hold_feet = state.lock is not None
         # a session of their own, whose state is joined to this one
         more = self.model.start(gait, characters=count, places=new_places, hold_feet=hold_feet, phases=phases)
+        more._terrain = self._terrain
         if state.poses is not None:
             more.advance(0)
         numbers = list(range(self.characters, total))

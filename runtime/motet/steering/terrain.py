@@ -92,8 +92,11 @@ class Terrain:
             raise ControlError(f"ground(x, z) failed: {type(error).__name__}: {error}") from error
         if heights.shape != x.shape:
             raise ControlError(f"ground(x, z) gave heights of shape {heights.shape} for places of {x.shape}")
-        if not (np.abs(heights) <= HIGHEST_GROUND).all():
-            raise ControlError(f"ground(x, z) gave a height that is no number within {HIGHEST_GROUND:g} m of 0")
+        is_height = np.abs(heights) <= HIGHEST_GROUND
+        if not is_height.all():
+            first = np.unravel_index(int(is_height.argmin()), heights.shape)
+            wrong = f"ground(x, z) gave {heights[first]:g} at x {x[first]:g}, z {z[first]:g}"
+            raise ControlError(f"{wrong}: a height is a number within {HIGHEST_GROUND:g} m of 0")
         return heights
 
     def slowed(self, target: Array, root: Array, settings: TerrainSettings) -> Array:

@@ -431,6 +431,7 @@ export class ControlSession {
       ...(gait !== undefined && { gait }),
       ...(turns !== undefined && { phases: turns }),
     });
+    more.ground = this.ground;
     if (state.shown) more.advance(0);
     state.shown?.forEach((shown, at) => shown.push(...more.state.shown![at]!));
     state.figures.push(...more.state.figures);

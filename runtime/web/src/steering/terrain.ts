@@ -63,7 +63,7 @@ export function checkedGround(ground: GroundHeight): GroundHeight {
     const height = ground(x, z);
     if (!(typeof height === "number" && Math.abs(height) <= TERRAIN.HIGHEST_GROUND))
       throw new ControlError(
-        `ground(x, z) gave no height within ${TERRAIN.HIGHEST_GROUND} m of 0: ${height}`,
+        `ground(x, z) gave ${height} at x ${x}, z ${z}: a height is a number within ${TERRAIN.HIGHEST_GROUND} m of 0`,
       );
     return height;
   };
