@@ -16,9 +16,10 @@ from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import Part, larger, root, smaller, where
 from motet.settings import Range, Settings
 from motet.steering.matching import Flags, Matcher, Playback, Rows
+from motet.steering.settings import Share
 
 Move = tuple[Part, Part]
-Metres = Annotated[float, Range(0.001, 1, "m")]
+StepLength = Annotated[float, Range(0.001, 1, "m")]
 
 
 @dataclass(frozen=True)
@@ -29,23 +30,23 @@ class StepSettings(Settings):
 
     swing: Annotated[float, Range(0.05, 5, "s")] = 0.4
     """Time in which a foot is led to its goal; it comes down then, or later if its recording still swings it."""
-    lowest: Metres = 0.045
+    lowest: StepLength = 0.045
     """How high the sole of a foot is lifted for the shortest step."""
-    highest: Metres = 0.07
+    highest: StepLength = 0.07
     """How high for a step of ``longest`` or more."""
-    longest: Metres = 0.4
+    longest: StepLength = 0.4
     """Length of a step from which on a foot is lifted no higher."""
-    stray: Metres = 0.15
+    stray: StepLength = 0.15
     """Distance of a standing foot from where the pose wants it, above which it steps."""
-    settles: Metres = 0.03
+    settles: StepLength = 0.03
     """The same of a figure that has come to rest."""
     leads: Annotated[float, Range(0, 5, "s")] = 0.4
     """How far ahead of the pose a foot is put down: half a stance."""
-    lead: Metres = 0.1
+    lead: StepLength = 0.1
     """The largest distance by which it is put down ahead."""
     mean: Annotated[float, Range(0.001, 10, "s")] = 0.2
     """Half-life of the mean of a foot's drift."""
-    rests: Annotated[float, Range(0, 1)] = 0.5
+    rests: Share = 0.5
     """Share of rest above which a figure has come to rest."""
 
 
