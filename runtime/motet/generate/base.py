@@ -267,10 +267,13 @@ class GenerateModel(LanguageModel):
                 text = self.quantities(part).text if numbers else part
                 self.note(text, self.embed(text), strict=True)
                 if lacking:
-                    self.check_whole(text)
+                    self.check_whole(part, numbers)
 
-    def check_whole(self, sentence: str) -> None:
-        """TextError where the action that a sentence is read as leaves out a word of it, if the model knows actions."""
+    def check_whole(self, sentence: str, numbers: bool = True) -> None:
+        """TextError where the action that a sentence is read as leaves out a word of it, if the model knows actions.
+
+        numbers: read it without its numbers.
+        """
 
     def note(self, sentence: str, context: Floats, strict: bool) -> None:
         """Warn if the model knows a sentence with this context (C,) only in part, apart from its unknown words.

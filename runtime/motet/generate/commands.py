@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.fields import Fields
 from motet.errors import BundleError
-from motet.text.clauses import POLITE_WORDS, stem
+from motet.text.clauses import POLITE_WORDS, SUBJECT, stem
 from motet.text.vocabulary import TextRules
 
 Key = frozenset[str]
@@ -75,25 +75,29 @@ class Commands:
 
     def act(self, text: str) -> int | None:
         """The action of the command that a text is; None if it is none."""
-        number = self.numbers.get(key_of(self.rules.words(text)))
-        return None if number is None else self.first + number
+        key = key_of(self.rules.words(text))
+        return self.action(key) if key in self.numbers else None
+
+    def action(self, key: Key) -> int:
+        """The action of a command."""
+        return self.first + self.numbers[key]
 
     def is_instead(self, text: str) -> bool:
         """Whether a text is a command for an act that nobody recorded."""
         key = key_of(self.rules.words(text))
         return key in self.numbers and key in self._act(key).instead
 
-    def nearest(self, text: str) -> int | None:
-        """The action of the longest command in a text that begins with a command's verb; None without one."""
-        words = self.rules.words(text)
-        key = key_of(words)
+    def nearest(self, text: str) -> Key | None:
+        """The longest command in a text that, but for its subject, begins with a command's verb; None without one."""
+        words = self.rules.words(SUBJECT.sub("", text, count=1))
         if not words or stem(words[0]) not in self.verbs:
             return None
-        inside = [known for known in self.numbers if known < key and known not in self._act(known).instead]
+        key = key_of(words)
+        within = [known for known in self.numbers if known <= key and known not in self._act(known).instead]
+        inside = [known for known in within if stem(words[0]) in known]
         if not inside:
             return None
-        longest = max(inside, key=lambda known: (len(known), sorted(known)))
-        return self.first + self.numbers[longest]
+        return max(inside, key=lambda known: (len(known), sorted(known)))
 
     def _act(self, key: Key) -> Command:
         return self.acts[self.numbers[key]]

@@ -12,7 +12,7 @@ from motet.keyed.acts import ACT_FPS
 from motet.keyed.keys import mirrored_keys
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
-from motet.text.clauses import FUNCTION_WORDS, stem
+from motet.text.clauses import FUNCTION_WORDS, Shown, stem
 from motet.text.numeric_phrases import PACE_PHRASES
 
 BASE_SENTENCE = "a person stands still"
@@ -41,11 +41,23 @@ BOTH_SIDES = frozenset(("left", "right"))
 @dataclass(frozen=True)
 class NamedAct:
     """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act. is_counted:
-    whether the sentence says how often."""
+    whether the sentence says how often. lacking: the words of the sentence that the act leaves out."""
 
     act: KeyedAct
     sentence: str
     is_counted: bool = False
+    lacking: tuple[str, ...] = ()
+
+    @property
+    def confidence(self) -> float:
+        """The share of the words of both sentences that is not left out."""
+        words = len(self.sentence.split())
+        return words / (words + len(self.lacking))
+
+    @property
+    def shown(self) -> Shown:
+        """How the sentence is shown."""
+        return Shown(self.act.says[0], self.lacking, self.confidence)
 
     @property
     def is_small(self) -> bool:
@@ -78,6 +90,34 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
         return None
     # the sentence that says the most of it
     _, name, sentence = max(matches)
+    return _adapted(name, sentence, stems, times)
+
+
+def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | None:
+    """The act of which a sentence, in lower-case words without its subject, has an order beside other words, the first of
+    them its verb; that which leaves out the fewest of these. None where there is none."""
+    stems = stems_of(words)
+    nearest: NamedAct | None = None
+    for name, sentences in _sentences().items():
+        orders = [sentence for sentence, order in sentences.items() if order <= stems and _is_order(sentence, words)]
+        if not orders:
+            continue
+        of_act = frozenset[str]().union(BOTH_SIDES, *sentences.values())
+        lacking = tuple(word for word in words if stems_of([word]) - of_act)
+        act = replace(_adapted(name, max(orders, key=len), stems, times), lacking=lacking)
+        if nearest is None or act.confidence > nearest.confidence:
+            nearest = act
+    return nearest
+
+
+def _is_order(sentence: str, words: Sequence[str]) -> bool:
+    """Whether some words begin with the verb of an act's sentence and have its particles: "put up" is not "put"."""
+    particles = FUNCTION_WORDS.intersection(sentence.split()) - ARTICLES
+    return particles <= set(words) and bool(stems_of(words[:1]) & stems_of(sentence.split()))
+
+
+def _adapted(name: str, sentence: str, stems: frozenset[str], times: float | None) -> NamedAct:
+    """An act on the side that some stems name, as often as it is to be done."""
     act = ours()[name]
     # acts of either hand are written for the right one
     sides = stems & BOTH_SIDES - stems_of(sentence.split())

@@ -29,7 +29,7 @@ from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecode
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
-from motet.generate.keyed_acts import BASE_SENTENCE, NamedAct, act_named, stems_of, without_subject
+from motet.generate.keyed_acts import BASE_SENTENCE, NamedAct, act_named, act_within, stems_of, without_subject
 from motet.generate.keyed_acts import verbs as keyed_verbs
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
@@ -210,14 +210,16 @@ class CodesModel(GenerateModel):
 
     def _meant(self, text: str, context: Floats) -> Floats:
         """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions: that of a command alone, or
-        of the nearest one where it leaves out less than the likeliest action."""
+        of the nearest one where it leaves out less than the likeliest action, which counts a word more where it is not
+        confident, and where it lacks a word of the command."""
         act = self._commands.act(text)
-        if act is None:
-            nearest = self._commands.nearest(text)
-            if nearest is not None:
-                lacking = len(self.lacking(text, int(context.argmax())))
-                if len(self.lacking(text, nearest)) < lacking + (not self._understood(text, context).confident):
-                    act = nearest
+        nearest = None if act is not None else self._commands.nearest(text)
+        if nearest is not None:
+            lacking = self.lacking(text, int(context.argmax()))
+            limit = len(lacking) + (not self._understood(text, context).confident)
+            limit += not nearest.isdisjoint(map(stem, lacking))
+            if len(self.lacking(text, self._commands.action(nearest))) < limit:
+                act = self._commands.action(nearest)
         meant = np.full(self._commands.first + len(self._commands.acts), NEVER, dtype=np.float32)
         if act is None:
             meant[: len(context)] = context
@@ -251,7 +253,10 @@ class CodesModel(GenerateModel):
 
     def _keyed(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
-        sentence is a command or a recorded action has all its words, those of the act in its own sentence."""
+        sentence is a command or a recorded action has all its words, those of the act in its own sentence.
+
+        A sentence may say more than the act, where the likeliest recorded action leaves out more of it.
+        """
         if self.contract.skeleton != HUMANOID:
             return None
         words = self.vocabulary.rules.words(sentence)
@@ -261,7 +266,7 @@ class CodesModel(GenerateModel):
             sentence = " ".join(words)
             act = act_named(words)
         if act is None:
-            return None
+            return self._keyed_within(sentence)
         if act.is_small:
             return act
         if self._commands.act(sentence) is not None:
@@ -271,33 +276,43 @@ class CodesModel(GenerateModel):
         recorded = self._sentences[int(self._context(sentence).argmax())]
         return None if stems_of(act.sentence.split()) <= stems_of(recorded.split()) else act
 
+    def _keyed_within(self, sentence: str) -> NamedAct | None:
+        """The act whose order a sentence without its subject holds beside other words, unless the likeliest recorded
+        action or command leaves out no more of it, a verb counting twice."""
+        text, times = _counted(sentence)
+        words = self.vocabulary.rules.words(text)
+        act = act_within(words, times) if words else None
+        if act is None:
+            return None
+        missing = [word for word in words if word not in FUNCTION_WORDS and not self.vocabulary.meant(word)]
+        if any(map(self.vocabulary.meant, words)):
+            missing += self.lacking(text)
+        lacks_verb = stem(words[0]) in map(stem, missing)
+        return act if len(act.lacking) < len(missing) + lacks_verb else None
+
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
-        try:
-            quantities = quantities_of(sentence)
-        except TextError:  # it is said when the sentence is read
+        text, times = _counted(sentence)
+        if times is None:
             return None
-        if quantities.amounts.keys() != {"times"}:
-            return None
-        words = self.vocabulary.rules.words(quantities.text)
-        times = quantities.amounts["times"]
+        words = self.vocabulary.rules.words(text)
         named = act_named(words, times) or act_named(without_subject(words), times)
         # One that cannot be repeated gives way to a command's, which can.
-        if named and not named.act.repeat and self._commands.act(quantities.text) is not None:
+        if named and not named.act.repeat and self._commands.act(text) is not None:
             return None
         return named
 
     def parts(self, sentence: str) -> list[str]:
         """The things that a text requests one after another: its sentences, and the parts of a sentence
         (:func:`motet.text.clauses.parts_of`) whose likeliest action leaves something out; errors like :meth:`ids`."""
-        if self._keyed(sentence):
+        act = self._keyed(sentence)
+        if act and not act.lacking:
             return [sentence]
         self.vocabulary.encode(sentence)
         shown_in_turn = []
         for whole in sentences_of(sentence):
             parts = self._parts_of(whole)
-            quantities = self.quantities(whole)
-            if len(parts) > 1 and not self._shown_at_once(quantities, parts):
+            if len(parts) > 1 and not self._shown_at_once(whole, parts):
                 shown_in_turn += parts
             else:
                 shown_in_turn.append(whole)
@@ -309,10 +324,11 @@ class CodesModel(GenerateModel):
         with_keyed = parts_of(sentence, self._verbs | keyed_verbs())
         return with_keyed if any(map(self._keyed, with_keyed)) else parts_of(sentence, self._verbs)
 
-    def _shown_at_once(self, quantities: Quantities, parts: Sequence[str]) -> bool:
+    def _shown_at_once(self, sentence: str, parts: Sequence[str]) -> bool:
         """Whether the likeliest action of a sentence shows all its parts, and no part has numbers of its own."""
-        if self.lacking(quantities.text):
+        if self.likeliest(sentence).lacking:
             return False
+        quantities = self.quantities(sentence)
         for part in parts:
             amounts = dict(quantities_of(part).amounts)
             if amounts and amounts != dict(quantities.amounts):
@@ -417,7 +433,7 @@ class CodesModel(GenerateModel):
         shows.
         """
         if numbers and (act := self._keyed(sentence)):
-            return Understood(1.0, (act.act.says[0],), True)
+            return Understood(act.confidence, (act.act.says[0],), True)
         text = self.quantities(sentence).text if numbers else sentence
         return self._understood(text, self.embed(text))
 
@@ -482,7 +498,7 @@ class CodesModel(GenerateModel):
     def _shown(self, request: Request, action: int) -> Shown:
         """How a request is shown; a TextWarning names the words that are left out."""
         if request.keyed is not None:
-            return Shown(request.keyed.act.says[0], (), 1.0)
+            return self._warned(request.text, request.keyed.shown)
         sentence = request.quantities.text
         return self._warned(sentence, self._shown_as(sentence, action))
 
@@ -495,7 +511,7 @@ class CodesModel(GenerateModel):
         """How a sentence is shown by its likeliest action; motions that are drawn may show another likely one.
         Errors like :meth:`ids`, without warnings."""
         if act := self._keyed(sentence):
-            return Shown(act.act.says[0], (), 1.0)
+            return act.shown
         return self._shown_as(self.quantities(sentence).text)
 
     def _shown_as(self, sentence: str, action: int | None = None) -> Shown:
@@ -506,9 +522,9 @@ class CodesModel(GenerateModel):
         confidence = self._understood(sentence, context).confidence
         return Shown(self._sentences[action], tuple(self.lacking(sentence, action)), confidence)
 
-    def check_whole(self, sentence: str) -> None:
+    def check_whole(self, sentence: str, numbers: bool = True) -> None:
         """See :meth:`GenerateModel.check_whole`."""
-        shown = self._shown_as(sentence)
+        shown = self.likeliest(sentence) if numbers else self._shown_as(sentence)
         if shown.lacking:
             raise TextError(shown.left_out(sentence))
 
@@ -519,7 +535,7 @@ class CodesModel(GenerateModel):
         contexts, noise, chosen = super().drawing_inputs(texts, rows, seed, strict, settings)
         if strict:
             for text, context in zip(texts, contexts, strict=True):
-                self.check_whole(text)
+                self.check_whole(text, numbers=False)
                 words = list(self._content(text).values())
                 for action in range(len(self._words)):
                     stems = self._stems(action)
@@ -685,6 +701,9 @@ class CodesModel(GenerateModel):
 
         numbers: whether to read those of the text.
         """
+        if strict:
+            for text, _ in timed:
+                self.check_whole(text, numbers)
         quantities = [self.quantities(text) if numbers else Quantities(text) for text, _ in timed]
         read_as = [quantity.text for quantity in quantities]
         contexts, noise, chosen = self.drawing_inputs(read_as, 1, seed, strict, settings)
@@ -721,6 +740,18 @@ class CodesModel(GenerateModel):
             raise MotionError(f"a motion of {len(frames)} frames is too short to continue: {2 * hop} are needed")
         frames = frames[len(frames) % hop :]
         return Context(frames, self.codec.codes_of(frames))
+
+
+def _counted(sentence: str) -> tuple[str, float | None]:
+    """A sentence without how often it says that something is done, and that number; itself and None where it says none,
+    or another number, too."""
+    try:
+        quantities = quantities_of(sentence)
+    except TextError:  # it is said when the sentence is read
+        return sentence, None
+    if quantities.amounts.keys() != {"times"}:
+        return sentence, None
+    return quantities.text, quantities.amounts["times"]
 
 
 def _check_story(sentences: Sequence[str], stand: object, hypotheses: float | None) -> None:
