@@ -7,8 +7,9 @@ import pytest
 
 import motet
 import motet.keyed
+from motet.errors import TextWarning, collected
 from motet.figures.humanoid import HUMANOID
-from motet.generate.keyed_acts import act_named, without_subject
+from motet.generate.keyed_acts import act_named, act_within, without_subject
 from motet.motion.kinematics import global_transforms
 
 
@@ -103,6 +104,61 @@ def test_recorded_actions_come_first(model: motet.CodesModel) -> None:
     assert model.likeliest("a person walks forward").action != "walk"
     assert model.likeliest("a person waves").action not in motet.keyed.ours()["wave"].says
     assert model.likeliest("salute").action == "salute"
+
+
+@pytest.mark.parametrize(
+    ("sentence", "name", "lacking"),
+    [
+        ("A person hammers a nail into a board.", "hammer", {"board"}),
+        ("He points at something far away on the horizon.", "point", {"far", "away", "horizon"}),
+        ("strumming an acoustic guitar", "play guitar", {"acoustic"}),
+    ],
+)
+def test_a_sentence_may_say_more_than_an_act(
+    model: motet.CodesModel, sentence: str, name: str, lacking: set[str]
+) -> None:
+    with collected(TextWarning) as messages:
+        (generated,) = model.generate(sentence)
+    assert generated.action == name
+    assert set(generated.lacking) == lacking
+    assert any("leaves out" in str(message) for message in messages)
+    # as everywhere, strict refuses what is left out, and so does check
+    with pytest.raises(motet.TextError, match="leaves out"):
+        model.generate(sentence, strict=True)
+    with pytest.raises(motet.TextError, match="leaves out"):
+        model.check(sentence)
+
+
+def test_what_is_recorded_comes_before_a_part_of_an_act(model: motet.CodesModel) -> None:
+    assert act_within(["walk", "to", "the", "door"]) is None
+    assert act_within(["puts", "hands", "on", "the", "thighs"]) is None  # "put hands up" has another particle
+    assert "box" in model.likeliest("a person lifts a box").action
+
+
+def test_acts_of_the_upper_body_are_done_while_the_figure_goes(model: motet.CodesModel) -> None:
+    (walk,) = model.generate("a person walks while waving")
+    assert walk.action in motet.keyed.ours()["wave"].says
+    places = global_transforms(walk.motion)[1]
+    hips = places[:, 0]
+    assert np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=1).sum() > 2.5
+    hands = places[:, [HUMANOID.index("leftHand"), HUMANOID.index("rightHand")], 1]
+    assert hands.max() > places[:, HUMANOID.index("leftUpperArm"), 1].max()
+    # hips that an act moves are not moved during anything else
+    assert model.likeliest("walks while doing squats").lacking
+
+
+def test_styles_are_laid_over_a_walk(model: motet.CodesModel) -> None:
+    (limp,) = model.generate("limp")
+    (sad,) = model.generate("a sad person walks with his head hanging down", seconds=8)
+    assert (limp.action, sad.action) == ("limp", "walk sadly")
+    assert len(sad.frames) == 240
+    for generated in (limp, sad):
+        way = global_transforms(generated.motion)[1][:, 0, [0, 2]]
+        assert np.linalg.norm(way[-1] - way[0]) > 2
+    # the head hangs to the end: what lasts longer is repeated
+    rotations, _ = global_transforms(sad.motion)
+    nod = np.degrees(np.arcsin(-rotations[:200, HUMANOID.index("head"), 1, 2]))
+    assert nod.min() > 15
 
 
 def test_a_story_goes_on_before_and_after_it(model: motet.CodesModel) -> None:

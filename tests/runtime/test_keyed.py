@@ -29,6 +29,11 @@ def standing() -> Motion:
 
 
 @pytest.fixture(scope="module")
+def walking() -> Motion:
+    return motet.load("control").run("walk speed 1.1 14s")
+
+
+@pytest.fixture(scope="module")
 def t_pose() -> Motion:
     """Four seconds of the figure at rest, on its place."""
     channels = motet.load("control").run("stop 0.1s")
@@ -50,9 +55,10 @@ def joint(motion: Motion, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ours())
-def test_every_act_is_one_that_a_body_can_do(name: str, standing: Motion) -> None:
+def test_every_act_is_one_that_a_body_can_do(name: str, standing: Motion, walking: Motion) -> None:
+    base = {"stand": standing, "walk": walking}[ours()[name].over]
     for seed in (0, 1):
-        motion = ours()[name].motion(standing, seed)
+        motion = ours()[name].motion(base, seed)
         rotations, places = global_transforms(motion)
         speeds = np.linalg.norm(np.diff(places, axis=0), axis=2) * motion.fps
         assert speeds.max() < FASTEST
@@ -64,7 +70,7 @@ def test_every_act_is_one_that_a_body_can_do(name: str, standing: Motion) -> Non
                 assert np.linalg.norm(places[:, HUMANOID.index(side + tip)] - middle, axis=1).min() > 0.08
         # it begins as the base does, but for what is there from the begin
         if ours()[name].keys[0].at[0] > 0:
-            assert np.abs(places[0] - global_transforms(standing[:1])[1][0]).max() < 0.03
+            assert np.abs(places[0] - global_transforms(base[:1])[1][0]).max() < 0.03
 
 
 def test_says_are_sentences_of_one_act_each() -> None:

@@ -16,13 +16,19 @@ from motet.models.load import load_as
 from motet.motion.motion import Motion
 from motet.steering.model import SteerModel
 
+WALK_SPEED = 1.3
+"""Metres a second of a person who walks below an act."""
+
 
 @click.command()
 @click.argument("acts", required=False, type=Path)
 @out_option
 @click.option("--act", "names", multiple=True, help="Only this act; may be given several times.  [default: all]")
 @click.option(
-    "--over", type=Path, metavar="MOTION", help="Motion that the acts are laid over.  [default: a person who stands]"
+    "--over",
+    type=Path,
+    metavar="MOTION",
+    help="Motion below the acts.  [default: a person who stands or walks]",
 )
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of times, sizes and counts.")
 @write_options
@@ -44,9 +50,13 @@ def key(
     """
     chosen = _chosen(ours() if acts is None else read_acts(acts), names)
     outs = places(out, list(chosen), output=output)
-    base = _standing(chosen, seed, session) if over is None else read(over)
+    if over is None:
+        model = load_as(SteerModel, "control", session)
+        bases = {name: _below(model, act, seed) for name, act in chosen.items()}
+    else:
+        bases = dict.fromkeys(chosen, read(over))
     for (name, act), place in zip(chosen.items(), outs, strict=True):
-        motion = output.write(place, act.motion(base, seed), name)
+        motion = output.write(place, act.motion(bases[name], seed), name)
         click.echo(f"{place}: {size(len(motion), motion.fps)}: {name}")
     output.finish()
 
@@ -58,8 +68,7 @@ def _chosen(acts: Mapping[str, KeyedAct], names: tuple[str, ...]) -> Mapping[str
     return {name: acts[name] for name in names or acts}
 
 
-def _standing(acts: Mapping[str, KeyedAct], seed: int, session: SessionOptions) -> Motion:
-    """A person who stands and breathes, a little longer than all acts."""
-    seconds = max(act.seconds(seed) for act in acts.values())
-    model = load_as(SteerModel, "control", session)
-    return model.run(f"stop {seconds + 1:.1f}s")
+def _below(model: SteerModel, act: KeyedAct, seed: int) -> Motion:
+    """A person who stands and breathes, or walks, a little longer than an act."""
+    order = f"walk speed {WALK_SPEED * act.pace:.2f}" if act.over == "walk" else "stop"
+    return model.run(f"{order} {act.seconds(seed) + 1:.1f}s")

@@ -1,6 +1,8 @@
 """Acts by key poses (:mod:`motet.keyed`) as generated motions: which sentences name one, and how it is laid over a
 figure that stands."""
 
+import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,13 +17,25 @@ from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
 from motet.text.numeric_phrases import PACE_PHRASES
 
-BASE_SENTENCE = "a person stands still"
-"""The sentence of what they are laid over."""
+BASE_SENTENCES = {"stand": "a person stands still", "walk": "a person walks forward"}
+"""The sentences of what they are laid over."""
+
+WALKED_SECONDS = 4.0
+"""How long an act that is laid over anything but a figure that stands lasts at least."""
+
+TOGETHER = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it)|with)\b")
+"""Words between an act and what the figure does below it."""
 
 FILLER_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
 """Stems of verbs that name no act."""
 
-FILLER_WORDS = FUNCTION_WORDS | {"human", "humans", "subject", "subjects", "persons", "please"}
+FILLER_WORDS = (
+    FUNCTION_WORDS
+    | {"human", "humans", "subject", "subjects", "persons", "please"}
+    | {
+        *("across", "like", "quite", "really", "some", "through", "very"),
+    }
+)
 """Words that name no act; not their stems, as that of toes is to."""
 
 BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
@@ -41,12 +55,30 @@ BOTH_SIDES = frozenset(("left", "right"))
 @dataclass(frozen=True)
 class NamedAct:
     """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act. is_counted:
-    whether the sentence says how often. lacking: the words of the sentence that the act leaves out."""
+    whether the sentence says how often. lacking: the words of the sentence that the act leaves out. below: the text of
+    what the act is laid over, "" for what the act says itself."""
 
     act: KeyedAct
     sentence: str
     is_counted: bool = False
     lacking: tuple[str, ...] = ()
+    below: str = ""
+
+    @property
+    def base(self) -> str:
+        """The text of what the act is laid over."""
+        return self.below or BASE_SENTENCES[self.act.over]
+
+    @property
+    def goes(self) -> bool:
+        """Whether it is laid over anything but a figure that stands."""
+        return self.base != BASE_SENTENCES["stand"]
+
+    @property
+    def is_of_upper_body(self) -> bool:
+        """Whether hips and feet stay, so that the act can be laid over anything."""
+        lower = {"hips", "left_foot", "right_foot"}
+        return all(key.numbers.keys().isdisjoint(lower) for key in self.act.keys)
 
     @property
     def confidence(self) -> float:
@@ -65,8 +97,13 @@ class NamedAct:
         small = {"head", "chest", "shoulders"}
         return all(key.numbers.keys() <= small and not key.hands for key in self.act.keys)
 
-    def within(self, seconds: float, seed: int) -> "NamedAct":
-        """The act played up to twice as fast, if it lasts longer than some seconds."""
+    def lasting(self, seconds: float, seed: int) -> "NamedAct":
+        """The act repeated more often, if it can be and is shorter than some seconds, or played up to twice as fast, if
+        it lasts longer."""
+        shortfall = seconds - self.act.seconds(seed)
+        if shortfall > 0 and self.act.repeat and not self.is_counted:
+            times = self.act.repeat.times[0] + math.ceil(shortfall / self.act.repeat.every[0])
+            return replace(self, act=replace(self.act, repeat=replace(self.act.repeat, times=(times, times))))
         faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / ACT_FPS, 1 / ACT_FPS), 1, MOST_HURRIED)
         slowest, fastest = faster * np.array(self.act.speed)
         return replace(self, act=replace(self.act, speed=(slowest, fastest)))
@@ -84,8 +121,10 @@ class NamedAct:
 def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:
     """The act that lower-case words name, None where there is none: all of them are words of its sentences, but for a
     side, and one of its sentences has no others. times: how often it is to be done, where the words say it."""
+    words = list(words)
     stems = stems_of(words)
-    matches = [(len(of_sentence), name, sentence) for name, sentence, of_sentence in _sentences_within(stems)]
+    within = _sentences_within(stems)
+    matches = [(len(order), name, sentence) for name, sentence, order in within if _has_particles(words, sentence)]
     if not matches:
         return None
     # the sentence that says the most of it
@@ -94,12 +133,16 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
 
 
 def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | None:
-    """The act of which a sentence, in lower-case words without its subject, has an order beside other words, the first of
-    them its verb; that which leaves out the fewest of these. None where there is none."""
+    """The act of which a sentence, in lower-case words without its subject, has an order beside other words, the first
+    of them its verb; that which leaves out the fewest of these. None where there is none."""
     stems = stems_of(words)
     nearest: NamedAct | None = None
     for name, sentences in _sentences().items():
-        orders = [sentence for sentence, order in sentences.items() if order <= stems and _is_order(sentence, words)]
+        orders = []
+        for sentence, order in sentences.items():
+            has_verb = stems_of(words[:1]) and stems_of(words[:1]) <= order
+            if has_verb and order <= stems and _has_particles(words, sentence):
+                orders.append(sentence)
         if not orders:
             continue
         of_act = frozenset[str]().union(BOTH_SIDES, *sentences.values())
@@ -110,10 +153,9 @@ def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | N
     return nearest
 
 
-def _is_order(sentence: str, words: Sequence[str]) -> bool:
-    """Whether some words begin with the verb of an act's sentence and have its particles: "put up" is not "put"."""
-    particles = FUNCTION_WORDS.intersection(sentence.split()) - ARTICLES
-    return particles <= set(words) and bool(stems_of(words[:1]) & stems_of(sentence.split()))
+def _has_particles(words: Iterable[str], sentence: str) -> bool:
+    """Whether some words have the particles of an act's sentence: "put" is not "put up"."""
+    return FUNCTION_WORDS.intersection(sentence.split()) - ARTICLES <= set(words)
 
 
 def _adapted(name: str, sentence: str, stems: frozenset[str], times: float | None) -> NamedAct:

@@ -29,7 +29,15 @@ from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecode
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
-from motet.generate.keyed_acts import BASE_SENTENCE, NamedAct, act_named, act_within, stems_of, without_subject
+from motet.generate.keyed_acts import (
+    BASE_SENTENCES,
+    TOGETHER,
+    NamedAct,
+    act_named,
+    act_within,
+    stems_of,
+    without_subject,
+)
 from motet.generate.keyed_acts import verbs as keyed_verbs
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
@@ -266,29 +274,45 @@ class CodesModel(GenerateModel):
             sentence = " ".join(words)
             act = act_named(words)
         if act is None:
-            return self._keyed_within(sentence)
+            return self._keyed_over(sentence) or self._keyed_within(sentence)
         if act.is_small:
             return act
-        if self._commands.act(sentence) is not None:
+        if self._commands.act(sentence) is not None and not self._commands.is_instead(sentence):
             return None
-        if not all(map(self.vocabulary.meant, words)) or self.lacking(sentence):
+        if self._leaves_out(sentence):
             return act
         recorded = self._sentences[int(self._context(sentence).argmax())]
         return None if stems_of(act.sentence.split()) <= stems_of(recorded.split()) else act
 
+    def _keyed_over(self, sentence: str) -> NamedAct | None:
+        """The act of the upper body that a sentence names beside what is done at the same time, "waves while walking",
+        unless the likeliest recorded action or command shows both."""
+        clauses = [clause.strip() for clause in TOGETHER.split(sentence)]
+        if len(clauses) != 2 or not all(clauses) or not self._leaves_out(sentence):
+            return None
+        for act_clause, below in (clauses, clauses[::-1]):
+            act = act_named(without_subject(act_clause.split()))
+            if act and act.is_of_upper_body and not self._leaves_out(below):
+                return replace(act, below=below)
+        return None
+
+    def _leaves_out(self, sentence: str) -> bool:
+        """Whether a sentence has an unknown word, or its likeliest action or command leaves out a word."""
+        words = self.vocabulary.rules.words(sentence)
+        return not all(map(self.vocabulary.meant, words)) or bool(self.lacking(sentence))
+
     def _keyed_within(self, sentence: str) -> NamedAct | None:
         """The act whose order a sentence without its subject holds beside other words, unless the likeliest recorded
-        action or command leaves out no more of it, a verb counting twice."""
+        action or command leaves out no more of it, which counts a word more where it lacks a word of the order."""
         text, times = _counted(sentence)
         words = self.vocabulary.rules.words(text)
         act = act_within(words, times) if words else None
         if act is None:
             return None
-        missing = [word for word in words if word not in FUNCTION_WORDS and not self.vocabulary.meant(word)]
-        if any(map(self.vocabulary.meant, words)):
-            missing += self.lacking(text)
-        lacks_verb = stem(words[0]) in map(stem, missing)
-        return act if len(act.lacking) < len(missing) + lacks_verb else None
+        lacking = self.lacking(text) if any(map(self.vocabulary.meant, words)) else []
+        missing = stems_of(word for word in words if self.vocabulary.meant(word) in ("", *lacking))
+        lacks_order = not missing.isdisjoint(stems_of(act.sentence.split()))
+        return act if len(act.lacking) < len(missing) + lacks_order else None
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
@@ -344,8 +368,8 @@ class CodesModel(GenerateModel):
         like :func:`motet.text.numeric_phrases.quantities_of`."""
         if self.contract.skeleton != HUMANOID:
             return Quantities(sentence)
-        if self._keyed(sentence):
-            return Quantities(BASE_SENTENCE)
+        if act := self._keyed(sentence):
+            return Quantities(act.base)
         if self._commands.act(sentence) is not None:
             return Quantities(sentence)
         quantities = self._on_the_spot(quantities_of(sentence))
@@ -412,7 +436,7 @@ class CodesModel(GenerateModel):
         """A request to show a text. seconds: 0 where the text says them, or it ends by itself. paced: whether it is
         played faster or slower to last as long."""
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
-        if quantities.text == BASE_SENTENCE and (act := self._keyed(text)):
+        if (act := self._keyed(text)) and quantities.text == act.base:
             return replace(request, keyed=act)
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
@@ -433,7 +457,7 @@ class CodesModel(GenerateModel):
         shows.
         """
         if numbers and (act := self._keyed(sentence)):
-            return Understood(act.confidence, (act.act.says[0],), True)
+            return Understood(act.confidence, (act.act.says[0],), act.confidence >= self._familiar.confident)
         text = self.quantities(sentence).text if numbers else sentence
         return self._understood(text, self.embed(text))
 
@@ -682,9 +706,9 @@ class CodesModel(GenerateModel):
         # Texts in the order in which they are shown, and what each is read as.
         timed = self._timed_texts(sentences, seconds, whole)
         if stand in ("start", "both"):
-            timed.insert(0, (BASE_SENTENCE, STANDING_SECONDS))
+            timed.insert(0, (BASE_SENTENCES["stand"], STANDING_SECONDS))
         if stand in ("end", "both"):
-            timed.append((BASE_SENTENCE, STANDING_SECONDS))
+            timed.append((BASE_SENTENCES["stand"], STANDING_SECONDS))
         requests, noise, chosen = self._requests(timed, numbers, seed, strict, loop_settings)
 
         # They are drawn after the end of the motion before.

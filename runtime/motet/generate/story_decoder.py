@@ -12,7 +12,7 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
-from motet.generate.keyed_acts import NamedAct
+from motet.generate.keyed_acts import WALKED_SECONDS, NamedAct
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -245,17 +245,19 @@ class Teller:
             yield Piece(number, int(actions[0]), shown, len(shown))
 
     def _keyed(self, number: int, request: Request, act: NamedAct, context: Context | None) -> Iterator[Piece]:
-        """An act by key poses, over a figure that stands as long."""
+        """An act by key poses, over a figure that stands, or does what the act is laid over, as long."""
         seed = int(self.noise[0].random((1,), np.float32)[0] * 1e7)
         if request.seconds:
-            act = act.within(request.seconds, seed)
+            act = act.lasting(request.seconds, seed)
+        elif act.goes:
+            act = act.lasting(max(act.act.seconds(seed), WALKED_SECONDS), seed)
         # as many steps as the act has, or more; what lasts longer than it may is begun, and cut off
         seconds = act.act.seconds(seed)
         limit = seconds if act.is_counted else min(seconds, self.settings["max_seconds"])
         last = max(1, round((request.seconds or limit) * self.contract.fps))
-        steps = self.codec.steps(max(seconds, request.seconds)) + 1
+        steps = self.codec.steps(max(seconds, request.seconds) * act.act.pace) + 1
         action = self._action(request)
-        frames = self._decoded(self._drawn(action, steps, context), context)
+        frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
         shown = act.laid_over(frames, self.contract, seed)[:last]
         yield Piece(number, int(action[0]), shown, len(shown))
 

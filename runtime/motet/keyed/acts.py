@@ -25,7 +25,8 @@ class KeyedAct:
 
     says: sentences for it. ease: seconds in which a part comes from the base to its first key, and goes back after its
     last. speed, amplitude: of each draw; the amplitude is of all numbers, but not of where hands go. mirrored: whether
-    a draw may have left and right exchanged.
+    a draw may have left and right exchanged. over: what the figure does below the act, "stand" or "walk", at ``pace``
+    times its usual speed.
     """
 
     name: str
@@ -36,6 +37,8 @@ class KeyedAct:
     speed: Span = (0.92, 1.08)
     amplitude: Span = (0.9, 1.1)
     mirrored: bool = False
+    over: str = "stand"
+    pace: float = 1.0
 
     def motion(self, base: Motion, seed: Seed = 0) -> Motion:
         """The act laid over the begin of a base, such as a person who stands.

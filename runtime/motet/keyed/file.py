@@ -25,8 +25,10 @@ TIME = Range(0, 60, "s")
 EASE = Range(0.05, 5, "s")
 SPEED = Range(0.3, 3)
 AMPLITUDE = Range(0.1, 2)
+PACE = Range(0.4, 2)
+OVER = ("stand", "walk")
 
-ACT_FIELDS = ("says", "ease", "speed", "amplitude", "mirrored", "repeat", "key")
+ACT_FIELDS = ("says", "ease", "speed", "amplitude", "mirrored", "over", "pace", "repeat", "key")
 KEY_FIELDS = ("at", "hold", *PART_NUMBERS, *HAND_PARTS)
 HAND_FIELDS = ("to", "palm", "fingers", "touch", *HAND)
 REPEAT_FIELDS = ("keys", "every", "times")
@@ -114,6 +116,12 @@ def _settings(name: str, table: Any) -> dict[str, Any]:
         settings["mirrored"] = table["mirrored"]
         if not isinstance(table["mirrored"], bool):
             raise _EntryError("mirrored: expected true or false")
+    if "over" in table:
+        settings["over"] = table["over"]
+        if table["over"] not in OVER:
+            raise _EntryError(f"over: expected {' or '.join(OVER)}, not {quoted(str(table['over']))}")
+    if "pace" in table:
+        settings["pace"], _ = _span([table["pace"]] * 2, PACE, "pace")
     if "repeat" in table:
         settings["repeat"] = _repeat(table["repeat"], len(keys))
     for field, limits in (("ease", EASE), ("speed", SPEED), ("amplitude", AMPLITUDE)):

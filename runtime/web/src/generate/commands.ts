@@ -1,7 +1,7 @@
 /* Bare commands, such as "walk", and the plain act that each means: docs/reference/bundle.md, "Bare commands". */
 import { CLAUSES } from "../generated.js";
 import { BundleError } from "../errors.js";
-import { stem } from "../text/clauses.js";
+import { stem, SUBJECT } from "../text/clauses.js";
 
 /** An entry of a manifest. */
 export interface Command {
@@ -51,8 +51,13 @@ export class Commands {
 
   /** The action of the command that a text is. */
   act(text: string): number | undefined {
-    const meant = this.numbers.get(keyOf(this.split(text)));
-    return meant && this.first + meant.number;
+    const key = keyOf(this.split(text));
+    return this.numbers.has(key) ? this.action(key) : undefined;
+  }
+
+  /** The action of a command. */
+  action(key: string): number {
+    return this.first + this.numbers.get(key)!.number;
   }
 
   /** Whether a text is a command for an act that nobody recorded. */
@@ -60,22 +65,19 @@ export class Commands {
     return this.numbers.get(keyOf(this.split(text)))?.instead ?? false;
   }
 
-  /** The action of the longest command in a text that begins with a command's verb. */
-  nearest(text: string): number | undefined {
-    const words = this.split(text);
+  /** The sorted stems of the longest command in a text that, but for its subject, begins with a command's verb. */
+  nearest(text: string): string[] | undefined {
+    const words = this.split(text.replace(SUBJECT, ""));
     if (!words.length || !this.verbs.has(stem(words[0]!))) return undefined;
     const inside = new Set(keyOf(words).split(" "));
-    let longest: string[] = [];
-    let nearest: number | undefined;
-    for (const [key, { number, instead }] of this.numbers) {
+    let longest: string[] | undefined;
+    for (const [key, { instead }] of this.numbers) {
       const stems = key.split(" ");
-      if (instead || stems.length >= inside.size || !stems.every((word) => inside.has(word))) continue;
-      if (stems.length < longest.length || (stems.length === longest.length && !later(stems, longest)))
-        continue;
-      longest = stems;
-      nearest = this.first + number;
+      if (instead || !stems.includes(stem(words[0]!)) || !stems.every((word) => inside.has(word))) continue;
+      const longer = stems.length - (longest?.length ?? 0);
+      if (longer > 0 || (longer === 0 && later(stems, longest!))) longest = stems;
     }
-    return nearest;
+    return longest;
   }
 
   /** The stems of the words that an act does not leave out: those of its commands, and polite ones. */

@@ -315,9 +315,12 @@ export class GenerateModel extends LanguageModel {
     let act = this.commands.act(text);
     const nearest = act === undefined ? this.commands.nearest(text) : undefined;
     if (nearest !== undefined) {
-      const lacking = this.lacking(text, context.indexOf(Math.max(...context))).length;
+      // a word more where the likeliest action is not confident, and where it lacks a word of the command
+      const lacking = this.lacking(text, context.indexOf(Math.max(...context)));
       const doubtful = this.known(text, context).confident ? 0 : 1;
-      if (this.lacking(text, nearest).length < lacking + doubtful) act = nearest;
+      const lacksCommand = lacking.some((word) => nearest.includes(stem(word))) ? 1 : 0;
+      const command = this.commands.action(nearest.join(" "));
+      if (this.lacking(text, command).length < lacking.length + doubtful + lacksCommand) act = command;
     }
     const meant = new Float32Array(this.commands.first + this.commands.acts.length).fill(GENERATE.NEVER);
     meant.set(act === undefined ? context : context.map((value) => value + GENERATE.FAR_LESS));

@@ -3,7 +3,9 @@ import { CLAUSES } from "../generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
 const THEN = /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
 const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
-const OPENING = /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the)\s+\w+|\w+ly)(?:\s+(?:is|are))?\s+)+/iu;
+/** Words that may stand before the verb of a part: its subject, or an adverb. */
+export const SUBJECT =
+  /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the)\s+\w+|\w+ly)(?:\s+(?:is|are))?\s+)+/iu;
 
 /** Words that say little about what is done. */
 export const FUNCTION_WORDS: ReadonlySet<string> = new Set(CLAUSES.FUNCTION_WORDS);
@@ -53,7 +55,7 @@ function beforeVerbs(text: string, verbs: Set<string>): string[] {
     const opened = /^[\p{L}\p{N}_]+/u.exec(
       text
         .slice(index + separator.length)
-        .replace(OPENING, "")
+        .replace(SUBJECT, "")
         .toLowerCase(),
     );
     if (!opened || !verbs.has(stem(opened[0])) || !done.some((word) => verbs.has(stem(word)))) continue;
