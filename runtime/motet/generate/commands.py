@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from motet.bundle.fields import Fields
 from motet.errors import BundleError
-from motet.text.clauses import POLITE_WORDS, SUBJECT, stem
+from motet.text.clauses import POLITE_WORDS, stem
 from motet.text.vocabulary import TextRules
 
 Key = frozenset[str]
@@ -88,8 +88,8 @@ class Commands:
         return key in self.numbers and key in self._act(key).instead
 
     def nearest(self, text: str) -> Key | None:
-        """The longest command in a text that, but for its subject, begins with a command's verb; None without one."""
-        words = self.rules.words(SUBJECT.sub("", text, count=1))
+        """The longest command in a text that begins with a command's verb; None without one."""
+        words = self.rules.words(text)
         if not words or stem(words[0]) not in self.verbs:
             return None
         key = key_of(words)

@@ -217,11 +217,12 @@ class CodesModel(GenerateModel):
         return contexts[0] if isinstance(sentences, str) else contexts
 
     def _meant(self, text: str, context: Floats) -> Floats:
-        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions: that of a command alone, or
-        of the nearest one where it leaves out less than the likeliest action, which counts a word more where it is not
+        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions: that of a command alone,
+        which it is but for its subject, or of the nearest one where it leaves out less than the likeliest action, which counts a word more where it is not
         confident, and where it lacks a word of the command."""
-        act = self._commands.act(text)
-        nearest = None if act is not None else self._commands.nearest(text)
+        order = SUBJECT.sub("", text, count=1)
+        act = self._commands.act(order)
+        nearest = None if act is not None else self._commands.nearest(order)
         if nearest is not None:
             lacking = self.lacking(text, int(context.argmax()))
             limit = len(lacking) + (not self._understood(text, context).confident)

@@ -1,7 +1,7 @@
 /* Bare commands, such as "walk", and the plain act that each means: docs/reference/bundle.md, "Bare commands". */
 import { CLAUSES } from "../generated.js";
 import { BundleError } from "../errors.js";
-import { stem, SUBJECT } from "../text/clauses.js";
+import { stem } from "../text/clauses.js";
 
 /** An entry of a manifest. */
 export interface Command {
@@ -65,9 +65,9 @@ export class Commands {
     return this.numbers.get(keyOf(this.split(text)))?.instead ?? false;
   }
 
-  /** The sorted stems of the longest command in a text that, but for its subject, begins with a command's verb. */
+  /** The sorted stems of the longest command in a text that begins with a command's verb. */
   nearest(text: string): string[] | undefined {
-    const words = this.split(text.replace(SUBJECT, ""));
+    const words = this.split(text);
     if (!words.length || !this.verbs.has(stem(words[0]!))) return undefined;
     const inside = new Set(keyOf(words).split(" "));
     let longest: string[] | undefined;

@@ -1,7 +1,7 @@
 import { GENERATE, continuationSettings, familiaritySettings, memorySettings } from "../generated.js";
 import type { Bundle, Manifest } from "../bundle/bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
-import { FUNCTION_WORDS, partsOf, sentencesOf, stem, verbsOf } from "../text/clauses.js";
+import { FUNCTION_WORDS, partsOf, sentencesOf, stem, SUBJECT, verbsOf } from "../text/clauses.js";
 import { Commands } from "./commands.js";
 import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
 import { BundleError, DecodingError, TextError } from "../errors.js";
@@ -312,8 +312,9 @@ export class GenerateModel extends LanguageModel {
 
   /** That of a command alone, or of the nearest one where it leaves out less than the likeliest action. */
   private meant(text: string, context: Float32Array): Float32Array {
-    let act = this.commands.act(text);
-    const nearest = act === undefined ? this.commands.nearest(text) : undefined;
+    const order = text.replace(SUBJECT, "");
+    let act = this.commands.act(order);
+    const nearest = act === undefined ? this.commands.nearest(order) : undefined;
     if (nearest !== undefined) {
       // a word more where the likeliest action is not confident, and where it lacks a word of the command
       const lacking = this.lacking(text, context.indexOf(Math.max(...context)));
