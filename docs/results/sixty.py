@@ -1,7 +1,10 @@
-"""Draw what the bundle `generate` shows for the sentences of docs/results/sixty.tsv, two seeds each, and print what it
-says of them: `python docs/results/sixty.py`. docs/results/sixty.md tells how they were judged."""
+"""Draw what the bundle `generate` shows for the sentences of a table, two seeds each, and print what it says of them.
+
+`python docs/results/sixty.py` takes docs/results/sixty.tsv and draws into docs/figures; another table and folder may
+follow. docs/results/sixty.md tells how they were judged."""
 
 import csv
+import sys
 import warnings
 from collections.abc import Iterator
 from functools import partial
@@ -25,18 +28,18 @@ WARNED = " | warned"
 def shown(model: motet.GenerateModel, sentence: str) -> Iterator[tuple[motet.Motion | None, str]]:
     """A motion for each seed, None where the sentence is refused, and a line that says what it is."""
     for seed in SEEDS:
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as messages:
             warnings.simplefilter("always")
             try:
-                found = model.generate(sentence, seed=seed)[0]
-            except motet.TextError as error:
+                generated = model.generate(sentence, seed=seed)[0]
+            except motet.MotetError as error:
                 yield None, f"refused: {error}"
                 continue
-        track = track_of(found.motion)
+        track = track_of(generated.motion)
         way = float(np.linalg.norm(np.diff(track.points[:, 0, [0, 2]], axis=0), axis=1).sum())
-        said = f"as: {found.action}" if found.action else "in parts"
-        line = f"{said} | {track.seconds:.1f} s, {way:.1f} m, {track.turn:.0f} degrees"
-        yield found.motion, line + WARNED * bool(told)
+        reading = f"as: {generated.action}" if generated.action else "in parts"
+        line = f"{reading} | {track.seconds:.1f} s, {way:.1f} m, {track.turn:.0f} degrees"
+        yield generated.motion, line + WARNED * bool(messages)
 
 
 def sheet(rows: list[tuple[str, list[tuple[motet.Motion | None, str]]]]) -> Figure:
@@ -54,23 +57,23 @@ def sheet(rows: list[tuple[str, list[tuple[motet.Motion | None, str]]]]) -> Figu
     return picture
 
 
-def main() -> None:
+def main(table: Path = TABLE, folder: Path = FOLDER) -> None:
     """Write the sheets, and the lines above the strips on stdout."""
     model = motet.load("generate")
-    with TABLE.open(encoding="utf-8") as file:
-        table = list(csv.DictReader(file, delimiter="\t"))
-    asked = [(row["sentence"], list(shown(model, row["sentence"]))) for row in table]
-    for sentence, motions in asked:
+    with table.open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file, delimiter="\t"))
+    strips = [(row["sentence"], list(shown(model, row["sentence"]))) for row in rows]
+    for sentence, motions in strips:
         print(sentence, *(f"    {line}" for _, line in motions), sep="\n")
-    done = [row[seed] == "yes" for row in table for seed in ("first", "second")]
-    silent = [not line.startswith("refused") and WARNED not in line for _, motions in asked for _, line in motions]
-    wrong = sum(not one and quiet for one, quiet in zip(done, silent, strict=True))
+    done = [row[seed] == "yes" for row in rows for seed in ("first", "second")]
+    silent = [not line.startswith("refused") and WARNED not in line for _, motions in strips for _, line in motions]
+    wrong = sum(not is_done and quiet for is_done, quiet in zip(done, silent, strict=True))
     both = sum(map(min, done[::2], done[1::2]))
     print(f"done: {both} sentences, {sum(done)} strips; wrong without a word: {wrong} strips")
-    sheets = [asked[start : start + PER_SHEET] for start in range(0, len(asked), PER_SHEET)]
-    for path in save({f"sixty-{n}": partial(sheet, rows) for n, rows in enumerate(sheets, 1)}, FOLDER):
+    sheets = [strips[start : start + PER_SHEET] for start in range(0, len(strips), PER_SHEET)]
+    for path in save({f"{table.stem}-{n}": partial(sheet, rows) for n, rows in enumerate(sheets, 1)}, folder):
         Image.open(path).quantize(64).save(path, optimize=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(*map(Path, sys.argv[1:]))
