@@ -109,9 +109,9 @@ def test_recorded_actions_come_first(model: motet.CodesModel) -> None:
 @pytest.mark.parametrize(
     ("sentence", "name", "lacking"),
     [
-        ("A person hammers a nail into a board.", "hammer", {"board"}),
-        ("He points at something far away on the horizon.", "point", {"far", "away", "horizon"}),
-        ("strumming an acoustic guitar", "play guitar", {"acoustic"}),
+        ("A person hammers a nail into the spaceship.", "hammer", {"spaceship"}),
+        ("He points at something beyond the pyramids.", "point", {"beyond", "pyramids"}),
+        ("strumming a purple guitar", "play guitar", {"purple"}),
     ],
 )
 def test_a_sentence_may_say_more_than_an_act(
@@ -130,7 +130,7 @@ def test_a_sentence_may_say_more_than_an_act(
 
 
 def test_what_is_recorded_comes_before_a_part_of_an_act(model: motet.CodesModel) -> None:
-    assert act_within(["walk", "to", "the", "door"]) is None
+    assert act_within(["run", "to", "the", "door"]) is None
     assert act_within(["puts", "hands", "on", "the", "thighs"]) is None  # "put hands up" has another particle
     assert "box" in model.likeliest("a person lifts a box").action
 

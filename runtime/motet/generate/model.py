@@ -293,7 +293,8 @@ class CodesModel(GenerateModel):
             return None
         for act_clause, below in (clauses, clauses[::-1]):
             act = act_named(without_subject(act_clause.split()))
-            if act and act.is_of_upper_body and not self._leaves_out(below):
+            has_verb = any(stem(word) in self._verbs for word in below.split())
+            if act and act.is_of_upper_body and not act.goes and has_verb and not self._leaves_out(below):
                 return replace(act, below=below)
         return None
 
