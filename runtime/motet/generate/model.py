@@ -217,9 +217,12 @@ class CodesModel(GenerateModel):
         return contexts[0] if isinstance(sentences, str) else contexts
 
     def _meant(self, text: str, context: Floats) -> Floats:
-        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions: that of a command alone,
-        which it is but for its subject, or of the nearest one where it leaves out less than the likeliest action, which counts a word more where it is not
-        confident, and where it lacks a word of the command."""
+        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions.
+
+        It is that of a command alone, which a text is but for its subject, or of the nearest one where it leaves out
+        less than the likeliest action. For this a word more counts where it is not confident, and another one where it
+        lacks a word of the command.
+        """
         order = SUBJECT.sub("", text, count=1)
         act = self._commands.act(order)
         nearest = None if act is not None else self._commands.nearest(order)
