@@ -93,7 +93,7 @@ def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozens
     their stems."""
     for name, sentences in _sentences().items():
         sides = stems & BOTH_SIDES if ours()[name].mirrored else frozenset()
-        if not stems - sides <= frozenset[str]().union(*sentences.values()):
+        if not stems - sides <= _stems_of_act(name):
             continue
         for sentence, of_sentence in sentences.items():
             if of_sentence and of_sentence <= stems:
@@ -119,10 +119,13 @@ def without_subject(words: Sequence[str]) -> list[str]:
 @cache
 def _stems_of_acts() -> frozenset[str]:
     """The stems of all words of all acts."""
-    of_acts = set[str]()
-    for sentences in _sentences().values():
-        of_acts.update(*sentences.values())
-    return frozenset(of_acts)
+    return frozenset[str]().union(*map(_stems_of_act, _sentences()))
+
+
+@cache
+def _stems_of_act(name: str) -> frozenset[str]:
+    """The stems of all words of an act."""
+    return frozenset[str]().union(*_sentences()[name].values())
 
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
