@@ -109,18 +109,26 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
 
 def _strip(graph: onnx.GraphProto) -> None:
     """Remove doc strings and metadata, which hold source paths, from a graph and the bodies of its Scan and If."""
-    graph.doc_string = ""
-    del graph.metadata_props[:]
-    for items in (graph.node, graph.initializer, graph.input, graph.output, graph.value_info):
-        for item in items:
-            item.doc_string = ""
-            del item.metadata_props[:]
+    for part in _with_bodies(graph):
+        part.doc_string = ""
+        del part.metadata_props[:]
+        for items in (part.node, part.initializer, part.input, part.output, part.value_info):
+            for item in items:
+                item.doc_string = ""
+                del item.metadata_props[:]
+        for node in part.node:
+            for attribute in node.attribute:
+                attribute.doc_string = ""
+
+
+def _with_bodies(graph: onnx.GraphProto) -> Iterator[onnx.GraphProto]:
+    """A graph and the bodies of its Scan and If, however deep."""
+    yield graph
     for node in graph.node:
         for attribute in node.attribute:
-            attribute.doc_string = ""
             for body in (attribute.g, *attribute.graphs):
                 if body.node:
-                    _strip(body)
+                    yield from _with_bodies(body)
 
 
 def _flatten(graph: onnx.GraphProto, ranks: Mapping[str, int]) -> None:
@@ -161,6 +169,66 @@ def _ranks(model: onnx.ModelProto) -> dict[str, int]:
     """The number of axes of each tensor between a graph's inputs and outputs."""
     values = onnx.shape_inference.infer_shapes(model).graph.value_info
     return {value.name: len(value.type.tensor_type.shape.dim) for value in values}
+
+
+def renewed(model: bytes) -> bytes:
+    """A graph as it would be stored today, with the same weights."""
+    proto = onnx.load_from_string(model)
+    return self_contained(proto, {prop.key: prop.value for prop in proto.metadata_props})
+
+
+def apart(models: Mapping[str, bytes]) -> tuple[dict[str, bytes], bytes]:
+    """Graphs by name without the weights that several of them hold, and these as a model of their own; b"" for none.
+
+    The bytes of such a graph with those of the weights behind them are the whole graph: protocol buffers merge.
+    """
+    protos = {name: onnx.load_from_string(model) for name, model in models.items()}
+    # each weight by its content, and what it is called in each graph
+    names: dict[bytes, dict[str, str]] = {}
+    for name, proto in protos.items():
+        for tensor in proto.graph.initializer:
+            if np.prod(tensor.dims) >= SMALLEST_QUANTISED:
+                names.setdefault(_content(tensor), {})[name] = tensor.name
+    # those of several graphs get one name in all of them: the exporter makes up some names
+    weights = onnx.ModelProto()
+    shared: dict[bytes, str] = {}
+    for content, called in names.items():
+        if len(called) > 1:
+            common = set(called.values())
+            shared[content] = common.pop() if len(common) == 1 else f"shared.{len(shared)}"
+            tensor = weights.graph.initializer.add()
+            tensor.ParseFromString(content)
+            tensor.name = shared[content]
+    rest = {name: _without(proto, shared) for name, proto in protos.items()}
+    return rest, weights.SerializeToString(deterministic=True)
+
+
+def _content(tensor: onnx.TensorProto) -> bytes:
+    """A tensor without its name."""
+    nameless = onnx.TensorProto()
+    nameless.CopyFrom(tensor)
+    nameless.ClearField("name")
+    content: bytes = nameless.SerializeToString(deterministic=True)
+    return content
+
+
+def _without(model: onnx.ModelProto, shared: Mapping[bytes, str]) -> bytes:
+    """A model without the weights that are shared, by their content, whose new names its nodes take."""
+    kept = []
+    renamed = {}
+    for tensor in model.graph.initializer:
+        name = shared.get(_content(tensor))
+        if name is None:
+            kept.append(tensor)
+        else:
+            renamed[tensor.name] = name
+    del model.graph.initializer[:]
+    model.graph.initializer.extend(kept)
+    for graph in _with_bodies(model.graph):
+        for node in graph.node:
+            node.input[:] = [renamed.get(name, name) for name in node.input]
+    rest: bytes = model.SerializeToString(deterministic=True)
+    return rest
 
 
 @torch.no_grad()

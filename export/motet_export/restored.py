@@ -39,7 +39,7 @@ def restored(bundle: Bundle) -> Run:
     _copy_arrays(state, bundle)
     weight_names = _randomised(other)
     for role, (module, spec) in other.graphs().items():
-        stored = _renamed(_tensors(bundle.read(manifest.graphs[role].file)), net)
+        stored = _renamed(_tensors(bundle.model(role)), net)
         random = _tensors(export_graph(module, spec, {}))
         _restore(state, other.state_dict(), stored, random, weight_names)
     # it must compute what the bundle does
