@@ -136,22 +136,28 @@ def _write(
     """Write the bundle of a model, with golden vectors and tables."""
     # golden vectors, graphs and tables, each with its entry in the manifest
     vectors, golden = golden_vectors(model, draws)
-    files, weights = apart(graphs)
-    if weights:
-        files["weights.onnx"] = weights
-    specs = {}
-    for role, graph in model.graphs.items():
-        file = f"{role}.onnx"
-        shares = {"weights": "weights.onnx"} if files[file] != graphs[file] else {}
-        specs[role] = {"file": file, **shares, **graph.spec.to_json()}
+    files, entries = _graph_files(model, graphs)
     tables = {}
     arrays = {}
     for name, array in model.tables.items():
         tables[name] = {"file": f"{name}.npy", "dtype": array.dtype.name, "shape": array.shape}
         arrays[f"{name}.npy"] = array_bytes(array)
     settings = {kind.FEATURE: asdict(model.settings(kind)) for kind in model.SETTINGS}
-    manifest = {**about, "settings": settings, "graphs": specs, "tables": tables, "golden": golden}
+    manifest = {**about, "settings": settings, "graphs": entries, "tables": tables, "golden": golden}
     write_bundle(out, manifest, {**files, **arrays, golden["file"]: vectors})
+
+
+def _graph_files(model: BundleModel, graphs: Mapping[str, bytes]) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """The files of graphs, with the weights that several hold in one of their own, and their entries in a manifest."""
+    files, weights = apart(graphs)
+    entries = {}
+    for role, graph in model.graphs.items():
+        file = f"{role}.onnx"
+        shared = {"weights": "weights.onnx"} if files[file] != graphs[file] else {}
+        entries[role] = {"file": file, **shared, **graph.spec.to_json()}
+    if weights:
+        files["weights.onnx"] = weights
+    return files, entries
 
 
 def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:

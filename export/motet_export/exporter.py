@@ -2,6 +2,7 @@
 
 import logging
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -19,6 +20,12 @@ from motet.errors import BundleError, MotetError
 
 SMALLEST_QUANTISED = 256
 """Smallest number of elements of a tensor that is stored in fewer bits."""
+
+SMALLEST_SHARED = 1024
+"""Smallest number of bytes of a weight that several graphs share."""
+
+Content = tuple[int, tuple[int, ...], bytes]
+"""The type, shape and bytes of a tensor."""
 
 Small = tuple[NDArray[Any], Floats | None]
 """A tensor in a smaller type, and the factors by which its numbers are multiplied when it is loaded."""
@@ -183,52 +190,37 @@ def apart(models: Mapping[str, bytes]) -> tuple[dict[str, bytes], bytes]:
     The bytes of such a graph with those of the weights behind them are the whole graph: protocol buffers merge.
     """
     protos = {name: onnx.load_from_string(model) for name, model in models.items()}
-    # each weight by its content, and what it is called in each graph
-    names: dict[bytes, dict[str, str]] = {}
-    for name, proto in protos.items():
-        for tensor in proto.graph.initializer:
-            if np.prod(tensor.dims) >= SMALLEST_QUANTISED:
-                names.setdefault(_content(tensor), {})[name] = tensor.name
-    # those of several graphs get one name in all of them: the exporter makes up some names
+    shared = _shared(protos.values())
     weights = onnx.ModelProto()
-    shared: dict[bytes, str] = {}
-    for content, called in names.items():
-        if len(called) > 1:
-            common = set(called.values())
-            shared[content] = common.pop() if len(common) == 1 else f"shared.{len(shared)}"
-            tensor = weights.graph.initializer.add()
-            tensor.ParseFromString(content)
-            tensor.name = shared[content]
-    rest = {name: _without(proto, shared) for name, proto in protos.items()}
+    names: dict[Content, str] = {}
+    for proto in protos.values():
+        for tensor in [tensor for tensor in proto.graph.initializer if _content(tensor) in shared]:
+            new = names.setdefault(_content(tensor), f"shared.{tensor.name}")
+            proto.graph.initializer.remove(tensor)
+            _rename(proto.graph, tensor.name, new)
+    for content, name in names.items():
+        weights.graph.initializer.add(name=name, data_type=content[0], dims=content[1], raw_data=content[2])
+    rest = {name: proto.SerializeToString(deterministic=True) for name, proto in protos.items()}
     return rest, weights.SerializeToString(deterministic=True)
 
 
-def _content(tensor: onnx.TensorProto) -> bytes:
-    """A tensor without its name."""
-    nameless = onnx.TensorProto()
-    nameless.CopyFrom(tensor)
-    nameless.ClearField("name")
-    content: bytes = nameless.SerializeToString(deterministic=True)
-    return content
+def _shared(models: Iterable[onnx.ModelProto]) -> set[Content]:
+    """The large weights that several models hold, whatever they call them: the exporter makes up names."""
+    holders = Counter[Content]()
+    for model in models:
+        holders.update({_content(tensor) for tensor in model.graph.initializer})
+    return {content for content, count in holders.items() if count > 1 and len(content[-1]) >= SMALLEST_SHARED}
 
 
-def _without(model: onnx.ModelProto, shared: Mapping[bytes, str]) -> bytes:
-    """A model without the weights that are shared, by their content, whose new names its nodes take."""
-    kept = []
-    renamed = {}
-    for tensor in model.graph.initializer:
-        name = shared.get(_content(tensor))
-        if name is None:
-            kept.append(tensor)
-        else:
-            renamed[tensor.name] = name
-    del model.graph.initializer[:]
-    model.graph.initializer.extend(kept)
-    for graph in _with_bodies(model.graph):
-        for node in graph.node:
-            node.input[:] = [renamed.get(name, name) for name in node.input]
-    rest: bytes = model.SerializeToString(deterministic=True)
-    return rest
+def _content(tensor: onnx.TensorProto) -> Content:
+    return tensor.data_type, tuple(tensor.dims), tensor.raw_data
+
+
+def _rename(graph: onnx.GraphProto, old: str, new: str) -> None:
+    """Give a weight another name in all nodes that read it."""
+    for part in _with_bodies(graph):
+        for node in part.node:
+            node.input[:] = [new if name == old else name for name in node.input]
 
 
 @torch.no_grad()

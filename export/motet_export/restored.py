@@ -157,7 +157,7 @@ def _tensors(data: bytes) -> Tensors:
     floats: Tensors = {}
     bytes_: Tensors = {}
     for tensor in graph.initializer:
-        name = cast_names.get(tensor.name, tensor.name)
+        name = cast_names.get(tensor.name, tensor.name).replace("shared.net.", "net.")
         value = numpy_helper.to_array(tensor)
         if value.dtype.kind == "f":
             floats[name] = value.astype(np.float32)

@@ -43,7 +43,7 @@ def test_graphs_compute_what_torch_computes(kind: str, monkeypatch: pytest.Monke
     files = {role: export_graph(module, spec, {"role": role}) for role, (module, spec) in graphs.items()}
     assert not {"Scan", "Loop", "If"} & {node.op_type for node in onnx.load_from_string(files["step"]).graph.node}
     # weights of both graphs are stored once
-    monkeypatch.setattr("motet_export.exporter.SMALLEST_QUANTISED", 16)
+    monkeypatch.setattr("motet_export.exporter.SMALLEST_SHARED", 64)
     rest, weights = apart(files)
     shared = {tensor.name for tensor in onnx.load_from_string(weights).graph.initializer}
     left = [{tensor.name for tensor in onnx.load_from_string(data).graph.initializer} for data in rest.values()]
