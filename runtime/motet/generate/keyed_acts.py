@@ -73,7 +73,7 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
     """The act that lower-case words name, None where there is none: all of them are words of its sentences, but for a
     side, and one of its sentences has no others. times: how often it is to be done, where the words say it."""
     stems = stems_of(words)
-    matches = [(len(of_sentence), name, sentence) for name, sentence, of_sentence in _sentences_within(stems)]
+    matches = list(_sentences_within(stems))
     if not matches:
         return None
     # the sentence that says the most of it
@@ -88,16 +88,18 @@ def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | No
     return NamedAct(act, sentence, times is not None)
 
 
-def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """The acts that have all of some stems, but for a side, by name; each with its sentences that have no others, and
-    their stems."""
+def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[int, str, str]]:
+    """Of the acts that have all of some stems, but for a side, the sentences that have no others: how many stems each
+    has, the act's name and the sentence."""
+    if not stems - BOTH_SIDES <= _stems_of_acts():  # most sentences have a word that no act has
+        return
     for name, sentences in _sentences().items():
         sides = stems & BOTH_SIDES if ours()[name].mirrored else frozenset()
         if not stems - sides <= _stems_of_act(name):
             continue
         for sentence, of_sentence in sentences.items():
             if of_sentence and of_sentence <= stems:
-                yield name, sentence, of_sentence
+                yield len(of_sentence), name, sentence
 
 
 def without_subject(words: Sequence[str]) -> list[str]:
