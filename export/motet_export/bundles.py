@@ -17,7 +17,7 @@ from motet.models.base import BundleModel
 from motet.models.load import build, kind_of
 from motet_export.commands import with_commands
 from motet_export.decoded import differences, golden_vectors, whole_runs
-from motet_export.exporter import ExportError, export_graph, halved, quantised, round_weights
+from motet_export.exporter import ExportError, apart, export_graph, halved, quantised, renewed, round_weights
 from motet_export.parity import (
     Examples,
     check_carried,
@@ -99,8 +99,8 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
     exact = kind_of(bundle.manifest).load(bundle)
     # the same graphs with rounded weights
     files = {}
-    for role, graph in bundle.manifest.graphs.items():
-        files[f"{role}.onnx"] = halved(bundle.read(graph.file), rounded=True)
+    for role in bundle.manifest.graphs:
+        files[f"{role}.onnx"] = halved(bundle.model(role), rounded=True)
     onnx = _loaded(exact, files)
     changes = differences(onnx, exact)
     report = {**bundle.manifest.parity, "weights": "float16", "half": changes}
@@ -110,12 +110,13 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
 
 
 def renew_golden(bundle: Bundle, out: str | Path, commands: Path | None = None) -> None:
-    """Copy a bundle to ``out`` with golden vectors as today's code makes them; nothing else changes but, if they are
-    given as a table, its commands (:func:`motet_export.commands.with_commands`)."""
+    """Copy a bundle to ``out`` with graphs stored, and golden vectors made, as by today's code; nothing else changes
+    but, if they are given as a table, its commands (:func:`motet_export.commands.with_commands`)."""
     check_place(out)
     model = with_commands(bundle, commands) if commands else kind_of(bundle.manifest).load(bundle)
     manifest = model.manifest
-    files = {f"{role}.onnx": bundle.read(graph.file) for role, graph in manifest.graphs.items()}
+    files = {f"{role}.onnx": renewed(bundle.model(role)) for role in manifest.graphs}
+    model = _loaded(model, files)
     _write(out, model, files, manifest.source, examples(manifest, model.graphs, far=True))
 
 
@@ -135,15 +136,28 @@ def _write(
     """Write the bundle of a model, with golden vectors and tables."""
     # golden vectors, graphs and tables, each with its entry in the manifest
     vectors, golden = golden_vectors(model, draws)
-    specs = {role: {"file": f"{role}.onnx", **graph.spec.to_json()} for role, graph in model.graphs.items()}
+    files, entries = _graph_files(model, graphs)
     tables = {}
     arrays = {}
     for name, array in model.tables.items():
         tables[name] = {"file": f"{name}.npy", "dtype": array.dtype.name, "shape": array.shape}
         arrays[f"{name}.npy"] = array_bytes(array)
     settings = {kind.FEATURE: asdict(model.settings(kind)) for kind in model.SETTINGS}
-    manifest = {**about, "settings": settings, "graphs": specs, "tables": tables, "golden": golden}
-    write_bundle(out, manifest, {**graphs, **arrays, golden["file"]: vectors})
+    manifest = {**about, "settings": settings, "graphs": entries, "tables": tables, "golden": golden}
+    write_bundle(out, manifest, {**files, **arrays, golden["file"]: vectors})
+
+
+def _graph_files(model: BundleModel, graphs: Mapping[str, bytes]) -> tuple[dict[str, bytes], dict[str, Any]]:
+    """The files of graphs, with the weights that several hold in one of their own, and their entries in a manifest."""
+    files, weights = apart(graphs)
+    entries = {}
+    for role, graph in model.graphs.items():
+        file = f"{role}.onnx"
+        shared = {"weights": "weights.onnx"} if files[file] != graphs[file] else {}
+        entries[role] = {"file": file, **shared, **graph.spec.to_json()}
+    if weights:
+        files["weights.onnx"] = weights
+    return files, entries
 
 
 def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:

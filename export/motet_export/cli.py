@@ -24,7 +24,9 @@ from motet_train.runs import RUN_MANIFEST, Run
 @click.option("--int8", is_flag=True, help="8-bit weights: a quarter of the size; reports changes.")
 @click.option("--half", is_flag=True, help="16-bit weights, computed with in 32 bits: half the size.")
 @click.option("--back", is_flag=True, help="RUN is a bundle: write a training run with its weights, to train on from.")
-@click.option("--golden", is_flag=True, help="RUN is a bundle: copy it with golden vectors as today's code makes them.")
+@click.option(
+    "--golden", is_flag=True, help="RUN is a bundle: copy it as today's code writes it: golden vectors, graphs."
+)
 @click.option(
     "--commands", type=Path, help="RUN is a bundle that generates: copy it with the plain acts of commands in a table."
 )

@@ -2,6 +2,7 @@
 
 import logging
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -19,6 +20,12 @@ from motet.errors import BundleError, MotetError
 
 SMALLEST_QUANTISED = 256
 """Smallest number of elements of a tensor that is stored in fewer bits."""
+
+SMALLEST_SHARED = 1024
+"""Smallest number of bytes of a weight that several graphs share."""
+
+Content = tuple[int, tuple[int, ...], bytes]
+"""The type, shape and bytes of a tensor."""
 
 Small = tuple[NDArray[Any], Floats | None]
 """A tensor in a smaller type, and the factors by which its numbers are multiplied when it is loaded."""
@@ -109,18 +116,26 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
 
 def _strip(graph: onnx.GraphProto) -> None:
     """Remove doc strings and metadata, which hold source paths, from a graph and the bodies of its Scan and If."""
-    graph.doc_string = ""
-    del graph.metadata_props[:]
-    for items in (graph.node, graph.initializer, graph.input, graph.output, graph.value_info):
-        for item in items:
-            item.doc_string = ""
-            del item.metadata_props[:]
+    for part in _with_bodies(graph):
+        part.doc_string = ""
+        del part.metadata_props[:]
+        for items in (part.node, part.initializer, part.input, part.output, part.value_info):
+            for item in items:
+                item.doc_string = ""
+                del item.metadata_props[:]
+        for node in part.node:
+            for attribute in node.attribute:
+                attribute.doc_string = ""
+
+
+def _with_bodies(graph: onnx.GraphProto) -> Iterator[onnx.GraphProto]:
+    """A graph and the bodies of its Scan and If, however deep."""
+    yield graph
     for node in graph.node:
         for attribute in node.attribute:
-            attribute.doc_string = ""
             for body in (attribute.g, *attribute.graphs):
                 if body.node:
-                    _strip(body)
+                    yield from _with_bodies(body)
 
 
 def _flatten(graph: onnx.GraphProto, ranks: Mapping[str, int]) -> None:
@@ -161,6 +176,51 @@ def _ranks(model: onnx.ModelProto) -> dict[str, int]:
     """The number of axes of each tensor between a graph's inputs and outputs."""
     values = onnx.shape_inference.infer_shapes(model).graph.value_info
     return {value.name: len(value.type.tensor_type.shape.dim) for value in values}
+
+
+def renewed(model: bytes) -> bytes:
+    """A graph as it would be stored today, with the same weights."""
+    proto = onnx.load_from_string(model)
+    return self_contained(proto, {prop.key: prop.value for prop in proto.metadata_props})
+
+
+def apart(models: Mapping[str, bytes]) -> tuple[dict[str, bytes], bytes]:
+    """Graphs by name without the weights that several of them hold, and these as a model of their own; b"" for none.
+
+    The bytes of such a graph with those of the weights behind them are the whole graph: protocol buffers merge.
+    """
+    protos = {name: onnx.load_from_string(model) for name, model in models.items()}
+    shared = _shared(protos.values())
+    weights = onnx.ModelProto()
+    names: dict[Content, str] = {}
+    for proto in protos.values():
+        for tensor in [tensor for tensor in proto.graph.initializer if _content(tensor) in shared]:
+            new = names.setdefault(_content(tensor), f"shared.{tensor.name}")
+            proto.graph.initializer.remove(tensor)
+            _rename(proto.graph, tensor.name, new)
+    for content, name in names.items():
+        weights.graph.initializer.add(name=name, data_type=content[0], dims=content[1], raw_data=content[2])
+    rest = {name: proto.SerializeToString(deterministic=True) for name, proto in protos.items()}
+    return rest, weights.SerializeToString(deterministic=True)
+
+
+def _shared(models: Iterable[onnx.ModelProto]) -> set[Content]:
+    """The large weights that several models hold, whatever they call them: the exporter makes up names."""
+    holders = Counter[Content]()
+    for model in models:
+        holders.update({_content(tensor) for tensor in model.graph.initializer})
+    return {content for content, count in holders.items() if count > 1 and len(content[-1]) >= SMALLEST_SHARED}
+
+
+def _content(tensor: onnx.TensorProto) -> Content:
+    return tensor.data_type, tuple(tensor.dims), tensor.raw_data
+
+
+def _rename(graph: onnx.GraphProto, old: str, new: str) -> None:
+    """Give a weight another name in all nodes that read it."""
+    for part in _with_bodies(graph):
+        for node in part.node:
+            node.input[:] = [new if name == old else name for name in node.input]
 
 
 @torch.no_grad()

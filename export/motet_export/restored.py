@@ -39,7 +39,7 @@ def restored(bundle: Bundle) -> Run:
     _copy_arrays(state, bundle)
     weight_names = _randomised(other)
     for role, (module, spec) in other.graphs().items():
-        stored = _renamed(_tensors(bundle.read(manifest.graphs[role].file)), net)
+        stored = _renamed(_tensors(bundle.model(role)), net)
         random = _tensors(export_graph(module, spec, {}))
         _restore(state, other.state_dict(), stored, random, weight_names)
     # it must compute what the bundle does
@@ -157,7 +157,7 @@ def _tensors(data: bytes) -> Tensors:
     floats: Tensors = {}
     bytes_: Tensors = {}
     for tensor in graph.initializer:
-        name = cast_names.get(tensor.name, tensor.name)
+        name = cast_names.get(tensor.name, tensor.name).replace("shared.net.", "net.")
         value = numpy_helper.to_array(tensor)
         if value.dtype.kind == "f":
             floats[name] = value.astype(np.float32)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 import torch
 from click.testing import CliRunner
@@ -61,3 +62,15 @@ def test_a_bundle_is_written_anew_with_half_the_weights(tmp_path: Path) -> None:
     frames = [model.run("walk 1s", smooth=False).values for model in (small, load_as(TdbnModel, exact))]
     assert 0 < np.abs(frames[0][:, 3:] - frames[1][:, 3:]).mean() < 0.5  # degrees
     assert max(verify(Bundle.open(tmp_path / "half.zip")).errors.values()) == 0
+
+
+def test_a_bundle_is_written_anew_with_the_same_weights(tmp_path: Path) -> None:
+    before = Bundle.open("tdbn")
+    done = CliRunner().invoke(main, ["export", str(before.path), "--golden", "-o", str(tmp_path / "again.zip")])
+    assert done.exit_code == 0, done.output
+    again = Bundle.open(tmp_path / "again.zip")
+    assert max(verify(again).errors.values()) == 0
+    assert {**again.manifest.source, "files": 0} == {**before.manifest.source, "files": 0}
+    for role in before.manifest.graphs:
+        old, new = (onnx.load_from_string(bundle.model(role)).graph.initializer for bundle in (before, again))
+        assert [(one.name, one.raw_data) for one in new] == [(one.name, one.raw_data) for one in old]

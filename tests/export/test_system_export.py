@@ -9,7 +9,7 @@ import torch
 
 from motet.bundle.graph import OnnxGraph
 from motet.predict.free_run import free_run
-from motet_export.exporter import export_graph
+from motet_export.exporter import apart, export_graph
 from motet_export.parity import check_carried, check_one_step
 from motet_train.papers.li2018.recurrent import (
     LSTMAE,
@@ -34,19 +34,25 @@ SYSTEMS: dict[str, Callable[[], System]] = {
 
 
 @pytest.mark.parametrize("kind", SYSTEMS)
-def test_graphs_compute_what_torch_computes(kind: str) -> None:
+def test_graphs_compute_what_torch_computes(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     torch.manual_seed(0)
     net = Stepwise(SYSTEMS[kind](), CHANNELS, KEPT, SEED).eval()
     net.mean += torch.randn(5)
     net.scale += torch.rand(5)
     graphs = net.graphs()
+    files = {role: export_graph(module, spec, {"role": role}) for role, (module, spec) in graphs.items()}
+    assert not {"Scan", "Loop", "If"} & {node.op_type for node in onnx.load_from_string(files["step"]).graph.node}
+    # weights of both graphs are stored once
+    monkeypatch.setattr("motet_export.exporter.SMALLEST_SHARED", 64)
+    rest, weights = apart(files)
+    shared = {tensor.name for tensor in onnx.load_from_string(weights).graph.initializer}
+    left = [{tensor.name for tensor in onnx.load_from_string(data).graph.initializer} for data in rest.values()]
+    assert len(shared) >= 3
+    assert not shared & (left[0] | left[1])
+    assert apart(rest) == (rest, b"")
     pairs = {}
     for role, (module, spec) in graphs.items():
-        data = export_graph(module, spec, {"role": role})
-        assert role != "step" or not {"Scan", "Loop", "If"} & {
-            n.op_type for n in onnx.load_from_string(data).graph.node
-        }
-        pairs[role] = OnnxGraph(data, spec), TorchGraph(module, spec)
+        pairs[role] = OnnxGraph(rest[role] + weights, spec), TorchGraph(module, spec)
         check_one_step(role, *pairs[role])
     check_carried(*pairs["step"])
     seed = np.random.default_rng(0).normal(size=(3, SEED, CHANNELS)).astype(np.float32)

@@ -15,16 +15,19 @@ import numpy as np
 import onnxruntime
 import pytest
 from click.testing import CliRunner
+from wire import field
 
 import motet
 from motet.bench.cases import cases
-from motet.bundle.bundle import FORMAT, Bundle, list_bundles, write_bundle
+from motet.bundle.bundle import FORMAT, Bundle, entry, list_bundles, write_bundle
 from motet.bundle.graph import SessionOptions
+from motet.bundle.graph_safety import fields
 from motet.bundle.members import Archive
 from motet.cli import main
 from motet.errors import BundleError, OutputError, SettingError
 from motet.generate.model import CodesModel
-from motet.models.load import KINDS, kind_of, load, verify
+from motet.models.load import KINDS, kind_of, load, load_as, verify
+from motet.papers.tdbn_control import TdbnModel
 
 PAPERS = ("convseq2seq", "language-to-motion", "motion-to-language", "tdbn")
 """Bundles of the papers' systems; the others have the names of their verbs."""
@@ -152,6 +155,35 @@ def test_a_graph_is_made_once_by_threads_that_call_it_at_the_same_time() -> None
     with ThreadPoolExecutor(4) as threads:
         made = list(threads.map(lambda _: graph.ready(), range(8)))
     assert all(each is made[0] for each in made)
+
+
+def test_weights_may_be_in_a_file_of_their_own(folder: Path) -> None:
+    whole = load_as(TdbnModel, folder).run("walk 1s").values
+    rest = b""
+    weights = b""
+    for number, value in fields(memoryview((folder / "step.onnx").read_bytes())):
+        parts = [] if number != 7 else list(fields(memoryview(value)))  # of the graph
+        weights += b"".join(field(5, part) for at, part in parts if at == 5)
+        rest += field(number, b"".join(field(at, part) for at, part in parts if at != 5) if parts else value)
+    files = {"step.onnx": rest, "weights.onnx": field(7, weights)}
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    edit(folder, lambda m: m["files"].update({name: entry(data)._asdict() for name, data in files.items()}))
+    with pytest.raises(BundleError, match="step graph: ONNX Runtime rejected the graph"):
+        load(folder).ready()
+    edit(folder, lambda m: m["graphs"]["step"].update(weights="weights.onnx"))
+    assert len(rest) < 0.1 * len(weights)
+    np.testing.assert_array_equal(load_as(TdbnModel, folder).run("walk 1s").values, whole)
+    # they are checked like all files
+    (folder / "weights.onnx").write_bytes(field(7, weights[:-4] + b"\0\0\0\0"))
+    with pytest.raises(BundleError, match=r"'weights.onnx' was altered"):
+        load(folder).ready()
+    (folder / "weights.onnx").unlink()
+    with pytest.raises(BundleError, match=r"'weights.onnx' is missing"):
+        load(folder)
+    edit(folder, lambda m: m["graphs"]["step"].update(weights="other.onnx"))
+    with pytest.raises(BundleError, match=r"graphs.step.weights: 'other.onnx' is not among its files"):
+        load(folder)
 
 
 def test_a_missing_file_is_refused(folder: Path) -> None:

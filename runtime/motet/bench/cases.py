@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from motet.bench.measure import Call, Case
-from motet.bundle.graph import Arrays, Graph
+from motet.bundle.graph import Arrays, Floats, Graph
 from motet.formats import read_motion, write_motion
 from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
@@ -92,12 +92,11 @@ def _(model: DescribeModel, file: Path | None = None) -> list[Case]:
 def describe_cases(model: DescribeModel) -> list[Case]:
     """Descriptions of :data:`CASE_WORDS` words a second that the net writes, many at once and one alone; encoder and
     step of one alone. By beam search; and one by consensus of 100 draws."""
-    end = model.vocabulary.ids[EOS]
     motion = _noise(model.contract, model.fps)
-    never = {"log_probabilities": lambda rows: np.where(np.arange(rows.shape[1]) == end, np.float32(-1e9), rows)}
     manifest = replace(model.manifest, defaults={"beams": CASE_BEAMS, "max_words": CASE_WORDS}, loop="beam")
     graphs = {name: graph for name, graph in model.graphs.items() if name != "space"}  # it writes nothing
-    steady = DescribeModel(manifest, {**graphs, "step": _Steady(model.graphs["step"], never)})
+    endless = _Steady(model.graphs["step"], {"log_probabilities": _never(model.vocabulary.ids[EOS])})
+    steady = DescribeModel(manifest, {**graphs, "step": endless})
     return [
         *_batches("describe.descriptions", lambda size: steady.describe([motion] * size), "motions/s", (32, 128)),
         Case("describe.one", lambda: steady.describe(motion)),
@@ -233,6 +232,16 @@ def _noise(contract: MotionContract, fps: float) -> Motion:
 
 def _text(model: LanguageModel) -> str:
     return " ".join(model.vocabulary.words[len(SPECIALS) :][:CASE_WORDS])
+
+
+def _never(word: int) -> Callable[[Floats], Floats]:
+    """What makes a word as good as impossible in log-probabilities (N, V), in place."""
+
+    def changed(log_probabilities: Floats) -> Floats:
+        log_probabilities[:, word] = -1e9
+        return log_probabilities
+
+    return changed
 
 
 def _step_call(step: Graph) -> Call:

@@ -85,13 +85,18 @@ class Bundle:
                 raise BundleError(f"the file {name!r} was altered: it differs from the manifest")
             return data
 
+    def model(self, role: str) -> bytes:
+        """The ONNX model of a role that there is: its file and, behind it, that of weights which it shares with other
+        graphs. As protocol buffers merge, the bytes of both are those of the whole graph."""
+        return b"".join(map(self.read, self.manifest.graphs[role].files.values()))
+
     def graph(self, role: str, options: SessionOptions | None = None) -> OnnxGraph:
         """The graph of a role ("encoder", "step", ...), checked against its contract."""
         graph_entry = self.manifest.graphs.get(role)
         with self.named(f", {role} graph"):
             if graph_entry is None:
                 raise BundleError("there is none")
-            graph = OnnxGraph(self.read(graph_entry.file), graph_entry.spec, options)
+            graph = OnnxGraph(self.model(role), graph_entry.spec, options)
         log.info("made the %s graph of %s on %s", role, self.path, ", ".join(graph.providers))
         return graph
 
@@ -99,7 +104,8 @@ class Bundle:
         """As :meth:`graph`, for a role that there is: read, checked and made when it is first called. BundleError now
         where its file is missing."""
         with self.named(f", {role} graph"):
-            self._find(self.manifest.graphs[role].file)
+            for name in self.manifest.graphs[role].files.values():
+                self._find(name)
         return LateGraph(self.manifest.graphs[role].spec, partial(self.graph, role, options))
 
     def late_tables(self) -> "Tables":

@@ -36,9 +36,9 @@ class FileEntry(NamedTuple):
 
 
 class GraphEntry(NamedTuple):
-    """The graph of a role: the file that it is in, and its contract."""
+    """The graph of a role, and its contract. files: "file" and, if it shares some with other graphs, "weights"."""
 
-    file: str
+    files: Mapping[str, str]
     spec: GraphSpec
 
 
@@ -144,11 +144,10 @@ class Manifest:
         if manifest.golden is None or not (manifest.graphs or manifest.tables):
             raise BundleError("manifest: it needs graphs or tables, and golden vectors")
         # every file that the manifest names must be in its list, which has the sizes and hashes
-        named = {
-            **{f"graphs.{role}.file": g.file for role, g in manifest.graphs.items()},
-            **{f"tables.{name}.file": t.file for name, t in manifest.tables.items()},
-            "golden.file": manifest.golden.file,
-        }
+        named = {f"tables.{name}.file": table.file for name, table in manifest.tables.items()}
+        named["golden.file"] = manifest.golden.file
+        for role, graph in manifest.graphs.items():
+            named |= {f"graphs.{role}.{key}": file for key, file in graph.files.items()}
         for key, file in named.items():
             if file not in manifest.files:
                 raise BundleError(f"manifest, {key}: {file!r} is not among its files")
@@ -235,7 +234,10 @@ def _common(data: Fields) -> dict[str, str]:
 
 
 def _graph(data: Fields) -> GraphEntry:
-    return GraphEntry(data.text("file"), GraphSpec.read(data))
+    files = {"file": data.text("file")}
+    if "weights" in data:
+        files["weights"] = data.text("weights")
+    return GraphEntry(files, GraphSpec.read(data))
 
 
 def _table(data: Fields) -> TableEntry:

@@ -107,21 +107,21 @@ def _best(scores: Scores, alive: Ids, left: NDArray[Any], end: int) -> tuple[Sco
     """
     rows, beams = scores.shape
     width = min(beams, left.shape[1])
-    flat_scores = scores.ravel()
-    pool = np.full((rows * beams, width), -np.inf)
-    words = np.full((rows * beams, width), end, dtype=np.int64)
+    size = (rows * beams, width)
+    pool = np.full(size, -np.inf)
+    words = np.full(size, end, dtype=np.int64)
 
     # ended hypotheses are kept unchanged
-    pool[:, 0] = flat_scores
+    pool[:, 0] = scores.ravel()
 
-    likeliest, log_probabilities = _likeliest(left, width)
-    words[alive] = likeliest
-    pool[alive] = flat_scores[alive, None] + log_probabilities
+    words[alive], log_probabilities = _likeliest(left, width)
+    pool[alive] = pool[alive, :1] + log_probabilities
 
     pool = pool.reshape(rows, -1)
     words = words.reshape(rows, -1)
-    best = np.argsort(-pool, axis=1, kind="stable")[:, :beams]
-    return np.take_along_axis(pool, best, 1), best // width, np.take_along_axis(words, best, 1)
+    row = np.arange(rows)[:, None]
+    best = np.argsort(-pool, kind="stable")[:, :beams]
+    return pool[row, best], best // width, words[row, best]
 
 
 def _likeliest(log_probabilities: NDArray[Any], count: int) -> tuple[Ids, NDArray[Any]]:
@@ -130,9 +130,10 @@ def _likeliest(log_probabilities: NDArray[Any], count: int) -> tuple[Ids, NDArra
     words = np.empty((count, rows), dtype=np.int64)
     values = np.empty((count, rows), dtype=log_probabilities.dtype)
     flat = log_probabilities.reshape(-1)
+    starts = np.arange(0, rows * size, size)
     for number in range(count):  # a few passes of argmax take a fraction of argpartition's time
         words[number] = log_probabilities.argmax(axis=1)
-        places = words[number] + np.arange(0, rows * size, size)
+        places = words[number] + starts
         values[number] = flat[places]
         flat[places] = -np.inf
     return words.T, values.T

@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
-from motet.keyed import KeyedAct, ours
-from motet.keyed.acts import ACT_FPS
+from motet.keyed.acts import ACT_FPS, KeyedAct
 from motet.keyed.keys import mirrored_keys
+from motet.keyed.shipped import says, shipped
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
@@ -118,68 +119,68 @@ class NamedAct:
         return shown
 
 
+class Order(NamedTuple):
+    """A sentence of an act, with its stems, and the function words that it cannot do without: "put" is not "put up"."""
+
+    name: str
+    sentence: str
+    stems: frozenset[str]
+    particles: frozenset[str]
+
+    def fit(self, words: Sequence[str]) -> tuple[int, int, str, str]:
+        """Rises with how much it says of a sentence's words: in stems, then in words themselves."""
+        return len(self.stems), len(set(words).intersection(self.sentence.split())), self.name, self.sentence
+
+
 def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:
     """The act that lower-case words name, None where there is none: all of them are words of its sentences, but for a
     side, and one of its sentences has no others. times: how often it is to be done, where the words say it."""
     words = list(words)
     stems = stems_of(words)
-    within = _sentences_within(stems)
-    matches = [(len(order), name, sentence) for name, sentence, order in within if _has_particles(words, sentence)]
-    if not matches:
+    if not stems - BOTH_SIDES <= _stems_of_acts():  # most sentences have a word that no act has
         return None
-    # the sentence that says the most of it
-    _, name, sentence = max(matches)
-    return _adapted(name, sentence, stems, times)
+    orders = [order for order in _orders_in(words, stems) if not stems - _stems_of_act(order.name) - BOTH_SIDES]
+    # acts of one side are not those of the other
+    of_sides = [order for order in orders if stems <= _stems_of_act(order.name) or shipped(order.name).mirrored]
+    if not of_sides:
+        return None
+    return _adapted(max(of_sides, key=lambda order: order.fit(words)), stems, times)
 
 
 def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | None:
     """The act of which a sentence, in lower-case words without its subject, has an order beside other words, the first
     of them its verb; that which leaves out the fewest of these. None where there is none."""
     stems = stems_of(words)
-    nearest: NamedAct | None = None
-    for name, sentences in _sentences().items():
-        orders = []
-        for sentence, order in sentences.items():
-            has_verb = stems_of(words[:1]) and stems_of(words[:1]) <= order
-            if has_verb and order <= stems and _has_particles(words, sentence):
-                orders.append(sentence)
-        if not orders:
-            continue
-        of_act = frozenset[str]().union(BOTH_SIDES, *sentences.values())
-        lacking = tuple(word for word in words if stems_of([word]) - of_act)
-        act = replace(_adapted(name, max(orders, key=len), stems, times), lacking=lacking)
-        if nearest is None or act.confidence > nearest.confidence:
-            nearest = act
-    return nearest
+    orders = list(_orders_in(words, stems_of(words[:1])))
+    if not orders:
+        return None
+    lacking = {}
+    for name in {order.name for order in orders}:
+        of_act = _stems_of_act(name) | BOTH_SIDES
+        lacking[name] = tuple(word for word in words if stems_of([word]) - of_act)
+    best = max(orders, key=lambda order: (-len(lacking[order.name]), *order.fit(words)))
+    return replace(_adapted(best, stems, times), lacking=lacking[best.name])
 
 
-def _has_particles(words: Iterable[str], sentence: str) -> bool:
-    """Whether some words have the particles of an act's sentence: "put" is not "put up"."""
-    return FUNCTION_WORDS.intersection(sentence.split()) - ARTICLES <= set(words)
+def _orders_in(words: Sequence[str], stems: Iterable[str]) -> Iterator[Order]:
+    """The orders with one of some stems whose words are all among some words."""
+    of_words = stems_of(words)
+    orders = {order.sentence: order for a_stem in stems for order in _orders().get(a_stem, ())}
+    for order in orders.values():
+        if order.stems <= of_words and order.particles <= set(words):
+            yield order
 
 
-def _adapted(name: str, sentence: str, stems: frozenset[str], times: float | None) -> NamedAct:
-    """An act on the side that some stems name, as often as it is to be done."""
-    act = ours()[name]
+def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedAct:
+    """The act of an order on the side that some stems name, as often as it is to be done."""
+    act = shipped(order.name)
     # acts of either hand are written for the right one
-    sides = stems & BOTH_SIDES - stems_of(sentence.split())
+    sides = stems & BOTH_SIDES - order.stems
     if act.mirrored and len(sides) == 1:
         act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
     if times is not None and act.repeat is not None:
         act = replace(act, repeat=replace(act.repeat, times=(int(times),) * 2))
-    return NamedAct(act, sentence, times is not None)
-
-
-def _sentences_within(stems: frozenset[str]) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """The acts that have all of some stems, but for a side, by name; each with its sentences that have no others, and
-    their stems."""
-    for name, sentences in _sentences().items():
-        sides = stems & BOTH_SIDES if ours()[name].mirrored else frozenset()
-        if not stems - sides <= frozenset[str]().union(*sentences.values()):
-            continue
-        for sentence, of_sentence in sentences.items():
-            if of_sentence and of_sentence <= stems:
-                yield name, sentence, of_sentence
+    return NamedAct(act, order.sentence, times is not None)
 
 
 def without_subject(words: Sequence[str]) -> list[str]:
@@ -201,10 +202,13 @@ def without_subject(words: Sequence[str]) -> list[str]:
 @cache
 def _stems_of_acts() -> frozenset[str]:
     """The stems of all words of all acts."""
-    of_acts = set[str]()
-    for sentences in _sentences().values():
-        of_acts.update(*sentences.values())
-    return frozenset(of_acts)
+    return frozenset(_orders())
+
+
+@cache
+def _stems_of_act(name: str) -> frozenset[str]:
+    """The stems of all words of an act."""
+    return frozenset[str]().union(*map(stems_of, map(str.split, says()[name])))
 
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
@@ -215,16 +219,18 @@ def stems_of(words: Iterable[str]) -> frozenset[str]:
 @cache
 def verbs() -> frozenset[str]:
     """The stems of the first words of all orders, which say what is done."""
-    first_words = []
-    for act in ours().values():
-        first_words += [sentence.split()[0] for sentence in act.says]
+    first_words = [sentence.split()[0] for sentences in says().values() for sentence in sentences]
     return stems_of(first_words) - BODY_STEMS
 
 
 @cache
-def _sentences() -> Mapping[str, Mapping[str, frozenset[str]]]:
-    """The stems of each sentence of each act."""
-    table = {}
-    for name, act in ours().items():
-        table[name] = {sentence: stems_of(sentence.split()) for sentence in act.says}
-    return table
+def _orders() -> Mapping[str, Sequence[Order]]:
+    """The sentences of all acts by each of their stems."""
+    orders: dict[str, list[Order]] = {}
+    for name, sentences in says().items():
+        for sentence in sentences:
+            particles = FUNCTION_WORDS.intersection(sentence.split()) - ARTICLES
+            order = Order(name, sentence, stems_of(sentence.split()), particles)
+            for of_sentence in order.stems:
+                orders.setdefault(of_sentence, []).append(order)
+    return orders

@@ -6,10 +6,11 @@ were, then trunk and head (:mod:`motet.keyed.trunk`), then the arms, whose hands
 (:mod:`motet.keyed.hands`). What the parts of a key may say, and in which ranges, is in :mod:`motet.keyed.parts`.
 
 ``motet.keyed.read("acts.toml")`` gives acts by name, ``act.motion(base, seed=0)`` a motion, and ``motet.keyed.ours()``
-the acts that ship, in the folder library.
+the acts that ship (:mod:`motet.keyed.shipped`).
 """
 
 from motet.keyed.acts import KeyedAct, laid_over
-from motet.keyed.file import ours, read
+from motet.keyed.file import read
+from motet.keyed.shipped import ours
 
 __all__ = ["KeyedAct", "laid_over", "ours", "read"]

@@ -2,9 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
-from functools import cache
-from importlib.resources import as_file, files
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,16 +52,6 @@ def read(file: str | Path) -> dict[str, KeyedAct]:
         raise FormatError(path, f"expected 1 to {MOST_ACTS} acts, each a table such as [nod], not {len(tables)}")
     reader = _Reader(path, text)
     return {name: reader.act(name, table) for name, table in tables.items()}
-
-
-@cache
-def ours() -> Mapping[str, KeyedAct]:
-    """The acts that ship, by name: those of the files in the folder "library"."""
-    acts: dict[str, KeyedAct] = {}
-    with as_file(files("motet.keyed") / "library") as folder:
-        for path in sorted(folder.glob("*.toml")):
-            acts |= read(path)
-    return acts
 
 
 class _Reader:

@@ -1,5 +1,6 @@
 /* Bundles, sentences and frames that are wrong are refused by name. */
 import assert from "node:assert/strict";
+import { createHash } from "node:crypto";
 import { readFile } from "node:fs/promises";
 import test from "node:test";
 import {
@@ -77,13 +78,38 @@ function zipped(files: Record<string, Uint8Array>): Uint8Array {
   return new Uint8Array(Buffer.concat([...local!, ...central!, new Uint8Array(end.buffer)]));
 }
 
-test("bundles of another format, and manifests of another form, are refused", async () => {
-  const zip = openZip(await bytes("predict"));
+/** The files of a bundle and its manifest, and what loads them with another one. */
+async function unpacked(bundle: string) {
+  const zip = openZip(await bytes(bundle));
   const files: Record<string, Uint8Array> = {};
   for (const name of zip.names) files[name] = await zip.read(name, 1 << 24);
   const manifest = JSON.parse(new TextDecoder().decode(files["manifest.json"]));
   const altered = (text: string) =>
     load(zipped({ ...files, "manifest.json": new TextEncoder().encode(text) }));
+  return { files, manifest, altered };
+}
+
+test("a graph's weights may be in a file of their own", async () => {
+  const { files, manifest, altered } = await unpacked("predict");
+  const { graphs } = manifest;
+  const whole = files["encoder.onnx"]!;
+  files["encoder.onnx"] = whole.subarray(0, 2000);
+  files["weights.onnx"] = whole.subarray(2000);
+  for (const name of ["encoder.onnx", "weights.onnx"]) {
+    const sha256 = createHash("sha256").update(files[name]!).digest("hex");
+    manifest.files[name] = { sha256, size: files[name]!.length };
+  }
+  await assert.rejects(altered(JSON.stringify(manifest)), BundleError);
+  graphs.encoder.weights = "weights.onnx";
+  await altered(JSON.stringify(manifest));
+  graphs.encoder.weights = "other.onnx";
+  await assert.rejects(altered(JSON.stringify(manifest)), /"other.onnx" is not in the manifest/);
+  graphs.encoder.weights = 3;
+  await assert.rejects(altered(JSON.stringify(manifest)), /graphs.encoder.weights: is no text/);
+});
+
+test("bundles of another format, and manifests of another form, are refused", async () => {
+  const { manifest, altered } = await unpacked("predict");
   await altered(JSON.stringify(manifest));
   await assert.rejects(altered(JSON.stringify({ ...manifest, format: 2 })), /format 2; format 3 is read/);
   for (const text of [

@@ -14,7 +14,7 @@ export interface Manifest {
   model: string;
   loop: string;
   files: Record<string, { sha256: string; size: number }>;
-  graphs: Record<string, GraphSpec & { file: string }>;
+  graphs: Record<string, GraphSpec & { file: string; weights?: string }>;
   tables: Record<string, { file: string; dtype: string; shape: number[] }>;
   golden: { file: string; tolerance: number; run: Record<string, number | string> };
   motion: {
@@ -86,7 +86,11 @@ export class Bundle {
   async graph(role: string, settings?: SessionSettings): Promise<Graph> {
     const spec = this.manifest.graphs[role];
     if (!spec) throw new BundleError(`the bundle ${this.manifest.name} has no graph ${JSON.stringify(role)}`);
-    return Graph.load(role, await this.read(spec.file), spec, settings);
+    // behind a graph come the weights that it shares with others: protocol buffers merge
+    const files = spec.weights === undefined ? [spec.file] : [spec.file, spec.weights];
+    const parts = await Promise.all(files.map((file) => this.read(file)));
+    const model = new Uint8Array(await new Blob(parts as BlobPart[]).arrayBuffer());
+    return Graph.load(role, model, spec, settings);
   }
 
   /** A plain array. */

@@ -66,6 +66,7 @@ export function checkManifest(manifest: Fields): void {
 
 function checkGraph(place: string, graph: Fields): void {
   check(typeof graph.file === "string", `${place}.file`, "is no text");
+  check(typeof (graph.weights ?? "") === "string", `${place}.weights`, "is no text");
   for (const key of ["inputs", "outputs"]) {
     const tensors = graph[key];
     check(

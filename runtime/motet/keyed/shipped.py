@@ -1,0 +1,53 @@
+"""The acts that ship, in the folder library: says.toml has what each is called, in a table for each of the other files,
+which have the key poses. A sentence is looked up in the first, and only the file of its act is read."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from importlib.resources import as_file, files
+
+from motet.keyed.acts import KeyedAct
+from motet.keyed.file import read
+
+LIBRARY = files("motet.keyed") / "library"
+
+
+@cache
+def _says_by_file() -> Mapping[str, Mapping[str, tuple[str, ...]]]:
+    """File -> the name of each of its acts -> its sentences."""
+    tables = tomllib.loads((LIBRARY / "says.toml").read_text(encoding="utf-8"))
+    return {file: {name: tuple(sentences) for name, sentences in acts.items()} for file, acts in tables.items()}
+
+
+@cache
+def says() -> Mapping[str, tuple[str, ...]]:
+    """The name of each act -> its sentences."""
+    sentences: dict[str, tuple[str, ...]] = {}
+    for acts in _says_by_file().values():
+        sentences |= acts
+    return sentences
+
+
+@cache
+def _acts_of(file: str) -> Mapping[str, KeyedAct]:
+    """The acts of a file by name."""
+    sentences = _says_by_file()[file]
+    with as_file(LIBRARY / f"{file}.toml") as path:
+        return {name: replace(act, says=sentences[name]) for name, act in read(path).items()}
+
+
+def shipped(name: str) -> KeyedAct:
+    """An act by its name; KeyError for one that does not ship."""
+    for file, acts in _says_by_file().items():
+        if name in acts:
+            return _acts_of(file)[name]
+    raise KeyError(name)
+
+
+def ours() -> Mapping[str, KeyedAct]:
+    """All acts by name."""
+    acts: dict[str, KeyedAct] = {}
+    for file in _says_by_file():
+        acts |= _acts_of(file)
+    return acts
