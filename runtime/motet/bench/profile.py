@@ -72,7 +72,7 @@ def profiled(options: SessionOptions, call_of: Callable[[SessionOptions], Call],
 
 def _events_after(seconds: Sequence[float], folder: Path) -> list[dict[str, Any]]:
     """The events in the profiles of a folder, of each session those later than so many seconds after its begin."""
-    events = list[dict[str, Any]]()
+    events = []
     for file, earliest in zip(sorted(folder.iterdir()), seconds, strict=True):
         recorded = json.loads(file.read_text(encoding="utf-8"))
         events += [event for event in recorded if event["ts"] / 1e6 > earliest]

@@ -55,7 +55,7 @@ def bench(
     for key in ("processor", "cores", "versions"):
         if old and old["machine"].get(key) != (now := getattr(machine, key)):
             log.warning("%s: another machine or version: %s %s, now %s", compare, key, old["machine"].get(key), now)
-    measurements: dict[str, list[Row]] = {}
+    measurements = {}
     for name in list_bundles() if bundle == "all" else [bundle]:
         measurements[name] = measured(name, session, machine, **measure_options)
         if not as_json:

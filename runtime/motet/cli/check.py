@@ -171,7 +171,7 @@ def _report(row: Row) -> Iterator[str]:
 
 def _parts_of_file(checked: Checked) -> list[tuple[str, str]]:
     """Which clip and figure of the file it is, where there are several."""
-    facts: list[tuple[str, str]] = []
+    facts = []
     if checked.clips:
         number = checked.clips.index(checked.clip or "") + 1
         facts.append(("clip", f"{checked.clip}, {number} of {len(checked.clips)}"))

@@ -3,7 +3,6 @@
 import io
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
@@ -51,7 +50,7 @@ def embed(
         raise click.UsageError("context vectors are written as .npy: give -o VECTORS.npy")
     check_place(out)
     tries = many.tries
-    rows = list[dict[str, Any]]()
+    rows = []
     if motions:
         for answer in many.answers(verb, many.sources(motions), "embedding"):
             rows += answer.rows

@@ -45,7 +45,7 @@ class Many:
         """The motions of this shard that files, folders, zips and patterns name. every: all clips where nothing says
         which."""
         files = self.shard.of(list(enumerate(files_of(paths))))
-        sources: list[Source] = []
+        sources = []
         for number, file in files:
             for source in self.read.sources([file], every):
                 sources.append(replace(source, number=number))

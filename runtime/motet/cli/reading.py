@@ -49,7 +49,7 @@ class Read:
     def sources(self, paths: Sequence[Path], every: bool = False) -> list[Source]:
         """The motions of files, as ``--clip``, ``--figure`` or their own names (a.glb#Walk) select them. every: all
         clips where nothing does."""
-        sources: list[Source] = []
+        sources = []
         for path in paths:
             sources += sources_of(path, self.clip, self.figure, every)
         return sources

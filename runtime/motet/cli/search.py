@@ -64,7 +64,7 @@ def search(
     if shard is not None and file is None:
         raise click.UsageError("--shard writes an index of a part: give --index FILE")
     part = None if shard is None else Shard.parse(shard)
-    parts: list[Path] = []
+    parts = []
     for path in merge:
         parts += _indexes(path)
     model = load_as(SearchModel, bundle, session)

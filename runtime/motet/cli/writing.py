@@ -162,7 +162,7 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output:
     output: how they are written; a character takes all that go to one place.
     """
     onto = output is not None and output.onto is not None
-    targets: list[Path] = []
+    targets = []
     if onto:
         for source in sources:
             targets += [_named(out, source)] * samples

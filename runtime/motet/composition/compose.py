@@ -220,7 +220,7 @@ class _Drawing:
         """The motion of prompts, and when each is shown: walks one by one, and all between two walks as one story."""
         fps = self.model.fps
         motion: Motion | None = None
-        passages: list[Passage] = []
+        passages = []
         # a walk alone, or neighbouring prompts together
         for _, run in groupby(parts, lambda part: part.start if part.walk else -1):
             together = list(run)
@@ -402,5 +402,4 @@ def _joints(frames: Array, like: Motion) -> Array:
     """Places (T, J, 3) of the joints of placed frames (T, E), each frame seen from where it is, without tips."""
     seen = seen_from(frames[:, None], pose_of(frames))[:, 0]
     joints = [HUMANOID.index(name) for name in BONES]
-    places: Array = positions(unplaced(seen, like))[:, joints]
-    return places
+    return positions(unplaced(seen, like))[:, joints]

@@ -169,7 +169,7 @@ class Describe(OfModel[DescribeModel]):
     def __call__(self, sources: Sequence[Source]) -> list[Answer]:
         """The answers, in order; a row for each window, with input, in_place, start, stop and hypotheses."""
         answers = list(map(Answer, sources))
-        windows = list[_Window]()
+        windows = []
         for answer in answers:
             with answer.tried():
                 cut = self.model.windows(self.read(answer))

@@ -189,7 +189,7 @@ def _complete(folders: Sequence[Path]) -> list[Path]:
 
 def _part_files(folders: Sequence[Path]) -> list[Path]:
     """The files of parts, of folders all in them."""
-    paths: list[Path] = []
+    paths = []
     for path in folders:
         paths += sorted(path.glob("*.jsonl*")) if path.is_dir() else [path]
     if not paths:

@@ -107,7 +107,7 @@ class Source:
 def files_of(places: Sequence[Path]) -> list[Path]:
     """The motion files that are meant: of folders and zips all in them, of patterns what they match, each in order of
     names. FormatError for a folder, zip or pattern without any."""
-    files: list[Path] = []
+    files = []
     for path in places:
         files += _files(path)
     return files

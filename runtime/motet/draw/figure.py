@@ -136,8 +136,7 @@ class Body:
 
     @cached_property
     def _rest(self) -> Array:
-        rest: Array = self.skeleton.rest_positions / self.height
-        return rest
+        return self.skeleton.rest_positions / self.height
 
     @cached_property
     def _in_trunk(self) -> tuple[bool, ...]:

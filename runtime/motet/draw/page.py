@@ -63,7 +63,7 @@ def write_many(
 
 def _write(file: File, shown: Sequence[tuple[Skinned, str, Captions | None]], title: str | None) -> None:
     title = place_of(file).stem if title is None else title
-    meshes: list[Mesh] = []
+    meshes = []
     bodies = []
     figures = []
     for figure, name, captions in shown:

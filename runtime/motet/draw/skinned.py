@@ -195,5 +195,4 @@ def _unit_rings(axis: Array, corners: int) -> Array:
     axis = unit(axis) if axis.any() else np.array([0.0, 1.0, 0.0])
     side = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
     around = ring(corners) @ np.stack([side, np.cross(axis, side)])
-    rings: Array = np.cos(CAPS) * around + np.sin(CAPS) * axis
-    return rings
+    return np.cos(CAPS) * around + np.sin(CAPS) * axis

@@ -101,7 +101,7 @@ def _layout(path: Path, lines: Iterator[Line], dofs: Dofs) -> Layout:
         return {bone: len(names) for bone, names in dofs.items()}
     if not _is_frame_number(words):
         raise FormatError(path, f"expected a frame number alone on its line, not {quoted(' '.join(words))}", line)
-    layout: Layout = {}
+    layout = {}
     for line, words in lines:
         if _is_frame_number(words):
             break
@@ -115,7 +115,7 @@ def _layout(path: Path, lines: Iterator[Line], dofs: Dofs) -> Layout:
 
 def _channels(bones: Iterable[str], dofs: Dofs) -> tuple[str, ...]:
     """The channels of bones, each bone's in the order of its degrees of freedom."""
-    channels: list[str] = []
+    channels = []
     for bone in bones:
         channels += [f"{bone}.{dof}" for dof in dofs[bone]]
     return tuple(channels)

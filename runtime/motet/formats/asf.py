@@ -290,7 +290,7 @@ def _bone_text(bone: _Bone, number: int) -> str:
 
 def _bones(asf: Asf) -> list[_Bone]:
     """The root, with the position in place of its reach, and all bones that the skeleton needs."""
-    bones: dict[str, _Bone] = {}
+    bones = {}
     joints = asf.skeleton.joints
     names = Names(asf.skeleton.names)
     tips = _tips(asf)

@@ -66,7 +66,7 @@ def _motion(path: Path, nodes: "list[_Node]", values: Array, fps: float) -> Moti
 
 def _channel_names(nodes: "list[_Node]") -> tuple[str, ...]:
     """The channels of a figure, such as "Hips.tx", in the order of the file."""
-    channels: list[str] = []
+    channels = []
     for node in nodes:
         channels += [f"{node.name}.{kind}" for kind in node.channels]
     return tuple(channels)
@@ -322,8 +322,8 @@ def _rows(motion: Motion, joints: list[int], translated: set[int]) -> Array:
 def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
     """The lines of the hierarchy, and the joints written as ROOT or JOINT in their order; others are End Sites."""
     skeleton = skeleton_of(motion)
-    lines: list[str] = []
-    joints: list[int] = []
+    lines = []
+    joints = []
     waiting: list[tuple[int | None, int]] = [(0, 0)]  # joints, or None for a closing brace, and their depth
     while waiting:
         i, depth = waiting.pop()

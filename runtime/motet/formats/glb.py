@@ -145,7 +145,7 @@ def container(document: Json, content: bytes | bytearray) -> bytes:
 
 def joint_nodes(skeleton: Skeleton) -> list[Json]:
     """A node for each joint, at rest, in their order."""
-    nodes: list[Json] = []
+    nodes = []
     for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
         nodes.append({"name": joint.name, "translation": list(joint.offset)})
         if children:
@@ -171,7 +171,7 @@ def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]
     # tracks of equally many frames share their times
     times = {len(motion): buffer.add(np.arange(len(motion)) / motion.fps, bounded=True)}
     samplers: list[Json] = []
-    channels: list[Json] = []
+    channels = []
     for node, path, values in tracks:
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         if len(values) not in times:

@@ -473,7 +473,7 @@ Keys = dict[tuple[int, str], tuple[Array, Array, str]]
 def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
     """The keys of some nodes; FormatError where times and values differ in number."""
     samplers = animation.get("samplers", [])
-    keys: Keys = {}
+    keys = {}
     for channel, node, path in _channels(animation):
         if node not in nodes:
             continue
@@ -578,5 +578,4 @@ def _on_great_circle(low: Array, high: Array, share: Array) -> Array:
     sine = np.where(is_near, 1.0, np.sin(angle))
     weight_low = np.where(is_near, 1 - share, np.sin((1 - share) * angle) / sine)
     weight_high = np.where(is_near, share, np.sin(share * angle) / sine)
-    turned: Array = weight_low * low + weight_high * high
-    return turned
+    return weight_low * low + weight_high * high

@@ -194,7 +194,7 @@ def _meshes(nodes: Nodes) -> Iterator[Skinned]:
 def _primitives(gltf: Gltf) -> list[Primitive]:
     """All primitives of meshes, each that a skin moves once, since it is where its joints are, whatever node has it.
     FormatError, before anything is computed, where these are too many points."""
-    primitives: dict[tuple[object, ...], Primitive] = {}
+    primitives = {}
     for node, primitive in _placed_primitives(gltf):
         attributes = primitive["attributes"]
         skin = gltf.objects("nodes")[node].get("skin") if "JOINTS_0" in attributes else None

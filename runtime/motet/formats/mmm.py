@@ -151,7 +151,7 @@ class _Opened:
 
 def _frame(path: Path, element: ElementTree.Element, joints: int, number: int) -> list[float]:
     """Time step, root position and rotation, and the joints' angles of one frame."""
-    values: list[float] = []
+    values = []
     for tag, count in {"Timestep": 1, "RootPosition": 3, "RootRotation": 3, "JointPosition": joints}.items():
         # each part of a frame has its number of values
         words = (element.findtext(tag) or "").split()

@@ -131,8 +131,7 @@ def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
 def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """Shape, whether columns come first, and dtype of an array, from the beginning of its file."""
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    header: tuple[tuple[int, ...], bool, np.dtype[Any]] = headers[npy.read_magic(stream)](stream)
-    return header
+    return headers[npy.read_magic(stream)](stream)
 
 
 ARRAYS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}

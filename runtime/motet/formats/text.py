@@ -233,7 +233,7 @@ def _still_joints(motion: Motion) -> tuple[list[Joint], list[str]]:
     the root, whose translation changes."""
     skeleton = skeleton_of(motion)
     joints = list(skeleton.joints)
-    moving: list[str] = []
+    moving = []
     translations = local_translations(motion)
     moved = {channel.rpartition(".")[0] for channel in motion.channels if channel[-2] == "t"}
     # a translation that does not change is an offset
@@ -355,7 +355,7 @@ def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]
         return file, None
     # every mark may be the one: in names of files it is allowed
     parts = str(file).split(MARK)
-    ways: list[tuple[Path, str]] = []
+    ways = []
     for i in range(1, len(parts)):
         path = Path(MARK.join(parts[:i]))
         if path.suffix.lower() in extensions:

@@ -114,7 +114,7 @@ class ClientSession:
             "contacts": pose.contacts,
             **({"positions": pose.positions()} if self.positions else {}),
         }
-        characters = list[dict[str, Any]]()
+        characters = []
         columns = [np.round(values.astype(np.float64), 5).tolist() for values in parts.values()]
         for values in zip(*columns, strict=True):
             characters.append(dict(zip(parts, values, strict=True)))

@@ -75,7 +75,7 @@ def _level_translation(part: Motion, hips: int, above: Array, share: Array) -> A
     translation = local_translations(part)[:, hips]
     height = rotated(above, translation)[:, 1:2]
     rise = rotated(inverse(above), share * (height[-1] - height[0]) * UP)
-    return np.asarray(translation - rise)
+    return translation - rise
 
 
 def _closed_rotations(part: Motion, hips: int, hips_world: Array, above: Array, share: Array) -> dict[str, Array]:
@@ -201,7 +201,7 @@ def _energy(poses: Array) -> Array:
 def _means(values: Array, length: int) -> Array:
     """The means (T - length,) of ``length`` values each of (T,)."""
     sums = np.cumsum(np.insert(values, 0, 0.0))
-    return np.asarray((sums[length:-1] - sums[: -length - 1]) / length)
+    return (sums[length:-1] - sums[: -length - 1]) / length
 
 
 def _distances(rows: Array, others: Array) -> Array:

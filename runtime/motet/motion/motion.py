@@ -297,7 +297,7 @@ def spline(values: Array, times: Array) -> Array:
     b = padded[start + 1]
     c = padded[start + 2]
     d = padded[start + 3]
-    return np.asarray(b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a))))
+    return b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
 
 
 def _extended(values: Array) -> Array:
@@ -318,7 +318,7 @@ def _between(values: Array, times: Array) -> tuple[Indices, Array]:
 
 def motions_of(source: Motion | Iterable[Motion]) -> list[Motion]:
     """A motion, or several, as a list; ArgumentError for anything else."""
-    motions: list[Motion] = []
+    motions = []
     for motion in source if is_many(source) and not isinstance(source, Motion) else [source]:
         if not isinstance(motion, Motion):
             remedy = ": motet.read() reads a file" if isinstance(motion, str | PathLike) else ""

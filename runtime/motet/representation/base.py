@@ -55,8 +55,7 @@ class FrameMirror:
 
     def __call__(self, frames: NDArray[Any]) -> NDArray[Any]:
         """Mirror frames (..., D)."""
-        mirrored: NDArray[Any] = frames[..., self.columns] * self.signs
-        return mirrored
+        return frames[..., self.columns] * self.signs
 
 
 def phases(motion: Motion, fps: float) -> Iterator[Motion]:

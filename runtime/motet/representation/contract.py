@@ -160,17 +160,15 @@ class MotionContract:
         """Frames (..., D) in standard deviations from the mean: 0 in dead channels, and within Z_LIMIT."""
         # dead channels are divided by infinity
         scale = np.where(self.std > 0, self.std, np.inf)
-        z: Array = np.clip(
+        return np.clip(
             (np.asarray(frames, dtype=np.float64) - self.mean) / scale,
             -Z_LIMIT,
             Z_LIMIT,
         )
-        return z
 
     def denormalised(self, z: ArrayLike) -> Array:
         """The inverse: frames (..., D), dead channels at their mean."""
-        frames: Array = np.asarray(z, dtype=np.float64) * self.std + self.mean
-        return frames
+        return np.asarray(z, dtype=np.float64) * self.std + self.mean
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object; :func:`motet.bundle.manifest.read_contract` is the inverse."""
@@ -199,5 +197,4 @@ def sequences(representation: str, motion: Motion, fps: float, like: Motion | No
 def living(std: ArrayLike, units: Sequence[str]) -> Array:
     """Standard deviations (D,) of training data, 0 where they are under the floor of their unit."""
     floors = np.array([LIVING_STD[unit] for unit in units])
-    living_std: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
-    return living_std
+    return np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)

@@ -125,7 +125,7 @@ def straight(past: Array, after: Array, count: int) -> Array:
 
 def _parts(count: int) -> Array:
     """Which part of the way (count, 1) each of the frames between two has behind it."""
-    return np.asarray((np.arange(1, count + 1) / (count + 1))[:, None])
+    return (np.arange(1, count + 1) / (count + 1))[:, None]
 
 
 def _root_velocity(places: Array) -> Array:

@@ -207,7 +207,7 @@ def _translations_between(back: Motion, ends: Motion, part: Array) -> Array:
     """Translations (T, J, 3) of a motion moved to those at the ends, by parts (T, 1) of the way between them."""
     translations = local_translations(back)
     offsets = local_translations(ends) - _ends_of(translations, ends)
-    return np.asarray(translations + offsets[:1] + part[..., None] * (offsets[-1:] - offsets[:1]))
+    return translations + offsets[:1] + part[..., None] * (offsets[-1:] - offsets[:1])
 
 
 def _turns_between(turns: Array, part: Array) -> Array:

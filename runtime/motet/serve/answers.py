@@ -99,7 +99,7 @@ class Answers:
         texts, settings = await _in(self._threads, self._texts_and_settings, data, True)
         settings |= await self._after(data)
         pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
-        parts: list[str] = []
+        parts = []
         for text in texts:
             parts += self._parts(text, data)
         understood = await _in(self._models, lambda: [self._read_as(part) for part in parts])
@@ -206,7 +206,7 @@ class Answers:
         return _json_answer(rows)
 
     def _describe(self, key: Key, files: list[list[Motion]]) -> list[list[list[Description]]]:
-        all_windows: list[Motion] = []
+        all_windows = []
         for windows in files:
             all_windows += windows
         descriptions = iter(self._describer.describe(all_windows, **cast(Any, dict(key))))

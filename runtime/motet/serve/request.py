@@ -88,7 +88,7 @@ async def read_request(
     The body is a JSON object, a form, or the bytes of the file called "file", whose type is in "format".
     """
     settings = from_texts(request.query_params.multi_items(), parameters)
-    uploads = dict[str, Upload]()
+    uploads = {}
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "multipart/form-data" or (kind == "application/x-www-form-urlencoded" and "file" not in files):
         async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:

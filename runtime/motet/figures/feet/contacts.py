@@ -285,4 +285,4 @@ def _mean_vote(votes: Array, weights: Array, window: Array, trust: float, guess:
         *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0),
     ]
     total, x, z = (np.convolve(column, window)[reach : reach + len(votes)] for column in columns)
-    return np.asarray((np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None])
+    return (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]

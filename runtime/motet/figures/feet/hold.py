@@ -273,7 +273,7 @@ def _between(times: list[Indices], values: list[Array], frames: int, blend: floa
     after = np.clip(np.searchsorted(key_times, frame, side="right"), 1, len(key_times) - 1)
     before = after - 1
     part = rise((frame - key_times[before]) / (key_times[after] - key_times[before]), 0, 1)[:, None]
-    return np.asarray(key_values[before] + part * (key_values[after] - key_values[before]))
+    return key_values[before] + part * (key_values[after] - key_values[before])
 
 
 def _keys(times: list[Indices], values: list[Array], blend: float) -> tuple[Array, Array]:
@@ -301,4 +301,4 @@ def lift(depth: Array, soft: float) -> Array:
     reach = max(1, round(soft))
     # a mean over a window of maxima is at least as high as the depth in its middle
     deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
-    return np.asarray(windows(deepest, reach) @ bell(reach))
+    return windows(deepest, reach) @ bell(reach)

@@ -182,7 +182,7 @@ def axes_agree(body: Body, rotations: Array, positions: Array) -> bool:
     """
     joint_map = body.joint_map
     # for each joint a direction of the humanoid's bone, and the same of the figure's in all frames
-    directions: dict[int, tuple[Array, Array]] = {}
+    directions = {}
     for bone, ends in body.aims.items():
         if ends:
             directions[body.joints[bone]] = (
@@ -285,10 +285,10 @@ class Calibration:
         """Vectors (T, 3) up from the i-th joint of the back; from the joint below to the last."""
         positions = self.positions
         if i == len(back) - 1:
-            return np.asarray(positions[:, back[i]] - positions[:, back[max(i - 1, chest - 1)]])
+            return positions[:, back[i]] - positions[:, back[max(i - 1, chest - 1)]]
         start = self.body.middle(positions, "UpperLeg") if i == 0 else positions[:, back[i]]
         end = self.body.middle(positions, "UpperArm") if i < chest else positions[:, back[-1]]
-        return np.asarray(end - start)
+        return end - start
 
     def _leg(self, bones: Sequence[str]) -> None:
         """Knees are hinges that bend backwards; feet and toes have the hinge's axis."""

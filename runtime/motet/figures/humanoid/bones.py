@@ -200,7 +200,7 @@ Tree = dict[str, tuple[str, Array]]
 
 def _rig_tree(content: dict[str, Any]) -> Tree:
     """The joints of a rig with the humanoid's proportions, from its convention's table."""
-    tree: Tree = {}
+    tree = {}
     parent = ""
     if "root" in content["rig"]:
         parent = content["rig"]["root"]

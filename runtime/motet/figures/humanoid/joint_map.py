@@ -187,11 +187,11 @@ class Body:
         """The middle (..., 3) between a joint of the left and its partner."""
         left = self._position(positions, "left", part)
         right = self._position(positions, "right", part)
-        return np.asarray((left + right) / 2)
+        return (left + right) / 2
 
     def to_left(self, positions: Array, part: str) -> Array:
         """Vectors (..., 3) from a joint of the right to its partner on the left."""
-        return np.asarray(self._position(positions, "left", part) - self._position(positions, "right", part))
+        return self._position(positions, "left", part) - self._position(positions, "right", part)
 
     def trunk_up(self, positions: Array) -> Array:
         """Directions (..., 3) from the middle of the legs' joints to that of the arms'."""
@@ -207,7 +207,7 @@ class Body:
 
     def _position(self, positions: Array, side: str, part: str) -> Array:
         """Positions (..., 3) of the joint of a bone."""
-        return np.asarray(positions[..., self.joints[sided(side, part)], :])
+        return positions[..., self.joints[sided(side, part)], :]
 
 
 def humanoid_direction(bone: str) -> Array:
@@ -294,7 +294,7 @@ def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, .
     """For each bone of a user's map its joints, each of them one bone's."""
     # the spine and the neck may have any number of joints
     known = [bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1])] + ["neck"]
-    places: dict[str, tuple[int, ...]] = {}
+    places = {}
     for bone, names in _entries(path).items():
         if bone not in known:
             raise FormatError(
@@ -434,7 +434,7 @@ def _bones(
 
 def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) -> dict[str, Triple]:
     """Vectors of bones of both sides: those of the right are those of the left with signs, which mirror them."""
-    vectors: dict[str, Triple] = {}
+    vectors = {}
     for bone, (x, y, z) in of_left.items():
         if bone in UNSIDED:
             vectors[bone] = (x, y, z)

@@ -232,4 +232,4 @@ def _envelope(values: Array, reach: float) -> Array:
     """A smooth curve (T,) that is nowhere below values (T,), wider than they by ``reach`` frames on either side."""
     frames = max(1, round(reach))
     highest = windows(np.pad(values, frames, mode="edge"), frames).max(axis=1)
-    return np.asarray(np.convolve(highest, bell(frames), mode="valid"))
+    return np.convolve(highest, bell(frames), mode="valid")
