@@ -1,15 +1,17 @@
 """The body that figures of people have in pages, pictures and files: a faceless mannequin, made from its outlines.
 
-Tables give key rings along trunk and head, leg, arm and finger in metres, around the humanoid's joints; half-way
-between them lie smooth ones. Trunk, legs and arms are one closed surface: a leg begins with half of the trunk's lowest
-ring and a bridge through the crotch, an arm with the border of a hole in the trunk. Arms are shaped as they mostly are,
-hanging by SLOPE, and then turned up into the T-pose. Each corner belongs to the joint of its ring at first, from where
-weights even out.
+mannequin.json has tables of key rings along trunk and head, leg, arm and finger in metres, around the humanoid's
+joints; half-way between them lie smooth ones. Trunk, legs and arms are one closed surface: a leg begins with half of
+the trunk's lowest ring and a bridge through the crotch, an arm with the border of a hole in the trunk. Arms are shaped
+as they mostly are, hanging by SLOPE, and then turned up into the T-pose. Each corner belongs to the joint of its ring
+at first, from where weights even out.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
@@ -30,60 +32,13 @@ INKS = np.array([(168, 179, 198), COLOURS[LEFT], COLOURS[RIGHT], COLOURS[MIDDLE]
 
 BANDS = {"left": LEFT_PART, "right": RIGHT_PART}
 
-TRUNK_RINGS = (
-    (0.855, 0.086, 0.845, -0.106, 0.174, 0.0),
-    (0.905, 0.090, 0.900, -0.118, 0.174, 0.0),
-    (0.955, 0.096, 0.960, -0.114, 0.168, 0.0),
-    (1.020, 0.095, 1.020, -0.090, 0.149, 0.0),
-    (1.090, 0.092, 1.090, -0.078, 0.133, 0.0),
-    (1.170, 0.098, 1.180, -0.082, 0.137, 0.0),
-    (1.280, 0.114, 1.290, -0.098, 0.153, 0.0),
-    (1.365, 0.104, 1.370, -0.100, 0.160, 0.0),
-    (1.430, 0.072, 1.440, -0.088, 0.150, 0.0),
-    (1.452, 0.052, 1.472, -0.074, 0.098, 0.0),
-    (1.466, 0.046, 1.500, -0.064, 0.064, 0.0),
-    (1.496, 0.046, 1.530, -0.056, 0.054, 0.0),
-    (1.522, 0.058, 1.560, -0.060, 0.053, 0.0),
-    (1.530, 0.098, 1.590, -0.076, 0.060, 0.0),
-    (1.570, 0.107, 1.625, -0.094, 0.071, 0.0),
-    (1.625, 0.108, 1.660, -0.102, 0.078, 0.0),
-    (1.685, 0.096, 1.695, -0.096, 0.075, 0.0),
-    (1.733, 0.060, 1.735, -0.064, 0.051, 0.0),
-    (1.750, 0.012, 1.750, -0.016, 0.012, 0.0),
-)
-"""Of each ring its height and place in front, those behind, half its width, and where its middle is from side to side:
-from the crotch to the crown."""
 
-LEG_RINGS = (
-    (0.775, 0.084, 0.775, -0.090, 0.084, 0.091),
-    (0.640, 0.069, 0.640, -0.069, 0.068, 0.091),
-    (0.540, 0.058, 0.540, -0.052, 0.055, 0.090),
-    (0.470, 0.052, 0.470, -0.054, 0.051, 0.090),
-    (0.360, 0.040, 0.360, -0.070, 0.053, 0.091),
-    (0.210, 0.034, 0.210, -0.050, 0.039, 0.090),
-    (0.110, 0.036, 0.100, -0.046, 0.033, 0.090),
-    (0.088, 0.056, 0.018, -0.064, 0.034, 0.091),
-    (0.072, 0.082, 0.000, -0.030, 0.038, 0.093),
-    (0.054, 0.118, 0.000, 0.060, 0.043, 0.096),
-    (0.030, 0.185, 0.000, 0.175, 0.044, 0.098),
-    (0.016, 0.206, 0.006, 0.206, 0.020, 0.096),
-)
-"""As of the trunk, of the left leg from the thigh to the toes."""
-
-ARM_RINGS = (
-    (0.045, 0.054, -0.046, 0.056, -0.056),
-    (0.110, 0.050, -0.048, 0.052, -0.050),
-    (0.195, 0.044, -0.044, 0.044, -0.046),
-    (0.260, 0.038, -0.039, 0.040, -0.042),
-    (0.310, 0.039, -0.040, 0.043, -0.040),
-    (0.370, 0.038, -0.039, 0.043, -0.039),
-    (0.460, 0.028, -0.028, 0.035, -0.032),
-    (0.530, 0.020, -0.020, 0.029, -0.027),
-    (0.585, 0.014, -0.017, 0.041, -0.037),
-    (0.618, 0.004, -0.007, 0.033, -0.029),
-)
-"""Of each ring of the left arm and palm how far from the shoulder it is, and how far it reaches over the arm's axis,
-under it, in front and behind."""
+OUTLINES = json.loads((files("motet.draw") / "mannequin.json").read_text("utf-8"))
+"""Tables of the body, a row for each ring. "trunk", from the crotch to the crown, and "leg", the left one from the
+thigh to the toes: the height of a ring and its place in front, those behind, half its width, and where its middle is
+from side to side. "arm", the left one with its palm: how far from the shoulder a ring is, and how far it reaches
+over the arm's axis, under it, in front and behind. "fingers": a :class:`Finger` each, the middle one first, the
+thumb last. "phalanges": how far along a finger a ring is, and how much of its radius it has."""
 
 
 class Finger(NamedTuple):
@@ -96,18 +51,6 @@ class Finger(NamedTuple):
     aside: float
     curl: tuple[float, float]
 
-
-FINGER_SHAPES = (
-    Finger((0.588, -0.003, 0.011), 0.130, 0.0102, 1.0, (8.0, 14.0)),
-    Finger((0.588, -0.003, 0.030), 0.119, 0.0100, 3.0, (7.0, 12.0)),
-    Finger((0.586, -0.003, -0.009), 0.121, 0.0098, -2.0, (9.0, 16.0)),
-    Finger((0.584, -0.003, -0.027), 0.098, 0.0088, -5.0, (10.0, 18.0)),
-    Finger((0.540, -0.008, 0.014), 0.088, 0.0118, 36.0, (14.0, 5.0)),
-)
-"""The middle one first, the thumb last."""
-
-PHALANGES = ((0.0, 1.0), (0.45, 1.06), (0.74, 0.95), (0.94, 0.74), (1.0, 0.3))
-"""Of each ring of a finger how far along it is, and how much of the radius it has."""
 
 RING_CORNERS = 24
 FINGER_RING_CORNERS = 6
@@ -230,14 +173,15 @@ def _patches(corners: Corners) -> list[Patch]:
         on_side = trunk if side == "left" else trunk[:, -np.arange(RING_CORNERS)]
         patches.append(_limb(corners, leg, side, _hip(on_side)))
         patches.append(_limb(corners, arm, side, _shoulder(on_side)))
-    for finger in map(_finger, FINGER_SHAPES):
+    for shape in OUTLINES["fingers"]:
+        finger = _finger(Finger(**shape))
         patches += [_limb(corners, finger, side) for side in LEFT_RIGHT]
     return patches
 
 
 def _trunk(corners: Corners) -> Numbers:
     """Number the trunk's rings (R, C), and after them a bridge from front to back through the crotch."""
-    rings = smoothed(_spanned(TRUNK_RINGS, *ring(RING_CORNERS, 2.3).T))
+    rings = smoothed(_spanned(OUTLINES["trunk"], *ring(RING_CORNERS, 2.3).T))
     trunk = corners.add(rings, _bones_of_trunk(rings), np.array(BODY))
     front = rings[0, 0]
     bridge = front + BRIDGE[:, :1] * (rings[0, RING_CORNERS // 2] - front) + BRIDGE[:, 1:] * [0.0, 1.0, 0.0]
@@ -259,7 +203,7 @@ def _limb(corners: Corners, limb: Limb, side: str, start: Numbers | None = None)
 
 
 def _spanned(table: Sequence[Sequence[float]], front: Array, left: Array) -> Array:
-    """Rings (R, C, 3) of a table like TRUNK or LEG, from how far each corner (C,) is in front and to the left."""
+    """Rings (R, C, 3) of a table like "trunk" or "leg", from how far each corner (C,) is in front and to the left."""
     front_y, front_z, back_y, back_z, half, middle_x = np.array(table).T[..., None]
     x = middle_x + half * left
     y = (front_y + back_y + (front_y - back_y) * front) / 2
@@ -301,7 +245,7 @@ def _shoulder(trunk: Numbers) -> Numbers:
 def _leg(start: Array) -> Limb:
     """The leg from corners (16, 3) of the trunk on: its rings begin behind, and go round by the outer side."""
     outline = np.roll(ring(len(start), 2.2), 6, axis=0)
-    rings = smoothed(np.concatenate([start[None], _spanned(LEG_RINGS, outline[:, 1], outline[:, 0])]))[1:]
+    rings = smoothed(np.concatenate([start[None], _spanned(OUTLINES["leg"], outline[:, 1], outline[:, 0])]))[1:]
     _, height, ahead = rings.mean(axis=1).T
     bones = np.array(["UpperLeg", "LowerLeg", "Foot"])[np.searchsorted([-0.5, -0.08], -height)]
     bones[ahead > 0.13] = "Toes"
@@ -312,7 +256,7 @@ def _arm(start: Array) -> Limb:
     """The arm and the palm from corners (16, 3) of the trunk on: its rings begin behind, and go round over the top."""
     # rings as wide above, below, in front and behind as the arm is there
     up, ahead = np.roll(ring(len(start), 2.2), 2, axis=0).T
-    along, over, under, front, back = np.array(ARM_RINGS).T[..., None]
+    along, over, under, front, back = np.array(OUTLINES["arm"]).T[..., None]
     height = np.where(up > 0, over, -under) * up
     depth = np.where(ahead > 0, front, -back) * ahead
     rings = _hanging(np.stack(np.broadcast_arrays(along, height, depth), axis=-1))
@@ -331,8 +275,8 @@ def _hanging(places: Array) -> Array:
 
 def _finger(finger: Finger) -> Limb:
     """A chain of bones, each more curled than the one before."""
-    share, wide = np.array(PHALANGES).T[..., None]
-    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(PHALANGES)))[:, None]
+    share, wide = np.array(OUTLINES["phalanges"]).T[..., None]
+    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(OUTLINES["phalanges"])))[:, None]
     aside = np.radians(finger.aside)
     way = np.cos(curl) * [np.cos(aside), 0.0, np.sin(aside)] - [0.0, 1.0, 0.0] * np.sin(curl)
     middles = finger.start + np.cumsum(np.diff(share, axis=0, prepend=0.0) * finger.length * way, axis=0)

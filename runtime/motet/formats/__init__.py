@@ -1,10 +1,11 @@
 """Files of motion: one record per format, chosen by the extension.
 
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
-binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions
-or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes "clip", "figure" or both. To
-add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of
-docs/reference/formats.md and the lists of corpora are built from.
+binary file object; both raise motet's errors and leave nothing half-written. What parses the content of a file raises
+:class:`~motet.formats.text.ContentError`, to which ``read``, marked as ``names_file``, adds the file's name. If its
+files hold several motions or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes
+"clip", "figure" or both. To add a format, write its module and add its record to :data:`FORMATS`, which help texts, the
+table of docs/reference/formats.md and the lists of corpora are built from.
 """
 
 import logging
@@ -23,7 +24,7 @@ from motet.errors import FormatError, MotionError, OutputError
 from motet.figures.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
 from motet.figures.root_motion import travel_on_root
 from motet.files import File, check_place, place_of
-from motet.formats.text import Clip, Contents, Figure, split_clip
+from motet.formats.text import Clip, Contents, Figure, naming, split_clip
 from motet.motion.motion import Motion, motions_of, rest_motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton, metres
@@ -38,6 +39,7 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of motion files.
 
+    keeps: which parts of a motion a file holds, for the docs.
     reader: the module of motet with its ``read``, imported on first use; empty if it is not read.
     writer: the function of motet that writes it, imported on first use; empty if it is not written.
     options: the keyword arguments of its ``read``.
@@ -48,17 +50,13 @@ class Format:
 
     extension: str
     name: str
+    keeps: str
     reader: str = ""
     writer: str = ""
     options: tuple[str, ...] = ()
     mocap: bool = False
     loose: bool = False
     needs: str = ""
-
-    @property
-    def keeps(self) -> str:
-        """Which parts of a motion a file holds, for the docs."""
-        return _KEEPS[self.extension]
 
     def module(self) -> Any:
         """The module that reads it."""
@@ -70,36 +68,92 @@ class Format:
         return function
 
 
-_CHARACTER = "a skeleton and its animations, each a clip, or its rest pose"
-_KEEPS = {
-    ".amc": "everything; AMC need not state its frame rate: 120 unless the file or `fps=` gives another",
-    ".bvh": "everything but the unit of length",
-    ".npz": "everything, bit for bit; from AMASS and mocap of videos (SMPL), the body joints",
-    ".csv": "values, units and frame rate, no skeleton",
-    ".xml": "angles and root; the skeleton is not in the file",
-    ".glb": "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
-    ".gltf": _CHARACTER,
-    ".vrm": f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](../humanoid.md#characters))",
-    ".vrma": "the humanoid: motions of other human figures are retargeted ([humanoid.md](../humanoid.md))",
-    ".fbx": "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`",
-    ".html": "a page with a player: orbit, play, scrub, no network",
-    ".gif": "an animated picture; needs Pillow: `pip install 'motet[plot]'`",
-}
 _NODES = ("clip", "figure", "rest")
 
 FORMATS = (
-    Format(".amc", "Acclaim, with its .asf", "formats.amc", "formats.amc.write", ("asf", "fps", "partial"), mocap=True),
-    Format(".bvh", "Biovision", "formats.bvh", "formats.bvh.write", ("figure", "partial"), mocap=True),
-    Format(".npz", "motet's own; SMPL", "formats.npz", "formats.npz.write", ("fps",), mocap=True),
-    Format(".csv", "table", "formats.csv", "formats.csv.write"),
-    Format(".xml", "MMM of KIT", "formats.mmm"),
-    Format(".glb", "glTF 2.0", "formats.gltf", "formats.glb.write", _NODES, mocap=True, loose=True),
-    Format(".gltf", "glTF 2.0, as text", "formats.gltf", options=_NODES, loose=True),
-    Format(".vrm", "VRM avatar", "formats.gltf", options=_NODES, loose=True),
-    Format(".vrma", "VRM Animation", "formats.gltf", "formats.glb.write_vrma", _NODES, mocap=True, loose=True),
-    Format(".fbx", "FBX", "formats.fbx", options=_NODES, mocap=True, loose=True),
-    Format(".html", "web page", writer="draw.page.write"),
-    Format(".gif", "picture", writer="draw.gif.write", needs="PIL"),
+    Format(
+        ".amc",
+        "Acclaim, with its .asf",
+        "everything; AMC need not state its frame rate: 120 unless the file or `fps=` gives another",
+        "formats.amc",
+        "formats.amc.write",
+        ("asf", "fps", "partial"),
+        mocap=True,
+    ),
+    Format(
+        ".bvh",
+        "Biovision",
+        "everything but the unit of length",
+        "formats.bvh",
+        "formats.bvh.write",
+        ("figure", "partial"),
+        mocap=True,
+    ),
+    Format(
+        ".npz",
+        "motet's own; SMPL",
+        "everything, bit for bit; from AMASS and mocap of videos (SMPL), the body joints",
+        "formats.npz",
+        "formats.npz.write",
+        ("fps",),
+        mocap=True,
+    ),
+    Format(".csv", "table", "values, units and frame rate, no skeleton", "formats.csv", "formats.csv.write"),
+    Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "formats.mmm"),
+    Format(
+        ".glb",
+        "glTF 2.0",
+        "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
+        "formats.gltf",
+        "formats.glb.write",
+        _NODES,
+        mocap=True,
+        loose=True,
+    ),
+    Format(
+        ".gltf",
+        "glTF 2.0, as text",
+        "a skeleton and its animations, each a clip, or its rest pose",
+        "formats.gltf",
+        options=_NODES,
+        loose=True,
+    ),
+    Format(
+        ".vrm",
+        "VRM avatar",
+        "a skeleton and its animations, each a clip, or its rest pose; written by `--onto`, the "
+        "avatar itself ([humanoid.md](../humanoid.md#characters))",
+        "formats.gltf",
+        options=_NODES,
+        loose=True,
+    ),
+    Format(
+        ".vrma",
+        "VRM Animation",
+        "the humanoid: motions of other human figures are retargeted ([humanoid.md](../humanoid.md))",
+        "formats.gltf",
+        "formats.glb.write_vrma",
+        _NODES,
+        mocap=True,
+        loose=True,
+    ),
+    Format(
+        ".fbx",
+        "FBX",
+        "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`",
+        "formats.fbx",
+        options=_NODES,
+        mocap=True,
+        loose=True,
+    ),
+    Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="draw.page.write"),
+    Format(
+        ".gif",
+        "picture",
+        "an animated picture; needs Pillow: `pip install 'motet[plot]'`",
+        writer="draw.gif.write",
+        needs="PIL",
+    ),
 )
 
 READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
@@ -179,13 +233,11 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
         "rest": rest,
     }
     options = _options_for(path, kind, settings)
-    try:
+    with naming(file):
         with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
             motion: Motion = kind.module().read(file, **options)
         log.debug("read %s: %r", path, motion)
         return motion if unit is None else _in_unit(path, motion, unit, kind.loose)
-    except MotionError as error:
-        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
 
 
 def _options_for(path: Path, kind: Format, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -203,7 +255,7 @@ def split_part(file: File, format: str | None = None) -> tuple[File, str | None,
     file, named = split_clip(file, READABLE)
     if named is None:
         return file, None, None
-    extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
+    extension = _extension(file, format)
     has_only_figures = extension in FIGURED and extension not in CLIPPED
     return (file, None, named) if has_only_figures else (file, named, None)
 
@@ -396,11 +448,15 @@ def check_writable(file: File, format: str | None = None, allowed: tuple[str, ..
 
 
 def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str) -> Format:
-    # the format that the caller names, or else the extension
-    extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
+    extension = _extension(file, format)
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
     if extension == ".c3d":
         what += ", which hold markers without a skeleton: first solve for one in the program that recorded them"
     raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")
+
+
+def _extension(file: File, format: str | None) -> str:
+    """The format that the caller names, or else the extension."""
+    return place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"

@@ -16,17 +16,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import FormatError, MotionError, listed, quoted
+from motet.errors import MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
 from motet.files import File, place_of
 from motet.formats.gltf_data import REST_TRANSFORM, Gltf, Json, Tracks, broken, parse
 from motet.formats.text import (
     Clip,
+    ContentError,
     Contents,
     Names,
     choice,
     chosen,
     most_poses,
+    names_file,
     part_names,
     split_clip,
 )
@@ -69,7 +71,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
         parts = _contents(scene, scene.names, map(moved, scene.animations))
         take = _take(scene, *choice(gltf.path, parts, clip, figure))
         if stance and not stance.keys() & set(take.figure.names):
-            raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
+            raise ContentError("the file of the rest pose shares no joint name with this figure")
         # every angle is counted from the rest pose of the nodes, whatever their own axes
         rest_turns, rest_places = _rested(take, stance)
         skeleton = skeleton_at(_joint_names(gltf, take.figure), take.figure.parents, rest_places)
@@ -132,17 +134,18 @@ def _scene(file: File) -> _Scene:
     near = above(gltf, set().union(*parts))
     moving = [animation for animation in animations if moved(animation) & near]
     if animations and not moving:
-        raise FormatError(gltf.path, "its animations move no joint of its skeleton: export the armature's animations")
+        raise ContentError("its animations move no joint of its skeleton: export the armature's animations")
     names = part_names(str(animation.get("name", "")) for animation in moving)
     return _Scene(gltf, dict(zip(titles, parts, strict=True)), moving, names)
 
 
+@names_file
 def _stance(file: File) -> dict[str, Array]:
     """The rotations (3, 3) of a file's joints in the world, by name: at rest, or at the start of a named clip."""
     extensions = (".glb", ".gltf", ".vrm", ".vrma")
     file, clip = split_clip(file, extensions)
     if isinstance(file, str | Path) and Path(file).suffix.lower() not in extensions:
-        raise FormatError(place_of(file), f"a rest pose must come from a file of {' '.join(extensions)}")
+        raise ContentError(f"a rest pose must come from a file of {' '.join(extensions)}")
     with broken(place_of(file)):
         scene = _scene(file)
         take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip), None)
@@ -270,7 +273,7 @@ def figures(gltf: Gltf, moved: NodeSet) -> list[NodeSet]:
     sets = [humanoid, *_skins(gltf)]
     joints_of_all = set().union(*sets)
     if unknown := joints_of_all.difference(range(len(gltf.parents))):
-        raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, unknown)))}")
+        raise ContentError(f"joints that are not nodes: {listed(sorted(map(str, unknown)))}")
     roots = _roots(gltf)
     animated = _animated(gltf, moved, roots)
     if not joints_of_all:
@@ -290,19 +293,19 @@ def _skins(gltf: Gltf) -> list[NodeSet]:
     """The joints of each skin; FormatError for too many skins."""
     skins = gltf.objects("skins")
     if len(skins) > MAX_SKINS:
-        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
+        raise ContentError(f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
     return [set(skin.get("joints", [])) for skin in skins]
 
 
-def _no_skeleton(gltf: Gltf, moved: NodeSet) -> FormatError:
+def _no_skeleton(gltf: Gltf, moved: NodeSet) -> ContentError:
     """The error for a file without joints, with what its animations move instead."""
     if gltf.document.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions"):
-        return FormatError(gltf.path, "it animates only expressions of a face, and no bones: it has no motion")
+        return ContentError("it animates only expressions of a face, and no bones: it has no motion")
     reason = "expected a skin with joints or a VRM humanoid"
     if moved:
         names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
         reason = f"its animations move only {names}, and nothing below"
-    return FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
+    return ContentError(f"no skeleton: {reason}; export the armature, too")
 
 
 def _grouped(gltf: Gltf, sets: list[NodeSet], moved: NodeSet, roots: Mapping[int, int]) -> list[NodeSet]:
@@ -330,7 +333,7 @@ def _humans(gltf: Gltf, groups: list[NodeSet]) -> list[NodeSet]:
             figure = figure_of(gltf, joints)
             skeleton = skeleton_at(figure.names, figure.parents, places[0, list(figure.nodes)])
             map_of(rest_motion(skeleton))
-        except (FormatError, MotionError):
+        except MotionError:
             continue
         humans.append(joints)
     return humans
@@ -410,7 +413,7 @@ def figure_of(gltf: Gltf, joints: NodeSet) -> Figure:
     inside = above(gltf, joints) - over
     nodes = tuple(node for node in gltf.order if node in inside or _is_end(gltf, node, inside))
     if len(nodes) > MAX_JOINTS:
-        raise FormatError(gltf.path, f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
+        raise ContentError(f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
     index_of = {node: i for i, node in enumerate(nodes)}
     parents = tuple(index_of.get(gltf.parents[node], -1) for node in nodes)
     unique_names = Names()
@@ -453,7 +456,7 @@ def _tracks(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> tuple[Tra
 def _frame_times(gltf: Gltf, name: str, times_of_tracks: list[Array]) -> tuple[Array, float]:
     """The times (T,) of an animation's frames by the times (K,) of its tracks' keys, and its frame rate."""
     if not all(map(len, times_of_tracks)):
-        raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
+        raise ContentError(f"its animation {quoted(name)} has tracks without keys")
     # from the first key of any track to the last
     start = min(times[0] for times in times_of_tracks)
     end = max(times[-1] for times in times_of_tracks)
@@ -462,7 +465,7 @@ def _frame_times(gltf: Gltf, name: str, times_of_tracks: list[Array]) -> tuple[A
     fps = _rate(times_of_tracks)
     count = (end - start) * fps + 1
     if not count * len(gltf.objects("nodes")) < most_poses(gltf.size):
-        raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
+        raise ContentError(f"{end - start:g} s at {fps:g} fps is too many frames")
     return start + np.arange(round(count)) / fps, fps
 
 
@@ -486,7 +489,7 @@ def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
         if values.size != expected * len(REST_TRANSFORM[path]):
             counts = f"{times.size} times and {len(values)} values, not {expected},"
             track = f"the {path} of {quoted(gltf.name(node))}"
-            raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {track}: export it again")
+            raise ContentError(f"its animation {quoted(name)} has {counts} for {track}: export it again")
         keys[node, path] = (times.reshape(-1), values, interpolation)
     return keys
 
