@@ -8,7 +8,7 @@ import click
 
 from motet.bundle.graph import SessionOptions
 from motet.cli.generate import captions_of, confidence_of
-from motet.cli.options import bundle_option, noted, session_options
+from motet.cli.options import bundle_option, json_option, noted, seed_option, session_options
 from motet.cli.writing import Output, out_option, size, write_options
 from motet.composition.compose import compose as composition_of
 from motet.composition.plans import parse_plan, read_plan
@@ -20,11 +20,11 @@ from motet.models.load import load_as
 @click.argument("plan", metavar="PLAN")
 @out_option
 @bundle_option("generate")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is drawn.")
+@seed_option("Seed of what is drawn.")
 @click.option("--strict", is_flag=True, help="Fail on a prompt that the model knows only in part.")
 @write_options
 @session_options
-@click.option("--json", "as_json", is_flag=True, help="Print an object with the passages and what was met.")
+@json_option("Print an object with the passages and what was met.")
 def compose(
     plan: str,
     out: Path,

@@ -9,7 +9,7 @@ import numpy as np
 
 from motet.bundle.graph import Floats, SessionOptions
 from motet.cli.many import Many, many_options
-from motet.cli.options import noted, session_options
+from motet.cli.options import json_option, noted, session_options
 from motet.cli.reading import read_options
 from motet.corpus.answers import Embed
 from motet.files import check_place, write_whole
@@ -25,7 +25,7 @@ from motet.models.load import load_as
 @session_options
 @read_options
 @many_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with the input of each row.")
+@json_option("Print a list with the input of each row.")
 def embed(
     motions: tuple[Path, ...],
     texts: tuple[str, ...],

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import session_options
+from motet.cli.options import seed_option, session_options
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
 from motet.keyed import KeyedAct, ours
@@ -24,7 +24,7 @@ from motet.steering.model import SteerModel
 @click.option(
     "--over", type=Path, metavar="MOTION", help="Motion that the acts are laid over.  [default: a person who stands]"
 )
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of times, sizes and counts.")
+@seed_option("Seed of times, sizes and counts.")
 @write_options
 @session_options
 @read_options

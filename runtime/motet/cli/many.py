@@ -3,7 +3,7 @@ named; and in parts, which other processes and machines write beside this one.""
 
 import functools
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from motet.cli.options import Tries, bar
+from motet.cli.options import Command, Tries, bar
 from motet.cli.reading import Read
 from motet.corpus import parts as corpus_parts
 from motet.corpus import ray_engine
@@ -90,7 +90,7 @@ class Many:
             raise OutputError(f"cannot complete {part.path}: {reason} on files that stay")
 
 
-def many_options(command: Callable[..., None]) -> Callable[..., None]:
+def many_options(command: Command) -> Command:
     """Gives a command ``many``, with the ``read`` of :func:`motet.cli.reading.read_options`, which stands above it."""
 
     @jobs_option

@@ -2,27 +2,27 @@
 
 import functools
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
+from motet.cli.options import Command
 from motet.cli.reading import FRAME_RATE
 from motet.corpus.sources import Source
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
 from motet.figures.humanoid import RIGS
-from motet.figures.root_motion import in_place
 from motet.formats import (
     BODIES,
     ONTO,
     WRITABLE,
     Character,
     check_writable,
-    put_onto,
     read_character,
+    shaped,
     write_all_on,
     write_on,
 )
@@ -51,9 +51,7 @@ class Output:
 
     def shaped(self, motion: Motion) -> Motion:
         """The motion as it is to be written."""
-        motion = put_onto(motion, self.character) if self.character else motion
-        motion = motion.resample(self.fps) if self.fps else motion
-        return in_place(motion) if self.in_place else motion
+        return shaped(motion, self.character, self.fps, self.in_place)
 
     def save(self, place: Path, motion: Motion, name: str, captions: Captions | None = None) -> None:
         """Write a motion that is shaped, or keep it for :meth:`finish` as a clip of this name, or one like it.
@@ -86,7 +84,7 @@ out_option = click.option(
 )
 
 
-def write_options(command: Callable[..., None]) -> Callable[..., None]:
+def write_options(command: Command) -> Command:
     """Gives a command ``output``, as ``--like``, ``--onto``, ``--fps`` and ``--in-place`` say; a character is read at
     once. The command calls its :meth:`Output.finish` in the end."""
 

@@ -19,7 +19,7 @@ from motet.figures.humanoid import (
     to_humanoid,
     with_figure,
 )
-from motet.files import place_of
+from motet.files import Json, place_of
 from motet.formats import contents_of, read_motion, split_part
 from motet.formats.text import Clip, Figure, choice
 from motet.motion.kinematics import global_transforms, heading, positions
@@ -84,7 +84,7 @@ class Checked:
         """Whether the figure hardly leaves its place."""
         return self.travel is not None and self.travel < 0.3  # metres
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """All fields, and :attr:`seconds`, :attr:`sure` and :attr:`in_place`."""
         return {**asdict(self), "seconds": self.seconds, "sure": self.sure, "in_place": self.in_place}
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from motet.draw.figure import COLOURS
 from motet.draw.mesh import Mesh, patch_triangles, ring, smooth_weights, smoothed
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
-from motet.motion.rotations import Array
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, SIDES, T_POSE, joint_of
+from motet.motion.rotations import Array, Indices, Mask
 from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
 
 BODY, LEFT_PART, RIGHT_PART, MIDDLE_PART = range(4)
@@ -53,8 +53,7 @@ class Finger(NamedTuple):
 
 
 RING_CORNERS = 24
-FINGER_RING_CORNERS = 6
-"""Corners of the trunk's rings, the first in front, and of fingers'. Limbs have 16."""
+"""Corners of the trunk's rings, the first in front. Limbs have 16, fingers 6."""
 
 HOLE_ROW = 12
 HOLE_COLUMNS = (4, 16)
@@ -75,26 +74,16 @@ DOWN_ARM = np.array(
 
 TRUNK_JOINTS = ("hips", "spine", "chest", "upperChest", "neck", "head")
 
-Numbers = NDArray[np.intp]
-
-BAND_AT_ARM = 0.535
-BAND_AT_LEG = 0.12
 BAND = 0.025
-"""Where bands are, from the shoulder on and over the ground, and half of their width."""
-
-COARSE_PATCHES = 5
-"""Of the coarsest body: trunk, legs and arms without fingers."""
-
-SMOOTHING_ROUNDS = 6
-"""How often weights even out between neighbours."""
+"""Half of the width of bands."""
 
 
 class Patch(NamedTuple):
     """Rings (R, C) of numbered corners; which squares (R - 1, C) from a ring to the next are drawn; and whether the
     first ring and the last one are closed."""
 
-    grid: Numbers
-    is_drawn: NDArray[np.bool_]
+    grid: Indices
+    is_drawn: Mask
     closes: tuple[bool, bool]
 
 
@@ -104,7 +93,7 @@ class Limb(NamedTuple):
 
     rings: Array
     bones: NDArray[np.str_]
-    in_band: NDArray[np.bool_]
+    in_band: Mask
 
 
 class Corners:
@@ -115,7 +104,7 @@ class Corners:
         self.bones = np.zeros(0, np.intp)
         self.parts = np.zeros(0, np.intp)
 
-    def add(self, rings: Array, bones: Numbers, parts: Numbers) -> Numbers:
+    def add(self, rings: Array, bones: Indices, parts: Indices) -> Indices:
         """Number rings (R, C, 3), with joints and parts that go with (R, C): their numbers (R, C)."""
         size = rings.shape[:2]
         numbers = len(self.places) + np.arange(size[0] * size[1]).reshape(size)
@@ -134,7 +123,8 @@ def human_mesh(level: int = 0) -> Mesh:
     mesh, patches = _whole()
     places = mesh.places.copy()
     triangles = []
-    for patch in patches[: None if level < 2 else COARSE_PATCHES]:
+    # the coarsest body has trunk, legs and arms without fingers
+    for patch in patches[: None if level < 2 else 5]:
         step = min(2**level, patch.grid.shape[1] // 3)
         kept = patch.grid[:: 2**level, ::step]
         triangles.append(patch_triangles(kept, patch.is_drawn[:: 2**level, ::step], patch.closes))
@@ -159,7 +149,7 @@ def _whole() -> tuple[Mesh, list[Patch]]:
     corners = Corners()
     patches = _patches(corners)
     triangles = np.concatenate([patch_triangles(patch.grid, patch.is_drawn, patch.closes) for patch in patches])
-    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], SMOOTHING_ROUNDS)
+    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], 6)
     return _with_arms_up(Mesh(corners.places, triangles, joints, weights, corners.parts)), patches
 
 
@@ -179,7 +169,7 @@ def _patches(corners: Corners) -> list[Patch]:
     return patches
 
 
-def _trunk(corners: Corners) -> Numbers:
+def _trunk(corners: Corners) -> Indices:
     """Number the trunk's rings (R, C), and after them a bridge from front to back through the crotch."""
     rings = smoothed(_spanned(OUTLINES["trunk"], *ring(RING_CORNERS, 2.3).T))
     trunk = corners.add(rings, _bones_of_trunk(rings), np.array(BODY))
@@ -189,10 +179,10 @@ def _trunk(corners: Corners) -> Numbers:
     return trunk
 
 
-def _limb(corners: Corners, limb: Limb, side: str, start: Numbers | None = None) -> Patch:
+def _limb(corners: Corners, limb: Limb, side: str, start: Indices | None = None) -> Patch:
     """Number a limb's rings on a side, which go on from a ring of the trunk or are closed."""
     sign = 1 if side == "left" else -1
-    bones = np.array([HUMANOID.index(sided(side, bone)) for bone in limb.bones])[:, None]
+    bones = np.array([joint_of(side, bone) for bone in limb.bones])[:, None]
     parts = np.where(limb.in_band, BANDS[side], BODY)[:, None]
     grid = corners.add(limb.rings * [sign, 1, 1], bones, parts)
     if start is not None:
@@ -211,19 +201,19 @@ def _spanned(table: Sequence[Sequence[float]], front: Array, left: Array) -> Arr
     return np.stack([x, y, z], axis=-1)
 
 
-def _bones_of_trunk(rings: Array) -> Numbers:
+def _bones_of_trunk(rings: Array) -> Indices:
     """The joint of each corner (R, C): by its ring's height one of the spine, beside it a collar bone or a leg."""
     spine = np.array([HUMANOID.index(name) for name in TRUNK_JOINTS])
     on_spine = np.searchsorted(T_POSE[spine[1:], 1], rings[..., 1].mean(axis=1), "right")
     bones = np.repeat(spine[on_spine][:, None], rings.shape[1], axis=1)
     x, y, _ = np.moveaxis(rings, -1, 0)
-    for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
-        bones[(sign * x > 0.04) & (y > 1.31) & (y < 1.47)] = HUMANOID.index(sided(side, "Shoulder"))
-        bones[(sign * x > 0.04) & (y < 0.92)] = HUMANOID.index(sided(side, "UpperLeg"))
+    for side, sign in SIDES:
+        bones[(sign * x > 0.04) & (y > 1.31) & (y < 1.47)] = joint_of(side, "Shoulder")
+        bones[(sign * x > 0.04) & (y < 0.92)] = joint_of(side, "UpperLeg")
     return bones
 
 
-def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
+def _without_holes(trunk: Indices) -> Mask:
     """Which squares of the trunk are drawn."""
     is_drawn = np.full((len(trunk) - 1, RING_CORNERS), True)
     for column in HOLE_COLUMNS:
@@ -231,12 +221,12 @@ def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
     return is_drawn
 
 
-def _hip(trunk: Numbers) -> Numbers:
+def _hip(trunk: Indices) -> Indices:
     """Corners (16,) that a left leg begins with: half of the lowest ring from the back, and the bridge."""
     return np.append(trunk[0, RING_CORNERS // 2 :: -1], trunk.size + np.arange(len(BRIDGE)))
 
 
-def _shoulder(trunk: Numbers) -> Numbers:
+def _shoulder(trunk: Indices) -> Indices:
     """Corners (16,) that a left arm begins with: the hole's border from its upper end at the back, over the top."""
     rows = trunk[HOLE_ROW : HOLE_ROW + HOLE + 1, HOLE_COLUMNS[0] : HOLE_COLUMNS[0] + HOLE + 1]
     return np.concatenate([rows[-1, :0:-1], rows[:0:-1, 0], rows[0, :-1], rows[:-1, -1]])
@@ -249,7 +239,8 @@ def _leg(start: Array) -> Limb:
     _, height, ahead = rings.mean(axis=1).T
     bones = np.array(["UpperLeg", "LowerLeg", "Foot"])[np.searchsorted([-0.5, -0.08], -height)]
     bones[ahead > 0.13] = "Toes"
-    return Limb(rings, bones, np.abs(height - BAND_AT_LEG) < BAND)
+    # its band is over the ankle
+    return Limb(rings, bones, np.abs(height - 0.12) < BAND)
 
 
 def _arm(start: Array) -> Limb:
@@ -264,7 +255,8 @@ def _arm(start: Array) -> Limb:
     # each ring belongs to the bone at its distance from the shoulder
     reach = (rings.mean(axis=1) - SHOULDER) @ DOWN_ARM[0]
     bones = np.array(["UpperArm", "LowerArm", "Hand"])[np.searchsorted([0.28, 0.53], reach)]
-    return Limb(rings, bones, np.abs(reach - BAND_AT_ARM) < BAND)
+    # its band is at the wrist
+    return Limb(rings, bones, np.abs(reach - 0.535) < BAND)
 
 
 def _hanging(places: Array) -> Array:
@@ -276,7 +268,7 @@ def _hanging(places: Array) -> Array:
 def _finger(finger: Finger) -> Limb:
     """A chain of bones, each more curled than the one before."""
     share, wide = np.array(OUTLINES["phalanges"]).T[..., None]
-    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(OUTLINES["phalanges"])))[:, None]
+    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(share)))[:, None]
     aside = np.radians(finger.aside)
     way = np.cos(curl) * [np.cos(aside), 0.0, np.sin(aside)] - [0.0, 1.0, 0.0] * np.sin(curl)
     middles = finger.start + np.cumsum(np.diff(share, axis=0, prepend=0.0) * finger.length * way, axis=0)
@@ -288,7 +280,7 @@ def _finger(finger: Finger) -> Limb:
 
 def _rings_around(middles: Array, upward: Array, sideways: Array, radii: Array) -> Array:
     """Rings (R, 6, 3) around middles (R, 3) in planes that two axes (R, 3) and (3,) span, with radii (R, 1)."""
-    up, side = ring(FINGER_RING_CORNERS).T[..., None]
+    up, side = ring(6).T[..., None]
     rings: Array = middles[:, None] + radii[:, None] * (up * upward[:, None] + side * sideways)
     return rings
 
@@ -296,8 +288,8 @@ def _rings_around(middles: Array, upward: Array, sideways: Array, radii: Array) 
 def _with_arms_up(mesh: Mesh) -> Mesh:
     """The mesh in the T-pose, whose joints bring it back to where it was shaped when arms hang by SLOPE."""
     places = mesh.places
-    for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
-        arm = [HUMANOID.index(sided(side, bone)) for bone in ("UpperArm", "LowerArm", "Hand")]
+    for side, sign in SIDES:
+        arm = [joint_of(side, bone) for bone in ("UpperArm", "LowerArm", "Hand")]
         share = (mesh.weights * np.isin(mesh.joints, arm)).sum(axis=1)
         shoulder = SHOULDER * [sign, 1, 1]
         hangs = DOWN_ARM.T * np.outer([1, sign, 1], [1, sign, 1])

@@ -164,18 +164,17 @@ def _radius(beyond: float) -> float:
 
 @dataclass(frozen=True)
 class Figure:
-    """A motion as points and bones.
+    """A motion as the points of a body.
 
+    first: the joint of its skeleton that the body begins with.
     points: (T, P, 3) in body heights, y up, the ground at y = 0: the J joints, then jaw and crown if there is a head.
-    bones: which points they join.
     heading: where the figure faces in its first frame: radians about y, 0 is +z, a quarter turn is +x.
-    fps: frames per second.
     """
 
+    body: Body
+    first: int
     points: Array
-    bones: tuple[Bone, ...]
     heading: float
-    fps: float
 
 
 def figure_of(motion: Motion) -> Figure:
@@ -184,16 +183,15 @@ def figure_of(motion: Motion) -> Figure:
     if not len(motion):
         raise MotionError("this motion has no frames to show")
     first = first_of(motion)
-    skeleton = below(skeleton, first)
-    body = Body(skeleton)
+    body = Body(below(skeleton, first))
     points = positions(motion)[:, first:] / body.height
     if not np.abs(points).max() < 1e6:
         raise MotionError("joints are over 1e+06 body heights from the origin: too far to show")
     lowest = float(points[..., 1].min())
     # a figure that moves up and down stands on y = 0 if its lowest point is that near
-    stands = f"{skeleton.names[0]}.ty" in motion.channels and abs(lowest) < 0.1
+    stands = f"{skeleton.names[first]}.ty" in motion.channels and abs(lowest) < 0.1
     points[:, :, 1] -= 0.0 if stands else lowest
-    return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
+    return Figure(body, first, body.points(points), _heading(points[0], body.sides))
 
 
 def _heading(points: Array, sides: tuple[str, ...]) -> float:

@@ -22,7 +22,7 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.figures.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
-from motet.figures.root_motion import travel_on_root
+from motet.figures.root_motion import in_place, travel_on_root
 from motet.files import File, check_place, place_of
 from motet.formats.text import Clip, Contents, Figure, naming, split_clip
 from motet.motion.motion import Motion, motions_of, rest_motion
@@ -412,6 +412,13 @@ def _moving(moving: Any) -> Motion:
     """A motion, or that of what a model generated; ArgumentError for what has none."""
     (motion,) = motions_of([moving if isinstance(moving, Motion) else getattr(moving, "motion", moving)])
     return motion
+
+
+def shaped(motion: Motion, character: Character | None, fps: float | None, is_in_place: bool) -> Motion:
+    """A motion as it is to be written: on a character, at another frame rate, in place."""
+    motion = put_onto(motion, character) if character else motion
+    motion = motion.resample(fps) if fps else motion
+    return in_place(motion) if is_in_place else motion
 
 
 def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:

@@ -28,9 +28,6 @@ log = logging.getLogger(__name__)
 CHANNEL_NAMES = {f"{axis}position": f"t{axis}" for axis in "xyz"} | {f"{axis}rotation": f"r{axis}" for axis in "xyz"}
 """Channels in small letters -> their names in a motion."""
 
-MOST_EMPTY_FRAMES = 10**7
-"""Frames of a file without channels."""
-
 
 @text.names_file
 def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motion:
@@ -78,7 +75,7 @@ def _frames(lines: list[str], header: "_Header", width: int, partial: bool) -> A
     """The values (T, width) of all frames; FormatError where they are not those that the file declares."""
     if not width:
         # without channels nothing else confirms the number
-        if header.frames > MOST_EMPTY_FRAMES:
+        if header.frames > 10**7:
             reason = f"the file declares {header.frames} frames and has no channels"
             raise text.ContentError(reason, header.line)
         return np.zeros((header.frames, 0))

@@ -14,12 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
-from motet.files import File, place_of
-from motet.formats.gltf_data import REST_TRANSFORM, Gltf, Json, Tracks, broken, parse
+from motet.files import File, Json, place_of
+from motet.formats.gltf_data import REST_TRANSFORM, Gltf, Tracks, broken, parse
 from motet.formats.text import (
     Clip,
     ContentError,
@@ -35,7 +34,7 @@ from motet.formats.text import (
 from motet.formats.text import Figure as FigureChoice
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion, rest_motion
-from motet.motion.rotations import Array, inverse, product, rotated
+from motet.motion.rotations import Array, Indices, inverse, product, rotated
 from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 log = logging.getLogger(__name__)
@@ -47,9 +46,6 @@ has a thousand joints."""
 
 NodeSet = set[int]
 """Nodes of a file, by their numbers in it."""
-
-LATE_START = 0.5
-"""Seconds before the first key from which on a file's start is told; many programs count frames from 1."""
 
 
 def read(file: File, clip: Clip = None, rest: File | None = None, figure: FigureChoice = None) -> Motion:
@@ -460,7 +456,8 @@ def _frame_times(gltf: Gltf, name: str, times_of_tracks: list[Array]) -> tuple[A
     # from the first key of any track to the last
     start = min(times[0] for times in times_of_tracks)
     end = max(times[-1] for times in times_of_tracks)
-    if start > LATE_START:
+    # many programs count frames from 1: a start that is later than half a second is told
+    if start > 0.5:
         log.warning("%s: its animation %s starts at %.3g s: read from there", gltf.path, quoted(name), start)
     fps = _rate(times_of_tracks)
     count = (end - start) * fps + 1
@@ -550,7 +547,7 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
     return between
 
 
-def _keys_around(times: Array, frames: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _keys_around(times: Array, frames: Array) -> tuple[Indices, Indices]:
     """The keys (T,) at or before the times of frames (T,), and those after them; of a single key this one."""
     before = np.searchsorted(times, frames + 1e-6, side="right") - 1
     before = np.clip(before, 0, max(len(times) - 2, 0))

@@ -11,19 +11,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import FormatError, quoted
 from motet.figures.humanoid import BONES, REQUIRED, JointMap, check_map
-from motet.files import File, place_of, write_whole
+from motet.files import File, Json, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
 from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
-from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, Json, broken, parse, read_beside
+from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, broken, parse, read_beside
 from motet.formats.text import ContentError
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion, rest_motion
-from motet.motion.rotations import Array, product, quat_to_rotmat, rotated, rotmat_to_quat
+from motet.motion.rotations import Array, Indices, product, quat_to_rotmat, rotated, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
@@ -42,7 +41,7 @@ PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "im
 Primitive = tuple[int, dict[str, int], int | None]
 """The node of a primitive of a mesh, its attributes, and its skin if it has one."""
 
-Skinned = tuple[Array, NDArray[np.intp]]
+Skinned = tuple[Array, Indices]
 """Points (P, 3) in the world at rest, and the joint (P,) of each, -1 for none."""
 
 
@@ -222,7 +221,7 @@ def _placed_primitives(gltf: Gltf) -> Iterator[tuple[int, Json]]:
             yield node, primitive
 
 
-def _skinned(nodes: Nodes, skin: Json, points: Array, joints: NDArray[np.intp], weights: Array) -> Skinned:
+def _skinned(nodes: Nodes, skin: Json, points: Array, joints: Indices, weights: Array) -> Skinned:
     """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
     # each joint moves every point, weighted; then the sum of weights is divided out
     linear, places = _bound(nodes, skin)

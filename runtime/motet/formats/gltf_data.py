@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import MotionError, quoted
-from motet.files import File, place_of
+from motet.files import File, Json, place_of
 from motet.formats.text import ContentError, names_file, naming, read_bytes
 from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated, rotmat_to_quat
 
@@ -33,9 +33,6 @@ MAX_UNPACKED = 2**25
 MAX_NODES = 20_000
 """Nodes of a file: a figure has a few hundred."""
 
-
-Json = dict[str, Any]
-"""A JSON object."""
 
 Tracks = Mapping[tuple[int, str], Array]
 """(Node, "translation", "rotation" or "scale") -> values (T, 3 or 4)."""

@@ -74,7 +74,7 @@ def names_file(read: Callable[Concatenate[File, P], T]) -> Callable[Concatenate[
     """A function that reads a file, and names it in its errors."""
 
     @wraps(read)
-    def named(file: File, *arguments: P.args, **options: P.kwargs) -> T:
+    def named(file: File, /, *arguments: P.args, **options: P.kwargs) -> T:
         with naming(file):
             return read(file, *arguments, **options)
 

@@ -22,6 +22,9 @@ from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
 
 AXES = ("x", "y", "z")
 
+Transforms = tuple[Array, Array]
+"""Rotations (T, J, 3, 3) and positions (T, J, 3) of joints."""
+
 
 def channels_of(joint: str, letter: str) -> tuple[str, ...]:
     """The channels of a joint's translation ("t"), Euler angles ("r") or exponential map ("e"), along x, y and z."""
@@ -102,12 +105,12 @@ def local_translations(motion: Motion) -> Array:
     return translations
 
 
-def global_transforms(motion: Motion) -> tuple[Array, Array]:
+def global_transforms(motion: Motion) -> Transforms:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) of every joint in the world, lengths in the skeleton's unit."""
     return chained(skeleton_of(motion), local_rotations(motion), local_translations(motion))
 
 
-def chained(skeleton: Skeleton, rotations: Array, translations: Array) -> tuple[Array, Array]:
+def chained(skeleton: Skeleton, rotations: Array, translations: Array) -> Transforms:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) in the world, from those in each parent's frame, in place."""
     # level by level, so that all joints of one depth are computed at once, after their parents
     for level in skeleton.levels:

@@ -10,10 +10,10 @@ from operator import index
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError, UnitError
-from motet.motion.rotations import Array, euler_to_rotmat
+from motet.files import Json
+from motet.motion.rotations import Array, Indices, euler_to_rotmat
 
 END_SUFFIX = "_end"
 
@@ -103,7 +103,7 @@ class Skeleton:
         return tuple(map(tuple, children))
 
     @cached_property
-    def levels(self) -> tuple[NDArray[np.intp], ...]:
+    def levels(self) -> tuple[Indices, ...]:
         """Indices of the joints by their number of ancestors, without the root."""
         depth = np.zeros(len(self.joints), dtype=np.intp)
         for i, joint in enumerate(self.joints[1:], start=1):
@@ -111,7 +111,7 @@ class Skeleton:
         return tuple(np.flatnonzero(depth == level) for level in range(1, depth.max() + 1))
 
     @cached_property
-    def parents(self) -> NDArray[np.intp]:
+    def parents(self) -> Indices:
         """For each joint the index of its parent, -1 for the root."""
         return np.array([joint.parent for joint in self.joints], dtype=np.intp)
 
@@ -133,10 +133,6 @@ class Skeleton:
         if name not in self.places:
             raise MotionError(f"the skeleton has no joint {name!r}; it has {', '.join(self.names)}")
         return self.places[name]
-
-    def subtree(self, name: str) -> tuple[int, ...]:
-        """Indices of a joint and all its descendants."""
-        return tuple(self.below(self.index(name)))
 
     def below(self, joint: int) -> list[int]:
         """Indices of a joint and all that hangs on it, in order."""
@@ -170,41 +166,31 @@ class Skeleton:
             raise UnitError("the length unit of this skeleton is unknown: set it, as in motion.with_unit(0.01)")
         return self.metres_per_unit / metres_per_unit
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """A JSON object that :meth:`from_json` reads back without loss."""
-        joints = []
-        for joint in self.joints:
-            joints.append(
-                {
-                    "name": joint.name,
-                    "parent": joint.parent,
-                    "offset": list(joint.offset),
-                    "order": joint.order,
-                    "axis": list(joint.axis),
-                }
-            )
+        joints = self.outline()
+        for row, joint in zip(joints, self.joints, strict=True):
+            row |= {"order": joint.order, "axis": list(joint.axis)}
         return {"metres_per_unit": self.metres_per_unit, "joints": joints}
+
+    def outline(self) -> list[Json]:
+        """Of each joint its name, its parent's index, -1 for none, and its offset, for JSON."""
+        return [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in self.joints]
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> "Skeleton":
         """The inverse of :meth:`to_json`; MotionError if it is not a skeleton."""
         try:
-            joints = tuple(map(_read_joint, data["joints"]))
+            joints = []
+            for row in data["joints"]:
+                offset = _triple(row["offset"])
+                joints.append(
+                    Joint(str(row["name"]), index(row["parent"]), offset, str(row["order"]), _triple(row["axis"]))
+                )
             metres = data["metres_per_unit"]
-            return Skeleton(joints, None if metres is None else float(metres))
+            return Skeleton(tuple(joints), None if metres is None else float(metres))
         except (KeyError, TypeError, ValueError) as error:
             raise MotionError(f"not a skeleton: {error}") from error
-
-
-def _read_joint(data: Mapping[str, Any]) -> Joint:
-    """A joint as :meth:`Skeleton.to_json` writes it."""
-    return Joint(
-        str(data["name"]),
-        index(data["parent"]),
-        _triple(data["offset"]),
-        str(data["order"]),
-        _triple(data["axis"]),
-    )
 
 
 def _triple(values: Iterable[float]) -> tuple[float, float, float]:

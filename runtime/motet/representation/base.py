@@ -13,7 +13,7 @@ from motet.errors import MotionError
 from motet.motion.kinematics import channels_of, skeleton_of
 from motet.motion.mirroring import lateral_axis
 from motet.motion.motion import Motion, is_whole
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices
 from motet.motion.skeleton import Skeleton, partners_of
 
 
@@ -50,7 +50,7 @@ class Representation(ABC):
 class FrameMirror:
     """Column d of a mirrored frame is column ``columns[d]`` of the frame times ``signs[d]``; both (D,)."""
 
-    columns: NDArray[np.intp]
+    columns: Indices
     signs: NDArray[np.float32]
 
     def __call__(self, frames: NDArray[Any]) -> NDArray[Any]:

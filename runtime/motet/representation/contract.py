@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import BundleError, MotionError
 from motet.figures.humanoid import Figure, to_humanoid
+from motet.files import Json
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
@@ -170,7 +170,7 @@ class MotionContract:
         """The inverse: frames (..., D), dead channels at their mean."""
         return np.asarray(z, dtype=np.float64) * self.std + self.mean
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """A JSON object; :func:`motet.bundle.manifest.read_contract` is the inverse."""
         return {
             "representation": self.representation,

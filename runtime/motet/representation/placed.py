@@ -160,7 +160,7 @@ def mirror() -> FrameMirror:
     for bone, partner in enumerate(partners_of(BONES)):
         bone_columns = kinds + len(SIXD_KINDS) * bone
         columns[bone_columns] = kinds + len(SIXD_KINDS) * partner
-        signs[bone_columns] = SIXD_SIGNS
+        signs[bone_columns] = list(SIXD_SIGNS.values())
     return FrameMirror(columns, signs)
 
 

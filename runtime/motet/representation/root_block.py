@@ -285,7 +285,10 @@ class RootAngles(Representation):
         return FrameMirror(columns, signs)
 
 
-VECTOR_KINDS = ("ex", "ey", "ez")
+VECTOR_SIGNS = {"ex": 1, "ey": -1, "ez": -1}
+"""Kinds of channels of exponential maps, and what a mirror image in the plane x = 0 makes of them."""
+
+VECTOR_KINDS = tuple(VECTOR_SIGNS)
 
 
 class RootVectors(Representation):
@@ -324,7 +327,7 @@ class RootVectors(Representation):
 
     def mirror(self, features: Motion) -> FrameMirror:
         """As :func:`motet.motion.mirroring.mirror` does it, for exponential maps in the parent joint's axes."""
-        return mirror_by_joints(features, dict(zip(VECTOR_KINDS, (1, -1, -1), strict=True)))
+        return mirror_by_joints(features, VECTOR_SIGNS)
 
 
 def joints_of(channels: Sequence[str]) -> tuple[str, ...]:

@@ -33,11 +33,10 @@ ROOT_SIXD = ("root.forward", "root.left", "root.turn", "root.height")
 ROOT_SIXD_UNITS = ("m/s", "m/s", "rad/s", "m")
 """As in :mod:`motet.representation.root_block`, but for the facing and for radians."""
 
-SIXD_KINDS = ("xx", "xy", "xz", "yx", "yy", "yz")
-"""Where the x axis and where the y axis points."""
+SIXD_SIGNS = {"xx": 1.0, "xy": -1.0, "xz": -1.0, "yx": -1.0, "yy": 1.0, "yz": 1.0}
+"""Where the x axis and where the y axis points, and what a mirror image in the plane x = 0 makes of that."""
 
-SIXD_SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
-"""What a mirror image in the plane x = 0 makes of them."""
+SIXD_KINDS = tuple(SIXD_SIGNS)
 
 
 FACING_SPREAD = 4 / 30
@@ -67,7 +66,7 @@ class RootSixd(Representation):
 
     def mirror(self, features: Motion) -> FrameMirror:
         """The axes of each joint's partner, mirrored."""
-        return mirror_by_joints(features, dict(zip(SIXD_KINDS, SIXD_SIGNS, strict=True)))
+        return mirror_by_joints(features, SIXD_SIGNS)
 
 
 def to_root_sixd(motion: Motion) -> Motion:
@@ -114,15 +113,11 @@ def _way(features: Motion, after: Motion | None, pose: Array | None) -> tuple[Ar
         steps[:1] = 0
         pose = np.zeros(3)
     elif pose is None:
-        pose = _last_pose(after)
+        # where the root is over the ground and how it faces in the last frame
+        place = last_place(after)
+        pose = np.array([place[0], place[2], facing(after)[-1]])
     facings, x, z = way(steps, (pose[0], 0.0, pose[1]), pose[2])
     return facings, np.column_stack([x, features.select(ROOT_SIXD[3:]).values, z])
-
-
-def _last_pose(motion: Motion) -> Array:
-    """Where the root is over the ground and how it faces (x, z, facing) in a motion's last frame."""
-    place = last_place(motion)
-    return np.array([place[0], place[2], facing(motion)[-1]])
 
 
 def facing(motion: Motion) -> Array:

@@ -13,13 +13,13 @@ from motet.draw.page import Captions
 from motet.errors import TextWarning, TravelWarning, collected
 from motet.figures.feet.treadmill import is_in_place
 from motet.figures.humanoid import rig
+from motet.files import Json
 from motet.formats import ONTO, Character
 from motet.generate.base import PLAYED, Generated
 from motet.generate.model import CodesModel, Story
 from motet.models.describe import DescribeModel, Description
 from motet.motion.looping import looped
 from motet.motion.motion import Motion, rest_motion
-from motet.motion.skeleton import METRES
 from motet.predict.model import PredictModel
 from motet.serve.batches import Batcher
 from motet.serve.content import MEDIA, Order, as_json, content_of, figure_of, frames_of
@@ -43,7 +43,7 @@ class Answer:
 
     content: bytes
     media: str
-    understood: list[dict[str, Any]] | None = None
+    understood: list[Json] | None = None
 
 
 class Answers:
@@ -73,7 +73,7 @@ class Answers:
         for pool in (self._models, self._threads):
             pool.shutdown(cancel_futures=True)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> Json:
         """What a look at the server's health shows: the models, and how many requests wait for them."""
         models = (self._writer, self._describer, self._predictor)
         waiting = len(self._generated) + len(self._described) + len(self._predicted)
@@ -157,7 +157,7 @@ class Answers:
         """What a text asks for one after another."""
         return [text] if data.settings.get("whole") else self._writer.parts(text)
 
-    def _read_as(self, text: str, shown: Shown | Generated | Passage | None = None) -> dict[str, Any]:
+    def _read_as(self, text: str, shown: Shown | Generated | Passage | None = None) -> Json:
         """How a sentence was understood: as what it is shown, or will likely be."""
         shown = shown or self._writer.likeliest(text)
         known = asdict(self._writer.understood(text))
@@ -218,10 +218,7 @@ class Answers:
             raise RequestError(
                 "there is no file: send its bytes as the body, and its type as format, or a form's 'file'"
             )
-        unit = data.settings.get("unit_in")
-        if unit is not None and unit not in METRES:
-            raise RequestError(f"unit_in: expected one of {', '.join(METRES)}, not {unit!r}")
-        options = {**data.some("clip", "figure", "partial"), **({"unit": unit} if unit else {})}
+        options = {**data.some("clip", "figure", "partial"), "unit": data.settings.get("unit_in")}
         return await self._readers.motion(data.files["file"], self._bounds, options)
 
     # ---- predict
@@ -261,7 +258,7 @@ def rig_of(data: RequestData, form: str, limits: Limits) -> Character | None:
 
 
 def order_of(
-    data: RequestData, form: str, title: str, captions: Captions | None = None, details: dict[str, Any] | None = None
+    data: RequestData, form: str, title: str, captions: Captions | None = None, details: Json | None = None
 ) -> Order:
     """What a request orders."""
     settings = data.settings
@@ -269,7 +266,7 @@ def order_of(
     return Order(form, title, **options, captions=captions, details=details or {})
 
 
-def _json_answer(rows: list[dict[str, Any]]) -> Answer:
+def _json_answer(rows: list[Json]) -> Answer:
     return Answer(as_json(rows), MEDIA["json"])
 
 

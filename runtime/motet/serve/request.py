@@ -12,6 +12,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from motet.errors import quoted
+from motet.files import Json
+from motet.live.protocol import from_json as json_value
 from motet.serve.limits import Limits
 from motet.serve.uploads import RequestError, Upload
 from motet.settings import is_number
@@ -105,7 +107,7 @@ async def read_request(
     return RequestData(settings, uploads)
 
 
-def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> dict[str, Any]:
+def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> Json:
     """Settings from names and texts, without those that are left empty; RequestError like :func:`from_json`."""
     texts_of: dict[str, list[str]] = {}
     for name, text in pairs:
@@ -114,17 +116,13 @@ def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parame
     return {name: _known(name, parameters).from_text(name, texts) for name, texts in texts_of.items()}
 
 
-def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) -> dict[str, Any]:
+def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) -> Json:
     """Settings from a JSON object, without those that are null; RequestError for an unknown or mistyped one."""
-
-    def refuse(constant: str) -> None:
-        raise ValueError(f"{constant} is no number")
-
     if len(body) > limits.text_bytes:
         raise HTTPException(413, f"the JSON is too large: expected at most {limits.text_bytes} bytes")
     try:
-        document = json.loads(body, parse_constant=refuse)
-    except (ValueError, RecursionError) as fault:
+        document = json_value(body)
+    except ValueError as fault:
         raise RequestError(f"the body must be JSON: {fault}") from fault
     if not isinstance(document, dict):
         raise RequestError(f"the body must be a JSON object, not {quoted(json.dumps(document))}")

@@ -45,7 +45,7 @@ from motet.motion.kinematics import (
     with_channels,
 )
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, Indices, Mask, inverse, product, quat_to_rotmat, rotated
+from motet.motion.rotations import Array, Indices, Mask, identities, inverse, product, quat_to_rotmat, rotated
 from motet.motion.scalar_or_batch import Quaternion, Vector, parts
 
 
@@ -166,7 +166,7 @@ def _measured(motion: Motion, rotations: Array, places: Array, ground: float | N
         soles = sole_points(rotations, places)
         soles[..., 1] -= ground_under(soles) if ground is None else ground
         return (
-            _legs(HUMANOID.places, np.tile(np.eye(3), (places.shape[1], 1, 1))),
+            _legs(HUMANOID.places, identities(places.shape[1])),
             1.0,
             soles,
         )

@@ -16,11 +16,12 @@ from itertools import permutations
 
 import numpy as np
 
-from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, limb_of, sided
+from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, SIDES, limb_of, sided
 from motet.figures.humanoid.joint_map import LIMB_BONES, Body, humanoid_direction
 from motet.motion.rotations import (
     Array,
     frames_last,
+    identities,
     product,
     rotvec_to_rotmat,
     swing,
@@ -136,7 +137,7 @@ def alignments_of_pose(body: Body, rotations: Array, pose: Array, axes: Array) -
     wanted[joint_map.carrier(body.skeleton)] = turns["hips"]
     wanted |= dict.fromkeys(joint_map.spine, turns.get("spine", axes))
     wanted |= dict.fromkeys(joint_map.neck, turns.get("neck", axes))
-    aligned = np.tile(np.eye(3), (len(pose), 1, 1))
+    aligned = identities(len(pose))
     for joint, turn in wanted.items():
         aligned[joint] = rotations[joint].T @ turn
     return aligned
@@ -229,10 +230,10 @@ class Calibration:
         self.rotations = rotations
         self.positions = positions
         self.along_axes = along_axes
-        self.aligned = np.tile(np.eye(3), (rotations.shape[1], 1, 1))
+        self.aligned = identities(rotations.shape[1])
         # each stage builds on the joints settled before: trunk, then legs from the hips, and arms from the chest
         self._trunk()
-        for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
+        for side, sign in SIDES:
             self._leg(limb_of(side, LEG))
             self._arm(limb_of(side, ARM), sign)
 

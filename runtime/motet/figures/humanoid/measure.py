@@ -39,7 +39,7 @@ from motet.figures.humanoid.joint_map import (
 from motet.figures.humanoid.joint_tree import map_of
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import UP, Array, rotated, swing, unit
+from motet.motion.rotations import UP, Array, identities, rotated, swing, unit
 from motet.motion.skeleton import Skeleton
 
 LENGTH_UNITS = {
@@ -160,7 +160,7 @@ def _fit_at_rest(body: Body, leg: float, frame: Array) -> Fitted:
             notes = ("the rest pose is one that the convention knows, which was made up for",)
         else:
             body = Body(body.skeleton, replace(joint_map, rest=None))
-    aligned = alignments_of_pose(body, np.tile(np.eye(3), (len(rest), 1, 1)), rest, frame)
+    aligned = alignments_of_pose(body, identities(len(rest)), rest, frame)
     up = frame[:, 1]
     return Fitted(body, aligned, leg, _heights(body, leg, rest @ up), up, 1.0, notes)
 
