@@ -9,7 +9,7 @@ import click
 from motet.bundle.graph import SessionOptions
 from motet.cli.generate import captions_of, confidence_of
 from motet.cli.options import bundle_option, json_option, noted, seed_option, session_options
-from motet.cli.writing import Output, out_option, size, write_options
+from motet.cli.writing import Output, out_option, say_written, write_options
 from motet.composition.compose import compose as composition_of
 from motet.composition.plans import parse_plan, read_plan
 from motet.generate.model import CodesModel
@@ -55,7 +55,7 @@ def compose(
     if as_json:
         click.echo(json.dumps({**facts, "passages": passages, "met": met}))
         return
-    click.echo(f"{out}: {size(len(motion), motion.fps)}")
+    say_written(out, motion)
     for passage in composed.passages:
         action = f"{passage.action}{confidence_of(vars(passage))}"
         click.echo(f"  {passage.start:.1f}-{passage.stop:.1f} s {passage.text} (as: {action})")

@@ -9,7 +9,7 @@ import click
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import seed_option, session_options
 from motet.cli.reading import Read, read_options
-from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.cli.writing import Output, out_option, places, say_written, write_options
 from motet.keyed import KeyedAct, ours
 from motet.keyed import read as read_acts
 from motet.models.load import load_as
@@ -47,7 +47,7 @@ def key(
     base = _standing(chosen, seed, session) if over is None else read(over)
     for (name, act), place in zip(chosen.items(), outs, strict=True):
         motion = output.write(place, act.motion(base, seed), name)
-        click.echo(f"{place}: {size(len(motion), motion.fps)}: {name}")
+        say_written(place, motion, f": {name}")
     output.finish()
 
 

@@ -84,7 +84,7 @@ class Many:
         self, part: Part, verb: Verb, paths: Sequence[Path], label: str, rest: Sequence[Source]
     ) -> Iterator[Answer]:
         """The answers for a part; OutputError in the end where the corpus is no longer that with which it began."""
-        yield from self.answers(Hashed.of(verb), rest, label)
+        yield from self.answers(Hashed(verb.reading, verb), rest, label)
         if digest(files_of(paths)) != part.about["corpus"]:
             reason = "the files that it is of changed while it was written: remove it, and run the same command again"
             raise OutputError(f"cannot complete {part.path}: {reason} on files that stay")

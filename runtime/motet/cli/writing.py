@@ -127,6 +127,11 @@ def _spare(place: Path, sources: Collection[Path]) -> None:
         raise click.UsageError(f"{place} is an input and would be overwritten: name another file for the result")
 
 
+def say_written(place: Path, motion: Motion, note: str = "") -> None:
+    """Print where a motion was written, how long it is, and a note."""
+    click.echo(f"{place}: {size(len(motion), motion.fps)}{note}")
+
+
 def size(frames: int, fps: float) -> str:
     """How long a motion is, in words."""
     return f"{frames} frames at {fps:g} fps, {round(frames / fps, 2):g} s"

@@ -115,11 +115,6 @@ class Hashed(Verb):
 
     verb: Verb
 
-    @staticmethod
-    def of(verb: Verb) -> "Hashed":
-        """That of a verb."""
-        return Hashed(verb.reading, verb)
-
     @property
     def most(self) -> int:
         """That of the verb."""

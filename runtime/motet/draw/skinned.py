@@ -115,13 +115,7 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     the humanoid's joints, of which those of arms are x and of legs and trunk y."""
     body = figure.fitted.body
     places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
-    # limbs, along their bones
-    scales = np.ones((len(HUMANOID.joints), 3))
-    for bone, end, axis in BONE_ENDS:
-        for side in LEFT_RIGHT:
-            if sided(side, end) in body.joints:
-                ratio = _length_ratio(places, body.joints, sided(side, bone), sided(side, end))
-                scales[joint_of(side, bone), axis] = ratio
+    scales = _proportions_of_limbs(places, body.joints)
     # the trunk, upwards
     trunk = body.middle(places, "UpperArm") - body.middle(places, "UpperLeg")
     scales[_indices("spine", "chest", "upperChest"), 1] = _ratio(trunk, np.array([0.48]))
@@ -132,15 +126,20 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     return scales
 
 
+def _proportions_of_limbs(places: Array, joints: Mapping[str, int]) -> Array:
+    """As :func:`_proportions`, of limbs along their bones alone, from places (T, J, 3) of a figure's joints."""
+    scales = np.ones((len(HUMANOID.joints), 3))
+    for bone, end, axis in BONE_ENDS:
+        for side in LEFT_RIGHT:
+            if sided(side, end) in joints:
+                vectors = places[:, joints[sided(side, bone)]] - places[:, joints[sided(side, end)]]
+                usual = HUMANOID.rest_positions[joint_of(side, bone)] - HUMANOID.rest_positions[joint_of(side, end)]
+                scales[joint_of(side, bone), axis] = _ratio(vectors, usual)
+    return scales
+
+
 def _indices(*bones: str) -> list[int]:
     return list(map(HUMANOID.index, bones))
-
-
-def _length_ratio(places: Array, joints: Mapping[str, int], start: str, end: str) -> float:
-    """How much longer a bone of a figure is than the humanoid's, from places of its joints (T, J, 3)."""
-    usual = HUMANOID.rest_positions
-    vectors = places[:, joints[start]] - places[:, joints[end]]
-    return _ratio(vectors, usual[HUMANOID.index(start)] - usual[HUMANOID.index(end)])
 
 
 def _ratio(vectors: Array, usual: Array) -> float:

@@ -11,7 +11,7 @@ table of docs/reference/formats.md and the lists of corpora are built from.
 import logging
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -346,7 +346,8 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     A character from a glTF file stands on the ground, and z becomes its facing direction at rest. MotionError, with the
     reason, if the motion's figure or the character is not human.
     """
-    if motion.skeleton and _same_figure(motion.skeleton, character.rest.skeleton):
+    skeleton = character.rest.skeleton
+    if motion.skeleton and skeleton and motion.skeleton.is_like(skeleton, 1e-6):
         return motion
     # over the humanoid, which every human figure is brought to
     humanoid_motion = on_humanoid(motion)
@@ -359,16 +360,6 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     except MotionError as error:
         raise MotionError(f"the character cannot take a motion: {error}") from error
     return travel_on_root(put, joint_map)
-
-
-def _same_figure(skeleton: Skeleton, other: Skeleton | None) -> bool:
-    if other is None or skeleton.metres_per_unit != other.metres_per_unit:
-        return False
-    at_origin = [replace(joint, offset=(0.0, 0.0, 0.0)) for joint in skeleton.joints]
-    others_at_origin = [replace(joint, offset=(0.0, 0.0, 0.0)) for joint in other.joints]
-    if at_origin != others_at_origin:
-        return False
-    return bool(np.abs(skeleton.offsets - other.offsets).max() <= 1e-6 * other.height)
 
 
 def write_motion(

@@ -30,8 +30,8 @@ from motet.motion.motion import Motion
 
 log = logging.getLogger(__name__)
 
-Takes = list[tuple[str, set[int]]]
-"""The names of takes, and the nodes that each moves."""
+Takes = dict[str, set[int]]
+"""The takes by name, and the nodes that each moves."""
 
 FBX_PROGRAM = Path(__file__).with_name("fbx_to_gltf.py")
 
@@ -68,7 +68,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
 def _choice(content: BytesIO, takes: Takes, clip: Clip, figure: Figure) -> tuple[int | None, Figure]:
     """The index of a take, None for none, and a figure. The file is read for its figures only if that needs them."""
     path = place_of(content)
-    names = tuple(name for name, _ in takes)
+    names = tuple(takes)
     is_number = isinstance(clip, int) or (clip is not None and clip.isdecimal())
     if figure is None and (clip is None or is_number or is_name_of(clip, names)):
         return (chosen(path, names, clip) if names or clip is not None else None), None
@@ -82,15 +82,14 @@ def _choice(content: BytesIO, takes: Takes, clip: Clip, figure: Figure) -> tuple
 def contents(file: File) -> Contents:
     """The takes that move a bone, and the figures as the first take shows them; FormatError like :func:`read`."""
     document = as_gltf(file, 0)
-    takes = _takes(document)
-    return gltf.contents_of_takes(document, [name for name, _ in takes], [moved for _, moved in takes])
+    return gltf.contents_of_takes(document, _takes(document))
 
 
 def _takes(document: BytesIO) -> Takes:
-    """The names of the takes, and the nodes that each moves."""
+    """The takes of a document."""
     takes = json.loads(document.getvalue())["extras"]["takes"]
     names = part_names(take["name"] for take in takes)
-    return [(name, set(take["moved"])) for name, take in zip(names, takes, strict=True)]
+    return {name: set(take["moved"]) for name, take in zip(names, takes, strict=True)}
 
 
 @names_file

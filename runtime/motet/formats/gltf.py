@@ -64,7 +64,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
         scene = _scene(file)
         gltf = scene.gltf
         stance = {} if rest is None else _stance(rest)
-        parts = _contents(scene, scene.names, map(moved, scene.animations))
+        parts = _contents(scene)
         take = _take(scene, *choice(gltf.path, parts, clip, figure))
         if stance and not stance.keys() & set(take.figure.names):
             raise ContentError("the file of the rest pose shares no joint name with this figure")
@@ -88,23 +88,23 @@ def _joint_names(gltf: Gltf, figure: "Figure") -> list[str]:
 def contents(file: File) -> Contents:
     """The animations that move a figure, and the figures; FormatError like :func:`read`."""
     with broken(place_of(file)):
-        scene = _scene(file)
-        return _contents(scene, scene.names, map(moved, scene.animations))
+        return _contents(_scene(file))
 
 
-def contents_of_takes(file: File, names: Sequence[str], takes: Sequence[NodeSet]) -> Contents:
+def contents_of_takes(file: File, takes: Mapping[str, NodeSet]) -> Contents:
     """The figures of a file, with clips that are not in it, by their names and the nodes that each moves."""
     with broken(place_of(file)):
-        return _contents(_scene(file), names, takes)
+        return _contents(_scene(file), takes)
 
 
-def _contents(scene: "_Scene", names: Sequence[str], takes: Iterable[NodeSet]) -> Contents:
-    moved_by = dict(zip(names, takes, strict=True))
+def _contents(scene: "_Scene", takes: Mapping[str, NodeSet] | None = None) -> Contents:
+    if takes is None:
+        takes = dict(zip(scene.names, map(moved, scene.animations), strict=True))
     figures = {}
     for title, joints in scene.figures.items():
         near = above(scene.gltf, joints)
-        figures[title] = tuple(name for name in names if moved_by[name] & near)
-    return Contents(tuple(names), figures)
+        figures[title] = tuple(name for name, nodes in takes.items() if nodes & near)
+    return Contents(tuple(takes), figures)
 
 
 @dataclass(frozen=True)

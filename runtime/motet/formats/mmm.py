@@ -54,7 +54,11 @@ def _joints_and_rows(file: File) -> tuple[list[str], Array]:
     joints: list[str] = []
     values = array("d")  # frame after frame
     count = 0
-    for element in _ended(file):
+    for event, element in _events(file):
+        if event != "end":
+            continue
+        if element.tag == "Motion":  # the first one is read
+            break
         if element.tag == "JointOrder":
             if joints or count:
                 raise ContentError("a motion must have one JointOrder, before its frames")
@@ -82,15 +86,6 @@ def motion_name(file: File) -> str:
     """The name of the first motion, in KIT's files the performer's; empty if it has none."""
     begun = (element for event, element in _events(file) if event == "start")
     return next((element.get("name", "") for element in begun if element.tag == "Motion"), "")
-
-
-def _ended(file: File) -> Iterator[ElementTree.Element]:
-    """The elements that end, up to the first motion, in order."""
-    for event, element in _events(file):
-        if event == "end":
-            yield element
-            if element.tag == "Motion":
-                return
 
 
 def _events(file: File) -> Iterator[tuple[str, ElementTree.Element]]:

@@ -163,15 +163,19 @@ def parsed(text: str | bytes) -> tuple[str, Json]:
         raise ProtocolError(f'a message must be an object whose "type" is one of {", ".join(KEYS)}')
     # whose values are known and fit
     arguments = {name: value for name, value in document.items() if value is not None}
+    _check_arguments(kind, arguments)
+    return kind, arguments
+
+
+def _check_arguments(kind: str, arguments: Json) -> None:
+    """ProtocolError for what a type of message does not have, or does not take, and where it lacks what it needs."""
     for name, value in arguments.items():
         if name not in KEYS[kind]:
             raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
         if wanted := _unfit(kind, name, value):
             raise ProtocolError(f"{kind}, {name}: expected {wanted}")
-    # and that says what its type needs
     if kind in REQUIRED_FIELDS and REQUIRED_FIELDS[kind] not in arguments:
         raise ProtocolError(f"{kind}: expected {REQUIRED_FIELDS[kind]}")
-    return kind, arguments
 
 
 def _unfit(kind: str, name: str, value: Any) -> str | None:

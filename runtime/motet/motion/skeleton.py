@@ -160,6 +160,14 @@ class Skeleton:
             joints.append(replace(joint, offset=tuple(offset)))
         return replace(self, joints=tuple(joints))
 
+    def is_like(self, other: "Skeleton", tolerance: float, first: int = 0) -> bool:
+        """Whether another skeleton has the same joints and unit, and from the ``first`` joint on offsets that differ by
+        no more than a share of its height."""
+        if len(self.joints) != len(other.joints) or self.with_offsets(other.offsets) != other:
+            return False
+        differences = np.abs(self.offsets - other.offsets)[first:]
+        return bool(differences.max(initial=0.0) <= tolerance * other.height)
+
     def unit_factor(self, metres_per_unit: float) -> float:
         """The factor from this skeleton's unit to the other unit."""
         if self.metres_per_unit is None:

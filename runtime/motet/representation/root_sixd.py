@@ -149,10 +149,16 @@ def sixd_to_rotmat(sixd: Array) -> Array:
     # x as it is, and what of y is square to it
     x = sixd[..., :3]
     y = sixd[..., 3:]
-    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
-    y = y - (x * y).sum(axis=-1, keepdims=True) * x
-    y = y / np.maximum(np.linalg.norm(y, axis=-1, keepdims=True), 1e-9)
+    x = _of_length_1(x)
+    y = _of_length_1(y - (x * y).sum(axis=-1, keepdims=True) * x)
     return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def _of_length_1(vectors: Array) -> Array:
+    """Vectors (..., 3) of length 1, but for those that are next to nothing."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    scaled: Array = vectors / np.maximum(lengths, 1e-9)
+    return scaled
 
 
 def rotmat_to_sixd(matrices: Array) -> Array:

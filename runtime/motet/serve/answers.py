@@ -189,11 +189,16 @@ class Answers:
         """What ``motet describe --json`` says of a file."""
         motion = await self._uploaded_motion(data)
         about = {"input": data.files["file"].name, "in_place": await _in(self._threads, is_in_place, motion)}
-        if data.settings.get("timeline"):
-            if data.some("beams", "draws"):
-                raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
-            parts = await _in(self._models, self._describer.timeline, motion)
-            return _json_answer([{**about, **part.to_json()} for part in parts])
+        if not data.settings.get("timeline"):
+            rows = await self._windows_described(motion, data)
+        elif data.some("beams", "draws"):
+            raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
+        else:
+            rows = [part.to_json() for part in await _in(self._models, self._describer.timeline, motion)]
+        return Answer(as_json([{**about, **row} for row in rows]), MEDIA["json"])
+
+    async def _windows_described(self, motion: Motion, data: RequestData) -> list[Json]:
+        """The start, stop and sentences of each window of a motion."""
         windows = await _in(self._threads, self._describer.windows, motion)
         settings = data.some("beams", "draws", "seed")
         if settings.get("draws") == 0:  # none drawn: beam search
@@ -202,8 +207,8 @@ class Answers:
         rows = []
         for (start, part), row in zip(windows, descriptions, strict=True):
             hypotheses = [hypothesis.to_json() for hypothesis in row]
-            rows.append({**about, "start": start, "stop": start + part.duration, "hypotheses": hypotheses})
-        return _json_answer(rows)
+            rows.append({"start": start, "stop": start + part.duration, "hypotheses": hypotheses})
+        return rows
 
     def _describe(self, key: Key, files: list[list[Motion]]) -> list[list[list[Description]]]:
         all_windows = []
@@ -264,10 +269,6 @@ def order_of(
     settings = data.settings
     options = {"fps": settings.get("fps"), "in_place": settings.get("in_place", False), "onto": "onto" in data.files}
     return Order(form, title, **options, captions=captions, details=details or {})
-
-
-def _json_answer(rows: list[Json]) -> Answer:
-    return Answer(as_json(rows), MEDIA["json"])
 
 
 async def _in(pool: ThreadPoolExecutor, call: Callable[..., T], *arguments: Any) -> T:

@@ -90,13 +90,11 @@ async def read_request(
     The body is a JSON object, a form, or the bytes of the file called "file", whose type is in "format".
     """
     settings = from_texts(request.query_params.multi_items(), parameters)
-    uploads = {}
+    uploads: dict[str, Upload] = {}
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "multipart/form-data" or (kind == "application/x-www-form-urlencoded" and "file" not in files):
-        async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:
-            parts = form.multi_items()
-            uploads = {name: await _upload(name, part, files) for name, part in parts if isinstance(part, UploadFile)}
-            settings |= from_texts([(name, part) for name, part in parts if isinstance(part, str)], parameters)
+        texts, uploads = await _form(request, files, limits)
+        settings |= from_texts(texts, parameters)
     elif body := await request.body():
         if kind == "application/json" or "file" not in files:
             settings |= from_json(body, parameters, limits)
@@ -105,6 +103,21 @@ async def read_request(
     if "file" in uploads and "format" in settings:
         uploads["file"].name = f"{PurePath(uploads['file'].name).stem}.{settings.pop('format')}"
     return RequestData(settings, uploads)
+
+
+async def _form(
+    request: Request, files: Sequence[str], limits: Limits
+) -> tuple[list[tuple[str, str]], dict[str, Upload]]:
+    """The texts of a form, by name, and its files."""
+    texts = []
+    uploads: dict[str, Upload] = {}
+    async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:
+        for name, part in form.multi_items():
+            if isinstance(part, str):
+                texts.append((name, part))
+            else:
+                uploads[name] = await _upload(name, part, files)
+    return texts, uploads
 
 
 def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> Json:

@@ -278,14 +278,14 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     the fault: an unknown bone or joint, a joint named twice, a required bone that is missing.
     """
     path = Path(path)
-    places = _joints_of_entries(path, skeleton)
-    spine = places.pop("spine", ())
-    neck = places.pop("neck", ())
-    longer = [bone for bone, joints in places.items() if len(joints) != 1]
-    if longer:
-        raise FormatError(path, f"{longer[0]}: expected one joint; only spine and neck take a list")
-    joints = {bone: joint for bone, (joint,) in places.items()}
     try:
+        places = _joints_of_entries(path, skeleton)
+        spine = places.pop("spine", ())
+        neck = places.pop("neck", ())
+        longer = [bone for bone, joints in places.items() if len(joints) != 1]
+        if longer:
+            raise MotionError(f"{longer[0]}: expected one joint; only spine and neck take a list")
+        joints = {bone: joint for bone, (joint,) in places.items()}
         return check_map(skeleton, JointMap(joints, spine, neck, path.name, 1.0))
     except MotionError as error:
         raise FormatError(path, str(error)) from error
@@ -298,18 +298,15 @@ def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, .
     places = {}
     for bone, names in _entries(path).items():
         if bone not in known:
-            raise FormatError(
-                path,
-                f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}",
-            )
+            raise MotionError(f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
         try:
             places[bone] = tuple(skeleton.index(name) for name in names)
         except MotionError as error:
-            raise FormatError(path, f"{bone}: {error}") from error
+            raise MotionError(f"{bone}: {error}") from error
     # each joint is one bone's
     twice = repeated(skeleton.names[joint] for joint in chain.from_iterable(places.values()))
     if twice:
-        raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
+        raise MotionError(f"a joint can be only one bone; named twice: {', '.join(twice)}")
     return places
 
 
@@ -318,15 +315,15 @@ def _entries(path: Path) -> dict[str, list[str]]:
     try:
         content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=_unique_keys)
     except OSError as error:
-        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+        raise MotionError(f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise FormatError(path, f"not a joint map in JSON: {error}") from error
+        raise MotionError(f"not a joint map in JSON: {error}") from error
     if not isinstance(content, dict):
-        raise FormatError(path, "not a joint map: expected an object of bones and joints")
+        raise MotionError("not a joint map: expected an object of bones and joints")
     entries = {bone: [names] if isinstance(names, str) else names for bone, names in content.items()}
     for bone, names in entries.items():
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise FormatError(path, f"{bone}: expected the name of a joint or a list of names")
+            raise MotionError(f"{bone}: expected the name of a joint or a list of names")
     return entries
 
 
