@@ -26,7 +26,7 @@ from motet.formats import (
     write_all_on,
     write_on,
 )
-from motet.formats.text import Names
+from motet.formats.text import UniqueNames
 from motet.motion.motion import Motion
 
 
@@ -60,7 +60,7 @@ class Output:
         """
         if self.onto:
             clips = self._clips.setdefault(place, {})
-            clips[Names(clips).unique(name)] = motion
+            clips[UniqueNames(clips).unique(name)] = motion
         elif place.suffix.lower() == ".html":
             write_page(place, motion, captions, name)
         else:

@@ -22,6 +22,7 @@ from motet.files import Json
 from motet.models.describe import DescribeModel
 from motet.models.load import load_as
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Names
 
 Kind = TypeVar("Kind")
 _Window = tuple["Answer", float, float, Motion]
@@ -37,7 +38,7 @@ class Answer:
     source: Source
     rows: list[Any] = field(default_factory=list)
     error: str = ""
-    warned: tuple[str, ...] = ()
+    warned: Names = ()
     fps: float | None = None
     hash: str = ""
 

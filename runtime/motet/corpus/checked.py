@@ -24,6 +24,7 @@ from motet.formats import contents_of, read_motion, split_part
 from motet.formats.text import Clip, Figure, choice
 from motet.motion.kinematics import global_transforms, heading, positions
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Names
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,9 @@ class Checked:
 
     file: str
     clip: str | None
-    clips: tuple[str, ...]
+    clips: Names
     figure: str | None
-    figures: tuple[str, ...]
+    figures: Names
     frames: int
     fps: float
     joints: int
@@ -66,8 +67,8 @@ class Checked:
     lowest: float | None = None
     travel: float | None = None
     strides: bool = False
-    notes: tuple[str, ...] = ()
-    bones: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    notes: Names = ()
+    bones: Mapping[str, Names] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:

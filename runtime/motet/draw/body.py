@@ -21,7 +21,7 @@ from motet.draw.figure import COLOURS
 from motet.draw.mesh import Mesh, patch_triangles, ring, smooth_weights, smoothed
 from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, SIDES, T_POSE, joint_of
 from motet.motion.rotations import Array, Indices, Mask
-from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Triple
 
 BODY, LEFT_PART, RIGHT_PART, MIDDLE_PART = range(4)
 """Parts that have a colour each: of people the body and the bands at wrist and ankle of either side; of others bones of
@@ -45,7 +45,7 @@ class Finger(NamedTuple):
     """Where a finger begins along the arm, over it and in front; its length and radius; and in degrees its turn towards
     the thumb's side, and how much it is curled at first and at each of its joints."""
 
-    start: tuple[float, float, float]
+    start: Triple
     length: float
     radius: float
     aside: float

@@ -16,7 +16,7 @@ from motet.errors import MotionError
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton, sides_of
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Names, Skeleton, sides_of
 
 COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
 """sRGB of 0 to 255; ``player.html`` has the same."""
@@ -70,7 +70,7 @@ class Body:
         return max(self.skeleton.height, 0.62 * longest) or 1.0
 
     @cached_property
-    def sides(self) -> tuple[str, ...]:
+    def sides(self) -> Names:
         """The side of each joint, told from its name."""
         return sides_of(self.skeleton.names)
 
@@ -194,7 +194,7 @@ def figure_of(motion: Motion) -> Figure:
     return Figure(body, first, body.points(points), _heading(points[0], body.sides))
 
 
-def _heading(points: Array, sides: tuple[str, ...]) -> float:
+def _heading(points: Array, sides: Names) -> float:
     """Where joints (J, 3) face, at right angles to the way from those of the right to those of the left."""
     if LEFT not in sides:
         return 0.0

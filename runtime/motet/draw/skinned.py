@@ -28,7 +28,7 @@ from motet.figures.humanoid import (
 )
 from motet.motion.kinematics import Transforms, chained, global_transforms, local_rotations, local_translations
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, angle_of, unit
+from motet.motion.rotations import UP, Array, angle_of, unit
 from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton
 
 PART_OF_SIDE = {LEFT: LEFT_PART, RIGHT: RIGHT_PART, MIDDLE: MIDDLE_PART}
@@ -193,7 +193,7 @@ def _capsule(bone: Bone, rest: Array, end_carrier: int, corners: int = 10) -> Me
 
 def _unit_rings(axis: Array, corners: int) -> Array:
     """Rings (6, C, 3) around an axis on balls of radius 1, upright where it has no length."""
-    axis = unit(axis) if axis.any() else np.array([0.0, 1.0, 0.0])
+    axis = unit(axis) if axis.any() else UP
     side = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
     around = ring(corners) @ np.stack([side, np.cross(axis, side)])
     return np.cos(CAPS) * around + np.sin(CAPS) * axis

@@ -27,7 +27,7 @@ from motet.files import File, check_place, place_of
 from motet.formats.text import Clip, Contents, Figure, naming, split_clip
 from motet.motion.motion import Motion, motions_of, rest_motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton, metres
+from motet.motion.skeleton import Names, Skeleton, metres
 
 if TYPE_CHECKING:
     from motet.formats.gltf_character import Nodes
@@ -53,7 +53,7 @@ class Format:
     keeps: str
     reader: str = ""
     writer: str = ""
-    options: tuple[str, ...] = ()
+    options: Names = ()
     mocap: bool = False
     loose: bool = False
     needs: str = ""
@@ -279,7 +279,7 @@ def _in_unit(path: Path, motion: Motion, unit_name: str | float, loose: bool) ->
     return motion
 
 
-def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
+def clips(file: File, *, format: str | None = None) -> Names:
     """The names of the motions in a file, for ``clip`` of :func:`read_motion`.
 
     They are unique; empty if the format holds one motion per file, or the file holds none. format: see
@@ -288,7 +288,7 @@ def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
     return contents_of(file, format=format).clips
 
 
-def figures_in(file: File, *, format: str | None = None) -> tuple[str, ...]:
+def figures_in(file: File, *, format: str | None = None) -> Names:
     """The names of the skeletons in a file, for ``figure`` of :func:`read_motion`.
 
     They are unique; empty if the format holds one skeleton per file, or none. Errors like :func:`clips`.
@@ -434,7 +434,7 @@ def write_all_on(file: File, motions: Mapping[str, Motion], character: Character
         gltf_character.write_onto(file, motions, character.nodes)
 
 
-def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> Format:
+def check_writable(file: File, format: str | None = None, allowed: Names = WRITABLE) -> Format:
     """The format; an unwritable path or a disallowed extension is refused before long work starts."""
     kind = _format(file, format, allowed, "write")
     if kind.needs and find_spec(kind.needs) is None:
@@ -445,7 +445,7 @@ def check_writable(file: File, format: str | None = None, allowed: tuple[str, ..
     return kind
 
 
-def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str) -> Format:
+def _format(file: File, format: str | None, allowed: Names, verb: str) -> Format:
     extension = _extension(file, format)
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)

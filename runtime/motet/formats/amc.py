@@ -16,7 +16,7 @@ from motet.formats.asf import CMU_METRES, Asf, Dofs, Line, asf_text, read_skelet
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Joint
+from motet.motion.skeleton import Joint, Names
 
 T = TypeVar("T")
 
@@ -114,7 +114,7 @@ def _layout(lines: Iterator[Line], dofs: Dofs) -> Layout:
     return layout
 
 
-def _channels(bones: Iterable[str], dofs: Dofs) -> tuple[str, ...]:
+def _channels(bones: Iterable[str], dofs: Dofs) -> Names:
     """The channels of bones, each bone's in the order of its degrees of freedom."""
     channels = []
     for bone in bones:
@@ -230,7 +230,7 @@ def write(file: File, motion: Motion) -> None:
     write_whole(path, "\n".join([*frames, ""]))
 
 
-def _dofs_of(motion: Motion, joint: Joint) -> tuple[str, ...]:
+def _dofs_of(motion: Motion, joint: Joint) -> Names:
     """The joint's channels in the motion's order if the rotation order allows it: the first one turns first."""
     dofs = []
     for channel in motion.channels:

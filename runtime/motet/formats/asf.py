@@ -17,8 +17,7 @@ from motet.files import File
 from motet.formats.text import (
     NOWHERE,
     ContentError,
-    Names,
-    Triple,
+    UniqueNames,
     complete_order,
     names_file,
     number,
@@ -27,12 +26,12 @@ from motet.formats.text import (
     triple,
 )
 from motet.motion.rotations import euler_to_rotmat, rotmat_to_euler
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
 
 CMU_METRES = 0.0254 / 0.45
 """CMU writes ``length 0.45`` for lengths in inches times 0.45. Other values have no known meaning."""
 
-Dofs = Mapping[str, tuple[str, ...]]
+Dofs = Mapping[str, Names]
 """Of each joint with channels their names, such as "rx"."""
 
 Line = tuple[int, list[str]]
@@ -58,7 +57,7 @@ class _Bone:
     name: str
     reach: Triple = NOWHERE
     axis: Triple = NOWHERE
-    dofs: tuple[str, ...] = ()
+    dofs: Names = ()
     children: list[str] = field(default_factory=list)
     order: str = "XYZ"
 
@@ -202,7 +201,7 @@ def _axis(line: int, words: list[str], factor: float) -> Triple:
     return x, y, z
 
 
-def _dofs(line: int, words: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
+def _dofs(line: int, words: list[str], known: Names) -> Names:
     dofs = tuple(word.lower() for word in words[1:])
     if not set(dofs) <= set(known) or len(set(dofs)) < len(dofs):
         reason = f"degrees of freedom {quoted(' '.join(words[1:]))}: expected each of {' '.join(known)} at most once"
@@ -301,7 +300,7 @@ def _bones(asf: Asf) -> list[_Bone]:
     """The root, with the position in place of its reach, and all bones that the skeleton needs."""
     bones = {}
     joints = asf.skeleton.joints
-    names = Names(asf.skeleton.names)
+    names = UniqueNames(asf.skeleton.names)
     tips = _tips(asf)
     for i, joint in enumerate(joints):
         if i in tips:
@@ -321,7 +320,7 @@ def _bones(asf: Asf) -> list[_Bone]:
     return list(bones.values())
 
 
-def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: Names) -> list[_Bone]:
+def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: UniqueNames) -> list[_Bone]:
     """Add the children of a bone with this end; those that start elsewhere hang on bones without channels that lead
     there, which are returned."""
     bases = []
@@ -334,7 +333,7 @@ def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: Names)
     return bases
 
 
-def _bone_at(joint: Joint, dofs: tuple[str, ...]) -> _Bone:
+def _bone_at(joint: Joint, dofs: Names) -> _Bone:
     """The bone of a joint, without reach and children."""
     axis = joint.axis
     # in the order of the joint's own rotation: some readers take one for the other

@@ -21,7 +21,7 @@ from motet.formats import text
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, rotmats_to_euler
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
 
 log = logging.getLogger(__name__)
 
@@ -63,7 +63,7 @@ def _motion(nodes: "list[_Node]", values: Array, fps: float) -> Motion:
     return Motion(values, channels, text.units_of(channels, "deg"), fps, Skeleton(joints))
 
 
-def _channel_names(nodes: "list[_Node]") -> tuple[str, ...]:
+def _channel_names(nodes: "list[_Node]") -> Names:
     """The channels of a figure, such as "Hips.tx", in the order of the file."""
     channels = []
     for node in nodes:
@@ -113,7 +113,7 @@ def contents(file: File) -> text.Contents:
     return text.Contents((), dict.fromkeys(_figure_names(figures), ()))
 
 
-def _figure_names(figures: "list[list[_Node]]") -> tuple[str, ...]:
+def _figure_names(figures: "list[list[_Node]]") -> Names:
     return text.part_names((nodes[0].name for nodes in figures), "figure")
 
 
@@ -122,8 +122,8 @@ class _Node:
     name: str
     parent: int
     line: int
-    offset: text.Triple | None = None
-    channels: tuple[str, ...] = ()
+    offset: Triple | None = None
+    channels: Names = ()
 
 
 def _joint(node: _Node) -> Joint:
@@ -158,7 +158,7 @@ class _Hierarchy:
         self.figures: list[list[_Node]] = []
         self.open_nodes: list[int] = []
         self.is_declared = False
-        self.names = text.Names()
+        self.names = text.UniqueNames()
 
     def is_complete(self) -> bool:
         """Whether the line MOTION may follow."""
@@ -197,7 +197,7 @@ class _Hierarchy:
         # a ROOT begins another figure, whose names are its own
         if kind == "root":
             self.figures.append([])
-            self.names = text.Names()
+            self.names = text.UniqueNames()
         parent = self.open_nodes[-1] if self.open_nodes else -1
         if kind == "end":
             name = self._open_node().name + END_SUFFIX
@@ -205,7 +205,7 @@ class _Hierarchy:
         self.is_declared = True
 
 
-def _channels(words: list[str], line: int) -> tuple[str, ...]:
+def _channels(words: list[str], line: int) -> Names:
     """The channels after their count, as "tx" ... "rz"; FormatError for others, or another count."""
     channels = []
     for word in words[1:]:

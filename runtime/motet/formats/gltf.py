@@ -23,7 +23,7 @@ from motet.formats.text import (
     Clip,
     ContentError,
     Contents,
-    Names,
+    UniqueNames,
     choice,
     chosen,
     most_poses,
@@ -35,7 +35,7 @@ from motet.formats.text import Figure as FigureChoice
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion, rest_motion
 from motet.motion.rotations import Array, Indices, inverse, product, rotated
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
 def _joint_names(gltf: Gltf, figure: "Figure") -> list[str]:
     """The names of a figure's joints: VRM's for the bones of its humanoid, and unique ones for the others."""
     bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
-    unique_names = Names(bones.values())  # other joints with such a name are renamed
+    unique_names = UniqueNames(bones.values())  # other joints with such a name are renamed
     names = []
     for node, name in zip(figure.nodes, figure.names, strict=True):
         names.append(bones.get(node) or unique_names.unique(name))
@@ -117,7 +117,7 @@ class _Scene:
     gltf: Gltf
     figures: dict[str, NodeSet]
     animations: list[Json]
-    names: tuple[str, ...]
+    names: Names
 
 
 def _scene(file: File) -> _Scene:
@@ -154,7 +154,7 @@ class Figure:
 
     nodes: tuple[int, ...]
     parents: tuple[int, ...]
-    names: tuple[str, ...]
+    names: Names
 
 
 @dataclass(frozen=True)
@@ -412,7 +412,7 @@ def figure_of(gltf: Gltf, joints: NodeSet) -> Figure:
         raise ContentError(f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
     index_of = {node: i for i, node in enumerate(nodes)}
     parents = tuple(index_of.get(gltf.parents[node], -1) for node in nodes)
-    unique_names = Names()
+    unique_names = UniqueNames()
     names = tuple(unique_names.unique(gltf.name(node)) for node in nodes)
     return Figure(nodes, parents, names)
 

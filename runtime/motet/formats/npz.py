@@ -27,7 +27,7 @@ from motet.formats.text import ContentError, check_rate, frame_rate, most_poses,
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product, rotvec_to_rotmat
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Names, Skeleton
 
 NPZ_MAX_BYTES = 2**29
 """Bytes of an unpacked array: over an hour of a hundred channels at 120 fps."""
@@ -157,7 +157,7 @@ def _motet(archive: zipfile.ZipFile, names: set[str]) -> Motion:
     return Motion(values, tuple(map(str, channels.tolist())), tuple(map(str, units.tolist())), rate, bones)
 
 
-def _smpl(archive: zipfile.ZipFile, names: set[str], parts: tuple[str, ...], size: int, fps: float | None) -> Motion:
+def _smpl(archive: zipfile.ZipFile, names: set[str], parts: Names, size: int, fps: float | None) -> Motion:
     # rotations in their parents' frames
     turned = _joints(archive, parts, size)
     # where the root is, in metres
@@ -174,7 +174,7 @@ def _smpl(archive: zipfile.ZipFile, names: set[str], parts: tuple[str, ...], siz
     return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans}, rate)
 
 
-def _joints(archive: zipfile.ZipFile, parts: tuple[str, ...], size: int) -> Array:
+def _joints(archive: zipfile.ZipFile, parts: Names, size: int) -> Array:
     """Rotations (T, 22, 3, 3) of the body's joints, each in its parent's frame."""
     with archive.open(f"{parts[0]}.npy") as stream:
         shape = _header(stream)[0]

@@ -22,14 +22,12 @@ from motet.files import File, place_of
 from motet.motion.kinematics import AXES, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Names, Skeleton, Triple
 
 log = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-Triple = tuple[float, float, float]
 
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 
@@ -47,8 +45,8 @@ class Contents(NamedTuple):
     figures: each of its skeletons -> the clips that move it.
     """
 
-    clips: tuple[str, ...]
-    figures: dict[str, tuple[str, ...]]
+    clips: Names
+    figures: dict[str, Names]
 
 
 class ContentError(MotionError):
@@ -195,7 +193,7 @@ def most_poses(size: int) -> int:
     return min(MAX_POSES, FREE_POSES + size)
 
 
-def units_of(channels: Iterable[str], angle: str) -> tuple[str, ...]:
+def units_of(channels: Iterable[str], angle: str) -> Names:
     """The units of translations, "length", and of Euler angles, which are in the unit ``angle``."""
     return tuple("length" if name[-2] == "t" else angle for name in channels)
 
@@ -206,7 +204,7 @@ def complete_order(axes: str) -> str:
     return next(order for order in map("".join, permutations("zyx")) if re.fullmatch(pattern, order))
 
 
-class Names:
+class UniqueNames:
     """Hands out unique names: a name already taken gets the suffix _2, _3, ..."""
 
     def __init__(self, taken: Iterable[str] = ()) -> None:
@@ -227,7 +225,7 @@ class Names:
 
 def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
     """Unique non-empty names, with ``_`` for every character that matches the regular expression ``forbidden``."""
-    plain = Names()
+    plain = UniqueNames()
     return [plain.unique(re.sub(forbidden, "_", name) or "_") for name in names]
 
 
@@ -242,7 +240,7 @@ def with_names(motion: Motion, names: Sequence[str]) -> Motion:
     return replace(motion, channels=channels, skeleton=Skeleton(joints, skeleton.metres_per_unit))
 
 
-def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[str, ...]]:
+def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, Names]:
     """The motion with constant translations turned into offsets of the skeleton, and the joints that still translate.
 
     The root keeps its translation and is not among those joints; all translations are in "length".
@@ -298,9 +296,9 @@ def _check_channels(path: str | Path, motion: Motion) -> None:
         raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(wrong)}")
 
 
-def part_names(names_in_file: Iterable[str], kind: str = "clip") -> tuple[str, ...]:
+def part_names(names_in_file: Iterable[str], kind: str = "clip") -> Names:
     """Unique names for a file's clips or figures, in order: printable and on one line, "clip3" for an empty third."""
-    names = Names()
+    names = UniqueNames()
     return tuple(names.unique(_tidy(name) or f"{kind}{i}") for i, name in enumerate(names_in_file, start=1))
 
 

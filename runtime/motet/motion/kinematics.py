@@ -18,7 +18,7 @@ from motet.motion.rotations import (
     rotated,
     rotmats_to_euler,
 )
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton
 
 AXES = ("x", "y", "z")
 
@@ -26,7 +26,7 @@ Transforms = tuple[Array, Array]
 """Rotations (T, J, 3, 3) and positions (T, J, 3) of joints."""
 
 
-def channels_of(joint: str, letter: str) -> tuple[str, ...]:
+def channels_of(joint: str, letter: str) -> Names:
     """The channels of a joint's translation ("t"), Euler angles ("r") or exponential map ("e"), along x, y and z."""
     return tuple(f"{joint}.{letter}{axis}" for axis in AXES)
 
@@ -167,7 +167,7 @@ def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
     return stacked
 
 
-def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
+def with_channels(motion: Motion, names: Names, values: Array, units: Names) -> Motion:
     """The motion with channels (T, len(names)) replaced, or prepended if it has none of that name."""
     # new channels stand before all others
     new = tuple(name for name in names if name not in motion.channels)

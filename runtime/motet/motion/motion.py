@@ -17,7 +17,7 @@ from motet.motion.rotations import (
     continuous_rotvec,
     without_turns,
 )
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -41,8 +41,8 @@ class Motion:
     """
 
     values: Array
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
+    channels: Names
+    units: Names
     fps: float
     skeleton: Skeleton | None = None
 
@@ -115,7 +115,7 @@ class Motion:
             raise MotionError(f"no frame between {start:g} and {stop:g} s at {self.fps:g} fps")
         return part
 
-    def select(self, channels: tuple[str, ...], units: tuple[str, ...] | None = None) -> "Motion":
+    def select(self, channels: Names, units: Names | None = None) -> "Motion":
         """The named channels in the order given, converted to ``units``; MotionError names what is missing."""
         if channels == self.channels and units in (None, self.units):
             return self
@@ -225,7 +225,7 @@ class Motion:
 
 
 @lru_cache(maxsize=64)
-def _check_channels(channels: tuple[str, ...], units: tuple[str, ...]) -> None:
+def _check_channels(channels: Names, units: Names) -> None:
     """MotionError for names that are not unique, and units that are unknown or not one for each."""
     if len(set(channels)) != len(channels):
         raise MotionError("channel names must be unique")
@@ -234,13 +234,13 @@ def _check_channels(channels: tuple[str, ...], units: tuple[str, ...]) -> None:
 
 
 @lru_cache(maxsize=64)
-def _places(channels: tuple[str, ...]) -> Mapping[str, int]:
+def _places(channels: Names) -> Mapping[str, int]:
     """The column of each channel."""
     return {name: column for column, name in enumerate(channels)}
 
 
 @lru_cache(maxsize=64)
-def _rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str) -> Mapping[str, list[int]]:
+def _rotation_columns(channels: Names, units: Names, letter: str) -> Mapping[str, list[int]]:
     columns_of: dict[str, list[int]] = {}
     for column in sorted(range(len(channels)), key=lambda column: channels[column][-2:]):
         joint, _, kind = channels[column].rpartition(".")

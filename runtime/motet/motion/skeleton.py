@@ -17,6 +17,12 @@ from motet.motion.rotations import Array, Indices, euler_to_rotmat
 
 END_SUFFIX = "_end"
 
+Triple = tuple[float, float, float]
+"""x, y and z."""
+
+Names = tuple[str, ...]
+"""Names of joints or channels, or units of channels, in their order."""
+
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 """Name of a unit of length -> its metres."""
 
@@ -38,9 +44,9 @@ class Joint:
 
     name: str
     parent: int
-    offset: tuple[float, float, float]
+    offset: Triple
     order: str = "zyx"
-    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis: Triple = (0.0, 0.0, 0.0)
 
     @cached_property
     def frame(self) -> Array:
@@ -80,7 +86,7 @@ class Skeleton:
         return f"Skeleton({len(self.joints)} joints, root {self.joints[0].name!r}, {unit})"
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
+    def names(self) -> Names:
         """The joints' names, in order."""
         return tuple(joint.name for joint in self.joints)
 
@@ -201,7 +207,7 @@ class Skeleton:
             raise MotionError(f"not a skeleton: {error}") from error
 
 
-def _triple(values: Iterable[float]) -> tuple[float, float, float]:
+def _triple(values: Iterable[float]) -> Triple:
     x, y, z = map(float, values)
     return x, y, z
 
@@ -224,7 +230,7 @@ def partners_of(names: Sequence[str]) -> tuple[int, ...]:
     return tuple(partner for partner, _ in _partners(names))
 
 
-def sides_of(names: Sequence[str]) -> tuple[str, ...]:
+def sides_of(names: Sequence[str]) -> Names:
     """:data:`LEFT`, :data:`RIGHT` or :data:`MIDDLE` for each name; one without a partner is in the middle."""
     return tuple(side for _, side in _partners(names))
 

@@ -12,7 +12,7 @@ from motet.figures.humanoid import Figure, to_humanoid
 from motet.files import Json
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 from motet.representation.base import FrameMirror, Representation, phases
 from motet.representation.retargeting import (
     foreign,
@@ -67,8 +67,8 @@ class MotionContract:
     """
 
     representation: str
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
+    channels: Names
+    units: Names
     fps: float
     mean: Array
     std: Array
@@ -141,7 +141,7 @@ class MotionContract:
         return (known and motion.skeleton == self.skeleton) or set(self.channels) <= set(motion.channels)
 
     @cached_property
-    def _joints(self) -> tuple[str, ...]:
+    def _joints(self) -> Names:
         """The joints that the channels speak of, but for the root where its block does."""
         block = named(self.representation).required
         names = (channel.rpartition(".")[0] for channel in self.channels if channel not in block)

@@ -37,7 +37,7 @@ from motet.motion.rotations import (
     rotmat_to_rotvec,
     rotvec_to_rotmat,
 )
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -61,7 +61,7 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
 
 
 @lru_cache(maxsize=256)
-def _differences(skeleton: Skeleton, other: Skeleton) -> tuple[str | None, tuple[str, ...]]:
+def _differences(skeleton: Skeleton, other: Skeleton) -> tuple[str | None, Names]:
     """Why angles mean other poses in another skeleton: a bone points elsewhere; None if they do not. And names of the
     joints of both that turn about other axes."""
     turned = []

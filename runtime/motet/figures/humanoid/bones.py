@@ -22,7 +22,7 @@ from motet.errors import MotionError
 from motet.files import Json
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotated
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
 
 LEFT_RIGHT = ("left", "right")
 
@@ -33,8 +33,6 @@ SPINE = ("spine", "chest", "upperChest")
 NECK = ("neck", "head")
 LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
-
-Triple = tuple[float, float, float]
 
 Places = Mapping[str, tuple[str, Triple, str]]
 """Joint -> parent, "" for none, offset and Euler order."""
@@ -50,7 +48,7 @@ def joint_of(side: str, part: str) -> int:
     return HUMANOID.index(sided(side, part))
 
 
-def limb_of(side: str, parts: Sequence[str]) -> tuple[str, ...]:
+def limb_of(side: str, parts: Sequence[str]) -> Names:
     """The names of a limb's joints on one side, such as those of LEG."""
     return tuple(sided(side, part) for part in parts)
 

@@ -35,13 +35,12 @@ from motet.figures.humanoid.bones import (
     LEG,
     NECK,
     SPINE,
-    Triple,
     limb_of,
     sided,
 )
 from motet.files import Json
 from motet.motion.rotations import Array, unit
-from motet.motion.skeleton import END_SUFFIX, Skeleton, repeated
+from motet.motion.skeleton import END_SUFFIX, Names, Skeleton, Triple, repeated
 
 LIMB_PARTS = (*LEG[:3], *ARM[1:3])
 NEEDED = ("hips", "spine", *limb_of("left", LIMB_PARTS), *limb_of("right", LIMB_PARTS))
@@ -125,7 +124,7 @@ class JointMap:
         """The joints of the neck and the head's, where there is one."""
         return self.neck + tuple(joint for bone, joint in self.joints.items() if bone == "head")
 
-    def names(self, skeleton: Skeleton) -> dict[str, tuple[str, ...]]:
+    def names(self, skeleton: Skeleton) -> dict[str, Names]:
         """For each bone ("spine" and "neck" for all of the back and of the neck) the names of its joints."""
         joints = {bone: (joint,) for bone, joint in self.joints.items()}
         names = {}
@@ -343,7 +342,7 @@ class Convention:
     title: str
     """The name of the convention."""
 
-    names: dict[str, tuple[str, ...]]
+    names: dict[str, Names]
     """For each bone the plain names that its joint can have."""
 
     spelled: frozenset[str]
@@ -358,7 +357,7 @@ class Convention:
     optional: frozenset[str]
     """Bones that only some files have."""
 
-    prefixes: tuple[str, ...]
+    prefixes: Names
     """Regular expressions of prefixes that every name can have."""
 
     rest: dict[str, Triple] | None
@@ -412,7 +411,7 @@ def _of_both_sides(names: Sequence[str], sides: Sequence[str]) -> frozenset[str]
     return frozenset(plain)
 
 
-def _bones(content: Json, sides: Sequence[str]) -> tuple[dict[str, tuple[str, ...]], frozenset[str], frozenset[str]]:
+def _bones(content: Json, sides: Sequence[str]) -> tuple[dict[str, Names], frozenset[str], frozenset[str]]:
     """For each bone the plain names, all names as they are written, and the bones that only some files have."""
     names = {}
     spelled = set()
@@ -495,7 +494,7 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
         raise HalfKnownError(str(error)) from error
 
 
-def _written(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+def _written(names: Names) -> list[Names]:
     """Names without words that nearly all begin with: with numbers at their ends, without them, without two."""
     bare = without_numbers(names)
     kinds = dict.fromkeys((names, bare, without_numbers(bare)))
@@ -511,7 +510,7 @@ def _nearly_all(count: int, names: Sequence[str]) -> bool:
     return count > 0.8 * len(names)
 
 
-def without_numbers(names: tuple[str, ...]) -> tuple[str, ...]:
+def without_numbers(names: Names) -> Names:
     """Names without the numbers that programs add at their ends: of nearly all names ("LeftArm_07", "hand.L.001"), or
     the one digit that nearly all end in ("Hips1", "Spine11"), or of names that no other is like without them."""
     # numbers after a separator, that nearly all names have
@@ -527,7 +526,7 @@ def without_numbers(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(short if counts[short] == 1 else name for short, name in zip(bare, names, strict=True))
 
 
-def _without_first_words(names: tuple[str, ...]) -> tuple[str, ...]:
+def _without_first_words(names: Names) -> Names:
     """Names without the words, or numbers, with which nearly all begin."""
     while True:
         first = [re.match(r"(?:[0-9]+[ _:.|-]*|[^\W\d_][^\W_]*[ _:.|-]+)(?=.)", name) for name in names]
@@ -546,7 +545,7 @@ def _absent_in_chain(convention: Convention, chain: str, names: Set[str]) -> int
     return 0 if chain in convention.optional or not known else 1 + absent
 
 
-def _match(convention: Convention, skeleton: Skeleton, written: tuple[str, ...]) -> _Match:
+def _match(convention: Convention, skeleton: Skeleton, written: Names) -> _Match:
     """The map that a convention makes of a skeleton's names, as they are written."""
     bare = _without_prefixes(convention, written)
     names = [_plain(name) for name in bare]

@@ -40,7 +40,7 @@ from motet.figures.humanoid.joint_tree import map_of
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, identities, rotated, swing, unit
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 
 LENGTH_UNITS = {
     "metres": 1.0,
@@ -75,7 +75,7 @@ class Fitted:
     confidence: float
     """From 0 to 1, how certain A is."""
 
-    notes: tuple[str, ...]
+    notes: Names
     """Sentences about the assumptions made."""
 
     pelvis: bool = True
@@ -153,7 +153,7 @@ def _fit_at_rest(body: Body, leg: float, frame: Array) -> Fitted:
     """A figure whose rest pose is a standing body with axes (3, 3) left, up and forward."""
     rest = body.skeleton.rest_positions
     joint_map = body.joint_map
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
     if joint_map.rest is not None:
         points = {bone: unit(np.array(point)) for bone, point in joint_map.points.items()}
         if _agreement(body, rest, frame, points) > np.cos(np.radians(4)):

@@ -71,7 +71,7 @@ from motet.motion.rotations import (
     twist,
     unit,
 )
-from motet.motion.skeleton import END_SUFFIX, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -150,7 +150,7 @@ class Humanoid:
     motion: Motion
     """The motion on :data:`motet.motion.HUMANOID`, at the file's frame rate, root translation in metres."""
 
-    joints: dict[str, tuple[str, ...]]
+    joints: dict[str, Names]
     """For each bone the names of the joints that it was taken from."""
 
     convention: str
@@ -168,7 +168,7 @@ class Humanoid:
     height: float | None
     """About how tall the figure stands, in metres, None where its unit is not known."""
 
-    notes: tuple[str, ...]
+    notes: Names
     """Sentences about the assumptions made."""
 
     figure: Figure
@@ -216,7 +216,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     return _findings(retargeted, figure, length_unit.metres, tuple(note for note in notes if note))
 
 
-def _findings(motion: Motion, figure: Figure, metres: float | None, notes: tuple[str, ...]) -> Humanoid:
+def _findings(motion: Motion, figure: Figure, metres: float | None, notes: Names) -> Humanoid:
     """A motion on the humanoid with what is found about its figure. metres: of one unit of its lengths, if known."""
     fitted = figure.fitted
     joint_map = fitted.joint_map
