@@ -19,7 +19,7 @@ from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
 from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
 from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, broken, parse, read_beside
-from motet.formats.text import ContentError
+from motet.formats.text import ContentError, naming
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion, rest_motion
 from motet.motion.rotations import Array, Indices, product, quat_to_rotmat, rotated, rotmat_to_quat
@@ -345,7 +345,8 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
     clip = animation(buffer, "motion", motion, tracks)
     skin = {"joints": [number_of[node] for node in joints]}
     inverse_bind = _inverse_bind(nodes.linear[joints], nodes.places[joints])
-    bare = _bare_nodes(nodes, number_of)
+    with naming(gltf.path):
+        bare = _bare_nodes(nodes, number_of)
     document = with_body(buffer, motion, nodes.skeleton, bare, clip, skin, inverse_bind)
     write_whole(file, container(document, buffer.content))
 
