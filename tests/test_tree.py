@@ -10,7 +10,7 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 79
+MOST_LARGE_FUNCTIONS = 75
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 BANNED = frozenset({"found", "one", "own", "told", "said", "given", "asked", "how", "who", "those"})
@@ -78,25 +78,25 @@ ONE_WAY = {
 
 CEILINGS = {
     "motet": 3_500,
-    "motet.bench": 5_500,
-    "motet.bundle": 11_500,
-    "motet.cli": 17_600,
-    "motet.composition": 7_800,
-    "motet.corpus": 9_300,
+    "motet.bench": 5_400,
+    "motet.bundle": 11_400,
+    "motet.cli": 17_200,
+    "motet.composition": 7_700,
+    "motet.corpus": 9_000,
     "motet.decode": 4_400,
-    "motet.draw": 12_300,
-    "motet.figures": 32_600,
-    "motet.formats": 36_800,
+    "motet.draw": 11_300,
+    "motet.figures": 32_000,
+    "motet.formats": 35_900,
     "motet.generate": 30_400,
     "motet.keyed": 9_300,
-    "motet.live": 5_000,
+    "motet.live": 4_900,
     "motet.models": 10_200,
-    "motet.motion": 16_500,
+    "motet.motion": 16_400,
     "motet.papers": 7_500,
     "motet.predict": 5_400,
-    "motet.representation": 9_500,
+    "motet.representation": 9_400,
     "motet.search": 3_600,
-    "motet.serve": 17_100,
+    "motet.serve": 16_800,
     "motet.steering": 57_400,
     "motet.text": 5_400,
     "motet_export": 12_400,

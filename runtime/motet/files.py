@@ -5,12 +5,15 @@ import uuid
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from motet.errors import OutputError
 
 File = str | Path | BinaryIO
 """A path, or a file object of bytes."""
+
+Json = dict[str, Any]
+"""A JSON object."""
 
 
 def place_of(file: File) -> Path:
@@ -23,8 +26,8 @@ def place_of(file: File) -> Path:
 
 def files_in(folder: Path, extensions: Collection[str]) -> list[Path]:
     """The files of some types in a folder and all below it, sorted, but for hidden ones."""
-    paths = (path for path in folder.rglob("*") if path.suffix.lower() in extensions and path.name[0] != ".")
-    return sorted(path for path in paths if path.is_file())
+    visible = folder.rglob("[!.]*")
+    return sorted(path for path in visible if path.suffix.lower() in extensions and path.is_file())
 
 
 def check_place(path: str | Path) -> Path:

@@ -158,6 +158,6 @@ def test_what_is_no_person_has_round_bones_around_its_own():
     corners = figure.corners(turns[20], places[20])
     edges = edges_of(figure.mesh.triangles)
     assert all(edges[b, a] == 1 for a, b in edges)
-    for bone in points.bones:  # corners lie around each bone's ends
+    for bone in points.body.bones:  # corners lie around each bone's ends
         away = np.linalg.norm(corners - points.points[20, bone.end], axis=1)
         assert away.min() < 1.05 * bone.end_radius

@@ -211,7 +211,7 @@ def test_a_joint_that_stays_above_the_hips_is_not_drawn():
     deeper = replace(motion, skeleton=Skeleton(joints, motion.skeleton.metres_per_unit))
     one, other = figure_of(motion), figure_of(deeper)
     np.testing.assert_allclose(other.points, one.points, atol=1e-12)
-    assert (other.bones, other.heading) == (one.bones, one.heading)
+    assert (other.body.bones, other.heading) == (one.body.bones, one.heading)
 
 
 def test_heading_is_where_the_figure_faces():

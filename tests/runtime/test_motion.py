@@ -162,7 +162,11 @@ def test_continuous_takes_out_gimbal_flips_of_the_joints_own_order():
 def test_skeletons_are_trees_with_a_text_form():
     skeleton = walker().skeleton
     assert Skeleton.from_json(skeleton.to_json()) == skeleton
-    assert [skeleton.names[i] for i in skeleton.subtree("left_leg")] == ["left_leg", "left_shin", "left_shin_end"]
+    assert [skeleton.names[i] for i in skeleton.below(skeleton.index("left_leg"))] == [
+        "left_leg",
+        "left_shin",
+        "left_shin_end",
+    ]
     for joints in ((), (Joint("a", 0, (0, 0, 0)),), (Joint("a", -1, (0, 0, 0)), Joint("a", 0, (0, 0, 0)))):
         with pytest.raises(MotionError):
             Skeleton(joints)

@@ -193,8 +193,8 @@ def test_of_two_figures_the_one_is_read_that_the_clip_moves(
 def test_skins_of_one_figure_are_one_skeleton(tmp_path: Path) -> None:
     path = write_clips(tmp_path / "a.glb", [("Walk", swinging(9))])
     document, binary = read_document(path)
-    arms = {i for side in ("left", "right") for i in HUMANOID.subtree(f"{side}UpperArm")}
-    legs = {i for side in ("left", "right") for i in HUMANOID.subtree(f"{side}UpperLeg")}
+    arms = {i for side in ("left", "right") for i in HUMANOID.below(HUMANOID.index(f"{side}UpperArm"))}
+    legs = {i for side in ("left", "right") for i in HUMANOID.below(HUMANOID.index(f"{side}UpperLeg"))}
     for parts in ([arms, legs, set(range(len(HUMANOID.joints))) - arms - legs], [arms, legs]):
         document["skins"] = [{"joints": sorted(part)} for part in parts]
         motion = motet.read(write_document(path, document, binary))

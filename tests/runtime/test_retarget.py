@@ -185,7 +185,7 @@ def limbless(motion: Motion, *gone: str) -> Motion:
     """The motion without some joints and all that hangs on them."""
     skeleton = motion.skeleton
     assert skeleton is not None
-    lost = {i for name in gone for i in skeleton.subtree(name)}
+    lost = {i for name in gone for i in skeleton.below(skeleton.index(name))}
     kept = [i for i in range(len(skeleton.joints)) if i not in lost]
     joints = [
         replace(skeleton.joints[i], parent=kept.index(p) if (p := skeleton.joints[i].parent) >= 0 else -1) for i in kept

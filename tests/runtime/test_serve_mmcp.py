@@ -154,7 +154,7 @@ def test_the_client_s_own_figure_gets_the_motion(url: str, name: str) -> None:
     (sample,) = ask(url, sent(own))
     motion = from_humanoid(told(5, WALK["prompt"]), own)
     expected = global_transforms(motion)[1] * own.metres_per_unit
-    below = own.subtree(next(one.rpartition(".")[0] for one in motion.channels if one.endswith(".tx")))
+    below = own.below(own.index(next(one.rpartition(".")[0] for one in motion.channels if one.endswith(".tx"))))
     found = positions(sample)
     np.testing.assert_allclose(found[:, below], expected[:, below], atol=0.02)
     np.testing.assert_allclose(np.ptp(found[:, 0], axis=0), np.ptp(found[:, below[0]], axis=0), atol=1e-5)

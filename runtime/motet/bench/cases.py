@@ -12,6 +12,7 @@ import numpy as np
 
 from motet.bench.measure import Call, Case
 from motet.bundle.graph import Arrays, Floats, Graph
+from motet.files import Json
 from motet.formats import read_motion, write_motion
 from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
@@ -259,6 +260,6 @@ class _Steady:
         self._graph = graph
         self._changes = changes
 
-    def __call__(self, feeds: Arrays) -> dict[str, Any]:
+    def __call__(self, feeds: Arrays) -> Json:
         outputs = self._graph(feeds)
         return {**outputs, **{name: change(outputs[name]) for name, change in self._changes.items()}}

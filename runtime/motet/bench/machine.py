@@ -72,7 +72,7 @@ class Machine:
 def wanted_by_others() -> float | None:
     """Processes that want a core, beside this one: the mean of half a second on Linux, elsewhere of the last minute,
     which also counts what this one did; None where the system does not tell."""
-    counts: list[int] = []
+    counts = []
     with suppress(OSError):
         for _ in range(LOOKS):
             counts += [

@@ -111,9 +111,9 @@ def taken(call: Call, seconds: float, least: int = 2) -> Taken:
 def compared(cases: Mapping[str, Sequence[Case]], seconds: float) -> list[Row]:
     """The rows of our cases, the first, beside those of others by the same names, measured in turn for about
     ``seconds`` each. A ratio is the median of those of the rounds. Who fails at a row is left out of it."""
-    rows = list[Row]()
+    rows = []
     for name in dict.fromkeys(case.name for case in next(iter(cases.values()))):
-        of_name = dict[str, Sequence[Case]]()
+        of_name = {}
         for rival, rival_cases in cases.items():
             of_name[rival] = [case for case in rival_cases if case.name == name]
         rows.append(_row(of_name, seconds))
@@ -123,7 +123,7 @@ def compared(cases: Mapping[str, Sequence[Case]], seconds: float) -> list[Row]:
 def _row(cases: Mapping[str, Sequence[Case]], seconds: float) -> Row:
     """The row of our cases of one name, the first, beside those of others."""
     us = next(iter(cases))
-    chosen = dict[str, Case]()
+    chosen = {}
     for rival, rival_cases in cases.items():
         fastest = _fastest(rival, rival_cases, seconds, must=rival == us)
         if fastest is not None:
@@ -141,7 +141,7 @@ def _row(cases: Mapping[str, Sequence[Case]], seconds: float) -> Row:
 
 def _beside(case: Case, rounds: Sequence[Taken], ours: Case, our_rounds: Sequence[Taken]) -> Beside:
     """A case of torch's beside ours, each by its rounds."""
-    ratios = list[float]()
+    ratios = []
     for calls, our_calls in zip(rounds, our_rounds, strict=True):
         ratios.append((np.median(calls.wall) / case.count) / (np.median(our_calls.wall) / ours.count))
     times = Times.of(rounds)

@@ -14,6 +14,7 @@ from typing import Any
 from motet.bench.machine import Machine
 from motet.bench.measure import Call, Case, Row
 from motet.bundle.graph import SessionOptions
+from motet.files import Json
 
 PRODUCTS = ("MatMul", "Gemm", "TransposeMatMul", "MatMulInteger", "MatMulIntegerToFloat", "DynamicQuantizeMatMul")
 
@@ -72,7 +73,7 @@ def profiled(options: SessionOptions, call_of: Callable[[SessionOptions], Call],
 
 def _events_after(seconds: Sequence[float], folder: Path) -> list[dict[str, Any]]:
     """The events in the profiles of a folder, of each session those later than so many seconds after its begin."""
-    events = list[dict[str, Any]]()
+    events = []
     for file, earliest in zip(sorted(folder.iterdir()), seconds, strict=True):
         recorded = json.loads(file.read_text(encoding="utf-8"))
         events += [event for event in recorded if event["ts"] / 1e6 > earliest]
@@ -102,7 +103,7 @@ def with_profiles(
     return profiled_rows
 
 
-def _summed(events: list[dict[str, Any]], taken: float, count: int) -> Profile:
+def _summed(events: list[Json], taken: float, count: int) -> Profile:
     kernels = Counter[str]()
     operations = 0.0
     sessions = 0.0
@@ -119,7 +120,7 @@ def _summed(events: list[dict[str, Any]], taken: float, count: int) -> Profile:
     )
 
 
-def operations_of(kernel: Mapping[str, Any]) -> float:
+def operations_of(kernel: Json) -> float:
     """Multiplications and additions in the products of a kernel, as the profile describes it; 0 of one without.
 
     Of weights that were packed when the graph was loaded the profile has no shape, so they are told from the results;

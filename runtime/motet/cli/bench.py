@@ -17,8 +17,9 @@ from motet.bench.measure import LESS, Case, Row, compared
 from motet.bench.profile import with_profiles
 from motet.bundle.bundle import list_bundles
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import session_options
+from motet.cli.options import json_option, session_options
 from motet.errors import FormatError, TextWarning, collected
+from motet.files import Json
 from motet.models.load import load
 
 log = logging.getLogger(__name__)
@@ -34,7 +35,7 @@ log = logging.getLogger(__name__)
 @click.option("--compare", type=Path, metavar="OLD", help="What --json printed: also how much better each row is.")
 @click.option("--force", is_flag=True, help="Measure though other programs want more cores than there are.")
 @session_options
-@click.option("--json", "as_json", is_flag=True, help="Print the machine and, of each bundle, a list of rows.")
+@json_option("Print the machine and, of each bundle, a list of rows.")
 def bench(
     bundle: str,
     compare: Path | None,
@@ -55,7 +56,7 @@ def bench(
     for key in ("processor", "cores", "versions"):
         if old and old["machine"].get(key) != (now := getattr(machine, key)):
             log.warning("%s: another machine or version: %s %s, now %s", compare, key, old["machine"].get(key), now)
-    measurements: dict[str, list[Row]] = {}
+    measurements = {}
     for name in list_bundles() if bundle == "all" else [bundle]:
         measurements[name] = measured(name, session, machine, **measure_options)
         if not as_json:
@@ -126,10 +127,10 @@ def _line(row: Row, before: float | None) -> str:
     return line
 
 
-def _earlier(file: Path) -> dict[str, Any]:
+def _earlier(file: Path) -> Json:
     """What ``--json`` printed."""
     try:
-        report: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        report: Json = json.loads(file.read_text(encoding="utf-8"))
         rows = list(chain(*report["bundles"].values()))
         known = [(row["name"], float(row["value"])) for row in rows]
         if not known or not isinstance(report["machine"], dict):

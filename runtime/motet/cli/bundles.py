@@ -2,13 +2,13 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import session_options
+from motet.cli.options import json_option, session_options
+from motet.files import Json
 from motet.models.load import verify as verify_bundle
 
 
@@ -18,10 +18,10 @@ def bundle() -> None:
 
 
 @bundle.command("list")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@json_option("Print JSON.")
 def list_(as_json: bool) -> None:
     """List the installed bundles."""
-    rows: list[dict[str, Any]] = []
+    rows: list[Json] = []
     for opened in map(Bundle.open, list_bundles().values()):
         manifest = opened.manifest
         size = sum(entry.size for entry in opened.manifest.files.values())
@@ -38,7 +38,7 @@ def list_(as_json: bool) -> None:
 
 @bundle.command()
 @click.argument("name")
-@click.option("--json", "as_json", is_flag=True, help="Print the whole manifest.")
+@json_option("Print the whole manifest.")
 def info(name: str, as_json: bool) -> None:
     """Show a bundle's inputs and outputs, licence, parity and quality."""
     manifest = Bundle.open(name).manifest
@@ -53,7 +53,7 @@ def info(name: str, as_json: bool) -> None:
             _tree({k: v for k, v in values.items() if k not in ("starts", "kinds")})  # long: with --json alone
 
 
-def _tree(values: dict[str, Any], indent: str = "  ") -> None:
+def _tree(values: Json, indent: str = "  ") -> None:
     for key, value in values.items():
         if isinstance(value, dict):
             click.echo(f"{indent}{key}")

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from motet.cli.many import Many, many_options, print_list
+from motet.cli.options import json_option
 from motet.cli.reading import read_options
 from motet.cli.writing import places, size
 from motet.corpus.answers import Answer, Check, to_json
@@ -59,7 +60,7 @@ class Row:
 @click.option("-o", "--out", type=Path, help="Page (.html) that plays the figure of the file beside the humanoid.")
 @read_options
 @many_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list of objects, one for each clip.")
+@json_option("Print a list of objects, one for each clip.")
 def check(files: tuple[Path, ...], out: Path | None, many: Many, as_json: bool) -> None:
     """Look at motion files."""
     if out is not None and out.suffix.lower() != ".html":
@@ -171,7 +172,7 @@ def _report(row: Row) -> Iterator[str]:
 
 def _parts_of_file(checked: Checked) -> list[tuple[str, str]]:
     """Which clip and figure of the file it is, where there are several."""
-    facts: list[tuple[str, str]] = []
+    facts = []
     if checked.clips:
         number = checked.clips.index(checked.clip or "") + 1
         facts.append(("clip", f"{checked.clip}, {number} of {len(checked.clips)}"))

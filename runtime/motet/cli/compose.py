@@ -8,8 +8,8 @@ import click
 
 from motet.bundle.graph import SessionOptions
 from motet.cli.generate import captions_of, confidence_of
-from motet.cli.options import bundle_option, noted, session_options
-from motet.cli.writing import Output, out_option, size, write_options
+from motet.cli.options import bundle_option, json_option, noted, seed_option, session_options
+from motet.cli.writing import Output, out_option, say_written, write_options
 from motet.composition.compose import compose as composition_of
 from motet.composition.plans import parse_plan, read_plan
 from motet.generate.model import CodesModel
@@ -20,11 +20,11 @@ from motet.models.load import load_as
 @click.argument("plan", metavar="PLAN")
 @out_option
 @bundle_option("generate")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of what is drawn.")
+@seed_option("Seed of what is drawn.")
 @click.option("--strict", is_flag=True, help="Fail on a prompt that the model knows only in part.")
 @write_options
 @session_options
-@click.option("--json", "as_json", is_flag=True, help="Print an object with the passages and what was met.")
+@json_option("Print an object with the passages and what was met.")
 def compose(
     plan: str,
     out: Path,
@@ -55,7 +55,7 @@ def compose(
     if as_json:
         click.echo(json.dumps({**facts, "passages": passages, "met": met}))
         return
-    click.echo(f"{out}: {size(len(motion), motion.fps)}")
+    say_written(out, motion)
     for passage in composed.passages:
         action = f"{passage.action}{confidence_of(vars(passage))}"
         click.echo(f"  {passage.start:.1f}-{passage.stop:.1f} s {passage.text} (as: {action})")

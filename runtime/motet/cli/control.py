@@ -9,7 +9,7 @@ import click
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import bundle_option, clips_option, naming, noted, session_options, steered
 from motet.cli.reading import Read, read_options
-from motet.cli.writing import Output, out_option, size, write_options
+from motet.cli.writing import Output, out_option, say_written, write_options
 from motet.errors import ControlError
 from motet.formats import names_motion
 from motet.generate.base import GenerateModel
@@ -78,4 +78,4 @@ def control(
     motion = output.shaped(motion)
     output.save(out, motion, script, captions)
     output.finish()
-    click.echo(f"{out}: {size(len(motion), motion.fps)}")
+    say_written(out, motion)

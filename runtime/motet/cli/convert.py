@@ -20,6 +20,7 @@ from motet.corpus.sources import Source, files_of
 from motet.figures.feet.hold import hold_feet as feet_held
 from motet.figures.feet.treadmill import with_travel
 from motet.figures.humanoid import read_map, to_humanoid
+from motet.files import Json
 from motet.formats import READS, WRITES, write_motion
 from motet.motion.kinematics import skeleton_of
 from motet.motion.looping import looped
@@ -103,7 +104,7 @@ class Convert(Verb):
     output: Output
     changes: Changes
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Json:
         """Also what is done."""
         figure = hashlib.sha256(pickle.dumps(self.output.character)).hexdigest()
         output = {"fps": self.output.fps, "in_place": self.output.in_place, "figure": figure}

@@ -1,17 +1,17 @@
 """``motet describe``: sentences for motion files."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import click
 
 from motet.bundle.graph import SessionOptions
 from motet.cli.many import Many, many_options, print_list
-from motet.cli.options import bundle_option, session_options
+from motet.cli.options import bundle_option, json_option, seed_option, session_options
 from motet.cli.reading import read_options
 from motet.corpus.answers import Answer, Describe, Timeline, to_json
+from motet.files import Json
 from motet.formats import READS
 from motet.models.nearest_neighbour import NOTHING
 
@@ -35,12 +35,12 @@ from motet.models.nearest_neighbour import NOTHING
     type=click.IntRange(0, 1000),
     help="Samples for consensus (MBR) decoding; 0: beam search. [default: the bundle's; of describe: beam search]",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the samples.")
+@seed_option("Seed of the samples.")
 @click.option("--timeline", is_flag=True, help="One sentence for each part of a motion, with its times.")
 @session_options
 @read_options
 @many_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list: each window or part with its input and seconds.")
+@json_option("Print a list: each window or part with its input and seconds.")
 def describe(
     motions: tuple[Path, ...],
     bundle: str,
@@ -87,6 +87,6 @@ def _told_of(answer: Answer, several: bool) -> Iterator[str]:
             yield f"{hypothesis['score']:8.2f}  {_told(hypothesis)}"
 
 
-def _told(hypothesis: Mapping[str, Any]) -> str:
+def _told(hypothesis: Json) -> str:
     sure = hypothesis["confident"] or hypothesis["text"] == NOTHING
     return str(hypothesis["text"]) if sure else f"? {hypothesis['text']}"

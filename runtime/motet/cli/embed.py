@@ -3,14 +3,13 @@
 import io
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 
 from motet.bundle.graph import Floats, SessionOptions
 from motet.cli.many import Many, many_options
-from motet.cli.options import noted, session_options
+from motet.cli.options import json_option, noted, session_options
 from motet.cli.reading import read_options
 from motet.corpus.answers import Embed
 from motet.files import check_place, write_whole
@@ -26,7 +25,7 @@ from motet.models.load import load_as
 @session_options
 @read_options
 @many_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with the input of each row.")
+@json_option("Print a list with the input of each row.")
 def embed(
     motions: tuple[Path, ...],
     texts: tuple[str, ...],
@@ -51,7 +50,7 @@ def embed(
         raise click.UsageError("context vectors are written as .npy: give -o VECTORS.npy")
     check_place(out)
     tries = many.tries
-    rows = list[dict[str, Any]]()
+    rows = []
     if motions:
         for answer in many.answers(verb, many.sources(motions), "embedding"):
             rows += answer.rows

@@ -9,7 +9,7 @@ import click
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import Tries, bundle_option, naming, session_options, warned
 from motet.cli.reading import Read, read_options
-from motet.cli.writing import Output, out_option, places, size, spare, write_options
+from motet.cli.writing import Output, out_option, places, say_written, spare, write_options
 from motet.errors import quoted
 from motet.models.load import load_as
 from motet.predict.fill import JOIN_SECONDS, LOOP_SECONDS, FillModel, Gap
@@ -83,7 +83,7 @@ def fill(
                 result = model.fill(motion, gaps)
                 filled = gaps
             result = output.write(place, result, source.title, _filled(filled))
-            click.echo(f"{place}: {size(len(result), result.fps)}")
+            say_written(place, result)
     output.finish()
     tries.finish()
 
@@ -120,4 +120,4 @@ def join(
     captions = [(0.0, first.stem), (before.duration, "filled"), (joined.duration - after.duration, second.stem)]
     joined = output.write(out, joined, f"{first.stem} {second.stem}", captions)
     output.finish()
-    click.echo(f"{out}: {size(len(joined), joined.fps)}")
+    say_written(out, joined)

@@ -1,7 +1,7 @@
 """``motet generate``: motions from sentences."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -10,8 +10,9 @@ from typing import Any, cast
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, naming, noted, session_options
+from motet.cli.options import Tries, bar, bundle_option, json_option, naming, noted, seed_option, session_options
 from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.files import Json
 from motet.formats import read_motion
 from motet.generate.base import PLAYED, Generated, GenerateModel
 from motet.generate.model import CodesModel, Story
@@ -40,9 +41,7 @@ from motet.text.clauses import Passage
     "--seconds", type=click.FloatRange(0, 600, min_open=True), help="Length for each text. [default: it ends by itself]"
 )
 @click.option("--max-seconds", type=click.FloatRange(0, 600), help="Maximum length in seconds. [default: the bundle's]")
-@click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later texts use seed + 1, ..."
-)
+@seed_option("Seed; later texts use seed + 1, ...")
 @click.option("--no-plant", is_flag=True, help="Skip foot planting: the figure moves as drawn.")
 @click.option("--all", "every", is_flag=True, help="Write all hypotheses, not only the best.")
 @click.option("--story", is_flag=True, help="One motion for all texts, in order.")
@@ -54,7 +53,7 @@ from motet.text.clauses import Passage
 @click.option("--strict", is_flag=True, help="Fail on a text that the model knows only in part.")
 @write_options
 @session_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with input and hypotheses of each text.")
+@json_option("Print a list with input and hypotheses of each text.")
 def generate(
     texts: tuple[str, ...],
     out: Path,
@@ -146,9 +145,7 @@ def _stories(
     return stories
 
 
-def _written(
-    text: str, results: Iterable[tuple[Generated, Path]], plant: bool, loop: bool, output: Output
-) -> dict[str, Any]:
+def _written(text: str, results: Iterable[tuple[Generated, Path]], plant: bool, loop: bool, output: Output) -> Json:
     """Write the motions of an input; what is said of them."""
     hypotheses = []
     for result, place in results:
@@ -169,7 +166,7 @@ def captions_of(passages: Iterable[Passage]) -> list[tuple[float, str]]:
     return [(passage.start, passage.text) for passage in passages]
 
 
-def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
+def _lines(rows: list[Json]) -> Iterator[str]:
     for row in rows:
         for hypothesis in row["hypotheses"]:
             likelihood = hypothesis["log_likelihood"]
@@ -186,14 +183,14 @@ def _lines(rows: list[dict[str, Any]]) -> Iterator[str]:
                 yield f"  {passage['start']:.1f}-{passage['stop']:.1f} s {passage['text']}{shown}"
 
 
-def confidence_of(shown: Mapping[str, Any]) -> str:
+def confidence_of(shown: Json) -> str:
     """How sure the model is of what it shows, and the words that are left out."""
     without = ", ".join(f"'{word}'" for word in shown["lacking"])
     sure = "" if shown["confidence"] is None else f", confidence {shown['confidence']:.2f}"
     return sure + (without and f", without {without}")
 
 
-def _numbers(hypothesis: Mapping[str, Any]) -> str:
+def _numbers(hypothesis: Json) -> str:
     """What was requested in numbers beside what was measured: "requested: 3 steps: 3 shown"."""
     shown = {kind: f": {value:.3g} shown" for kind, value in hypothesis["measured"].items()}
     numbers = ", ".join(f"{value:.3g} {kind}{shown.get(kind, '')}" for kind, value in hypothesis["requested"].items())

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import session_options
+from motet.cli.options import seed_option, session_options
 from motet.cli.reading import Read, read_options
-from motet.cli.writing import Output, out_option, places, size, write_options
+from motet.cli.writing import Output, out_option, places, say_written, write_options
 from motet.keyed import KeyedAct, ours
 from motet.keyed import read as read_acts
 from motet.models.load import load_as
@@ -30,7 +30,7 @@ WALK_SPEED = 1.3
     metavar="MOTION",
     help="Motion below the acts.  [default: a person who stands or walks]",
 )
-@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Seed of times, sizes and counts.")
+@seed_option("Seed of times, sizes and counts.")
 @write_options
 @session_options
 @read_options
@@ -57,7 +57,7 @@ def key(
         bases = dict.fromkeys(chosen, read(over))
     for (name, act), place in zip(chosen.items(), outs, strict=True):
         motion = output.write(place, act.motion(bases[name], seed), name)
-        click.echo(f"{place}: {size(len(motion), motion.fps)}: {name}")
+        say_written(place, motion, f": {name}")
     output.finish()
 
 

@@ -3,7 +3,7 @@ named; and in parts, which other processes and machines write beside this one.""
 
 import functools
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from motet.cli.options import Tries, bar
+from motet.cli.options import Command, Tries, bar
 from motet.cli.reading import Read
 from motet.corpus import parts as corpus_parts
 from motet.corpus import ray_engine
@@ -45,7 +45,7 @@ class Many:
         """The motions of this shard that files, folders, zips and patterns name. every: all clips where nothing says
         which."""
         files = self.shard.of(list(enumerate(files_of(paths))))
-        sources: list[Source] = []
+        sources = []
         for number, file in files:
             for source in self.read.sources([file], every):
                 sources.append(replace(source, number=number))
@@ -84,13 +84,13 @@ class Many:
         self, part: Part, verb: Verb, paths: Sequence[Path], label: str, rest: Sequence[Source]
     ) -> Iterator[Answer]:
         """The answers for a part; OutputError in the end where the corpus is no longer that with which it began."""
-        yield from self.answers(Hashed.of(verb), rest, label)
+        yield from self.answers(Hashed(verb.reading, verb), rest, label)
         if digest(files_of(paths)) != part.about["corpus"]:
             reason = "the files that it is of changed while it was written: remove it, and run the same command again"
             raise OutputError(f"cannot complete {part.path}: {reason} on files that stay")
 
 
-def many_options(command: Callable[..., None]) -> Callable[..., None]:
+def many_options(command: Command) -> Command:
     """Gives a command ``many``, with the ``read`` of :func:`motet.cli.reading.read_options`, which stands above it."""
 
     @jobs_option

@@ -27,13 +27,26 @@ from motet.settings import Progress, silent
 
 log = logging.getLogger("motet")
 
+Command = Callable[..., Any]
+"""What a command does, or what makes options of it."""
 
-def bundle_option(default: str) -> Callable[..., Any]:
+
+def bundle_option(default: str) -> Command:
     """The option ``--bundle`` of a command that has a model by default."""
     return click.option("--bundle", default=default, show_default=True, help="Name or path of a bundle.")
 
 
-def clips_option(command: Callable[..., Any]) -> Callable[..., Any]:
+def seed_option(help_text: str) -> Command:
+    """The option ``--seed`` of a command."""
+    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=help_text)
+
+
+def json_option(help_text: str) -> Command:
+    """The flag ``--json`` of a command, which gets it as ``as_json``."""
+    return click.option("--json", "as_json", is_flag=True, help=help_text)
+
+
+def clips_option(command: Command) -> Command:
     """Give a command of steered figures ``--clips``, for :func:`steered`."""
     help_text = "Folder of motion files, named walk_*, run_*, idle_*, to steer a figure by instead of a bundle."
     return click.option("--clips", type=click.Path(path_type=Path), help=help_text)(command)
@@ -48,7 +61,7 @@ def steered(kind: Callable[..., Kind], bundle: str, clips: Path | None, session:
     return cast(Kind, SteerModel.from_clips(clips))
 
 
-def session_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def session_options(command: Command) -> Command:
     """Give a command ``--threads`` and ``--provider``; it gets them as ``session``, a SessionOptions."""
 
     @click.option(

@@ -8,10 +8,11 @@ from typing import Any
 import click
 
 from motet.bundle.graph import SessionOptions
-from motet.cli.options import Tries, bar, bundle_option, session_options
+from motet.cli.options import Tries, bar, bundle_option, json_option, seed_option, session_options
 from motet.cli.reading import Read, read_options
 from motet.cli.writing import Output, out_option, places, size, write_options
 from motet.errors import MotionError
+from motet.files import Json
 from motet.generate.model import CodesModel
 from motet.models.load import load_as
 from motet.motion.motion import Motion
@@ -28,9 +29,7 @@ from motet.predict.model import MAX_SAMPLES, PredictModel
 @click.option(
     "--samples", type=click.IntRange(1, MAX_SAMPLES), help="Number of different futures to write for each motion."
 )
-@click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed; later samples use seed + 1, ..."
-)
+@seed_option("Seed; later samples use seed + 1, ...")
 @click.option(
     "--beyond",
     default="generate",
@@ -41,7 +40,7 @@ from motet.predict.model import MAX_SAMPLES, PredictModel
 @write_options
 @session_options
 @read_options
-@click.option("--json", "as_json", is_flag=True, help="Print a list with input and samples of each motion.")
+@json_option("Print a list with input and samples of each motion.")
 def predict(
     sources: tuple[Path, ...],
     out: Path,
@@ -120,7 +119,7 @@ def _futures(
 
 def _written(
     futures: Sequence[Motion], outs: Sequence[Path], name: str, output: Output, frames: int, seed: int
-) -> dict[str, Any]:
+) -> Json:
     """Write the futures of a motion; what is said of them."""
     start = (len(futures[0]) - frames) / futures[0].fps
     captions = [(0.0, "given"), (start, "predicted")] if start > 0 else [(0.0, "predicted")]
@@ -130,7 +129,7 @@ def _written(
     return {**facts, "samples": samples}
 
 
-def _lines(row: dict[str, Any], append: bool) -> Iterator[str]:
+def _lines(row: Json, append: bool) -> Iterator[str]:
     start = row["start"]
     joint = f", predicted from {start / row['fps']:.3g} s on (frame {start}, counted from 0)" if append else ""
     for sample in row["samples"]:

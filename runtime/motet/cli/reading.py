@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from motet.cli.options import Command
 from motet.corpus.sources import Source, sources_of
 from motet.formats import FORMATS
 from motet.formats.text import FRAME_RATES
@@ -49,7 +50,7 @@ class Read:
     def sources(self, paths: Sequence[Path], every: bool = False) -> list[Source]:
         """The motions of files, as ``--clip``, ``--figure`` or their own names (a.glb#Walk) select them. every: all
         clips where nothing does."""
-        sources: list[Source] = []
+        sources = []
         for path in paths:
             sources += sources_of(path, self.clip, self.figure, every)
         return sources
@@ -68,7 +69,7 @@ unit_option = click.option(
 )
 
 
-def read_options(command: Callable[..., None]) -> Callable[..., None]:
+def read_options(command: Command) -> Command:
     """Gives a command ``read``, which reads a motion file as the options of :func:`motet.read` say."""
 
     def takers(option: str) -> str:

@@ -10,7 +10,7 @@ import click
 
 from motet.bundle.graph import SessionOptions
 from motet.cli.many import jobs_option
-from motet.cli.options import bar, bundle_option, noted, session_options, warned
+from motet.cli.options import bar, bundle_option, json_option, noted, session_options, warned
 from motet.cli.reading import unit_option
 from motet.errors import FormatError, TextWarning, collected
 from motet.formats import names_motion, read_motion
@@ -39,9 +39,7 @@ def _indexes(folder: Path) -> list[Path]:
 @unit_option
 @jobs_option
 @session_options
-@click.option(
-    "--json", "as_json", is_flag=True, help="Print a list with path, clip, times, score, in_place and like of each."
-)
+@json_option("Print a list with path, clip, times, score, in_place and like of each.")
 def search(
     query: str,
     folder: Path,
@@ -64,7 +62,7 @@ def search(
     if shard is not None and file is None:
         raise click.UsageError("--shard writes an index of a part: give --index FILE")
     part = None if shard is None else Shard.parse(shard)
-    parts: list[Path] = []
+    parts = []
     for path in merge:
         parts += _indexes(path)
     model = load_as(SearchModel, bundle, session)

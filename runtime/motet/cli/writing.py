@@ -2,31 +2,31 @@
 
 import functools
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import click
 
+from motet.cli.options import Command
 from motet.cli.reading import FRAME_RATE
 from motet.corpus.sources import Source
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
 from motet.figures.humanoid import RIGS
-from motet.figures.root_motion import in_place
 from motet.formats import (
     BODIES,
     ONTO,
     WRITABLE,
     Character,
     check_writable,
-    put_onto,
     read_character,
+    shaped,
     write_all_on,
     write_on,
 )
-from motet.formats.text import Names
+from motet.formats.text import UniqueNames
 from motet.motion.motion import Motion
 
 
@@ -51,9 +51,7 @@ class Output:
 
     def shaped(self, motion: Motion) -> Motion:
         """The motion as it is to be written."""
-        motion = put_onto(motion, self.character) if self.character else motion
-        motion = motion.resample(self.fps) if self.fps else motion
-        return in_place(motion) if self.in_place else motion
+        return shaped(motion, self.character, self.fps, self.in_place)
 
     def save(self, place: Path, motion: Motion, name: str, captions: Captions | None = None) -> None:
         """Write a motion that is shaped, or keep it for :meth:`finish` as a clip of this name, or one like it.
@@ -62,7 +60,7 @@ class Output:
         """
         if self.onto:
             clips = self._clips.setdefault(place, {})
-            clips[Names(clips).unique(name)] = motion
+            clips[UniqueNames(clips).unique(name)] = motion
         elif place.suffix.lower() == ".html":
             write_page(place, motion, captions, name)
         else:
@@ -86,7 +84,7 @@ out_option = click.option(
 )
 
 
-def write_options(command: Callable[..., None]) -> Callable[..., None]:
+def write_options(command: Command) -> Command:
     """Gives a command ``output``, as ``--like``, ``--onto``, ``--fps`` and ``--in-place`` say; a character is read at
     once. The command calls its :meth:`Output.finish` in the end."""
 
@@ -129,6 +127,11 @@ def _spare(place: Path, sources: Collection[Path]) -> None:
         raise click.UsageError(f"{place} is an input and would be overwritten: name another file for the result")
 
 
+def say_written(place: Path, motion: Motion, note: str = "") -> None:
+    """Print where a motion was written, how long it is, and a note."""
+    click.echo(f"{place}: {size(len(motion), motion.fps)}{note}")
+
+
 def size(frames: int, fps: float) -> str:
     """How long a motion is, in words."""
     return f"{frames} frames at {fps:g} fps, {round(frames / fps, 2):g} s"
@@ -162,7 +165,7 @@ def places(out: Path, sources: Sequence[Source | str], samples: int = 1, output:
     output: how they are written; a character takes all that go to one place.
     """
     onto = output is not None and output.onto is not None
-    targets: list[Path] = []
+    targets = []
     if onto:
         for source in sources:
             targets += [_named(out, source)] * samples

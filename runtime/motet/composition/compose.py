@@ -43,17 +43,9 @@ KEY_POSE_SECONDS = 0.5
 DRIFT = 0.5
 """Largest invisible correction of an unsteered motion, m/s."""
 
-DRAWS = 4
-"""The most times that an unsteered motion is drawn."""
-
-GROUND_PLANE = np.array([1.0, np.nan, 1.0])
-"""Multiplies a place: x and z stay, and the height is free."""
 
 GROUND = [0, 2]
 """The axes of the ground in a place."""
-
-BURIED = 0.05
-"""Metres that a pose may be under the ground, where soles are thinner than the humanoid's."""
 
 
 What = Literal["place", "facing", "pose"]
@@ -220,7 +212,7 @@ class _Drawing:
         """The motion of prompts, and when each is shown: walks one by one, and all between two walks as one story."""
         fps = self.model.fps
         motion: Motion | None = None
-        passages: list[Passage] = []
+        passages = []
         # a walk alone, or neighbouring prompts together
         for _, run in groupby(parts, lambda part: part.start if part.walk else -1):
             together = list(run)
@@ -243,7 +235,8 @@ class _Drawing:
         model = self.model
         seconds = [(part.stop - part.start) / model.fps for part in parts]
         texts = [part.text for part in parts]
-        for draws_left in reversed(range(DRAWS)):
+        # at most four times
+        for draws_left in reversed(range(4)):
             story = model.story(texts, seconds=seconds, after=before, seed=seed, strict=self.strict)
             try:
                 new = model.contract.motion(story.frames, after=before, plant=False)
@@ -278,7 +271,8 @@ def _moves(motion: Motion) -> Moves:
 def _led_to(moves: Moves, leg: Leg, last: int, at: int, fps: float, text: str) -> Moves:
     """Moves of a text that are led from where they are at one frame to the place of a leg at another."""
     start = moves.root[last]
-    here = {last: Key(place=start * GROUND_PLANE, facing=moves.facing[last])}
+    # x and z stay, and the height is free
+    here = {last: Key(place=start * np.array([1.0, np.nan, 1.0]), facing=moves.facing[last])}
     # The way over the ground that the motion goes, and the way to the place; NaN without one.
     place = np.full(3, np.nan)
     if leg.place is not None:
@@ -348,7 +342,8 @@ def _pose(moment: Moment) -> Array:
     rotations, positions_of_joints = global_transforms(pose)
     soles = sole_points(rotations, positions_of_joints)
     low = min(float(positions_of_joints[..., 1].min()), float(soles[..., 1].min()))
-    if low < -BURIED:
+    # soles may be thinner than the humanoid's
+    if low < -0.05:
         raise MotionError(f"the pose of {moment.at:g} s is {-100 * low:.0f} cm under the ground")
     return placed(pose)
 
@@ -402,5 +397,4 @@ def _joints(frames: Array, like: Motion) -> Array:
     """Places (T, J, 3) of the joints of placed frames (T, E), each frame seen from where it is, without tips."""
     seen = seen_from(frames[:, None], pose_of(frames))[:, 0]
     joints = [HUMANOID.index(name) for name in BONES]
-    places: Array = positions(unplaced(seen, like))[:, joints]
-    return places
+    return positions(unplaced(seen, like))[:, joints]

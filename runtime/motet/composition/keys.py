@@ -114,8 +114,7 @@ class Moves:
 def _turned(rotations: Array, keys: Mapping[int, Array], reach: int) -> Array:
     """Rotations (T, 3, 3) of a joint that pass through those of keys, each (3, 3), by frame."""
     differences = {frame: rotmat_to_rotvec(key @ rotations[frame].T) for frame, key in keys.items()}
-    turned: Array = product(rotvec_to_rotmat(_swell(differences, len(rotations), reach)), rotations)
-    return turned
+    return product(rotvec_to_rotmat(_swell(differences, len(rotations), reach)), rotations)
 
 
 def _evenly(values: Mapping[int, float], count: int, wraps: bool = True) -> Array:
@@ -125,8 +124,7 @@ def _evenly(values: Mapping[int, float], count: int, wraps: bool = True) -> Arra
     if not finite:
         return np.zeros(count)
     heights = list(finite.values())
-    evenly: Array = np.interp(np.arange(count), list(finite), np.unwrap(heights) if wraps else heights)
-    return evenly
+    return np.interp(np.arange(count), list(finite), np.unwrap(heights) if wraps else heights)
 
 
 def _swell(values: Mapping[int, Array], count: int, reach: int) -> Array:

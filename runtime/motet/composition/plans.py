@@ -21,8 +21,6 @@ from motet.settings import is_number
 LONGEST_COMPOSITION = 600.0
 """Seconds of a composition."""
 
-FARTHEST_PLACE = 1000.0
-"""Metres from its start, and degrees."""
 
 SHORTEST_PROMPT = 0.3
 """Seconds of a prompt."""
@@ -83,7 +81,7 @@ class Moment:
 
 
 def _near(value: object) -> bool:
-    return is_number(value) and abs(float(value)) <= FARTHEST_PLACE  # type: ignore[arg-type]  # a number it is
+    return is_number(value) and abs(float(value)) <= 1000.0  # type: ignore[arg-type]  # a number it is
 
 
 def read_plan(path: str | Path, read: Reader = read_motion) -> list[Moment]:

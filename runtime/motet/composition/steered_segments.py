@@ -37,20 +37,10 @@ GOAL = re.compile(r"\b(to|towards?|into|past|around|across|along)\s+(a|an|the|hi
 
 BACKWARD_STEMS = {stem("backward"), stem("backwards")}
 
-STOPPING_SECONDS = 0.5
-"""Seconds in which a figure stops."""
-
-QUARTER_TURN_SECONDS = 0.8
-"""Seconds in which a standing figure turns by 90 degrees."""
 
 START = 0.3
 """Seconds until a standing figure is on its way."""
 
-HURRIED = 0.5
-"""Share of the time to stop and turn that is needed at least."""
-
-PASSING_ANGLE = math.radians(30)
-"""A figure walks on through a place if its facing there is no farther from its way."""
 
 ARRIVAL_DISTANCE = 0.05
 """Metres within which a figure is at a place."""
@@ -169,9 +159,11 @@ def _pause(walk: Walk, leg: Leg, way: float) -> float:
     """Seconds that a figure stands at a place: before another act, and to turn; it walks through all others."""
     ahead = way + math.pi * walk.gait.back
     turn = 0.0 if leg.facing is None else abs(float(wrapped(np.array(leg.facing - ahead))))
-    turn = turn if turn > PASSING_ANGLE else 0.0
+    # it walks on through a place if its facing there is within 30 degrees of its way
+    turn = turn if turn > math.radians(30) else 0.0
     stands = walk.halts and leg is walk.legs[-1]
-    return STOPPING_SECONDS * (stands or turn > 0) + QUARTER_TURN_SECONDS * turn / (math.pi / 2)
+    # a figure stops in half a second, and turns by a quarter, standing, in 0.8 s
+    return 0.5 * (stands or turn > 0) + 0.8 * turn / (math.pi / 2)
 
 
 def _check(walk: Walk, ground: Array, fps: float) -> None:
@@ -186,7 +178,8 @@ def _check(walk: Walk, ground: Array, fps: float) -> None:
         far = float(np.hypot(*gap))
         then = (leg.frame + 1) / fps
         starting = START * min(1.0, then - now) if leg is walk.legs[0] else 0.0
-        pause = HURRIED * _pause(walk, leg, float(np.arctan2(*gap)))
+        # half of the time to stop and turn is needed at least
+        pause = 0.5 * _pause(walk, leg, float(np.arctan2(*gap)))
         need = far / walk.gait.high + pause + starting
         if far > ARRIVAL_DISTANCE and need > then - now:
             raise MotionError(

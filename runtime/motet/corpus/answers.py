@@ -18,9 +18,11 @@ from motet.corpus import checked
 from motet.corpus.checked import Checked
 from motet.corpus.sources import Source, opened
 from motet.errors import MotetError, TravelWarning, UnitError, collected, each_once
+from motet.files import Json
 from motet.models.describe import DescribeModel
 from motet.models.load import load_as
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Names
 
 Kind = TypeVar("Kind")
 _Window = tuple["Answer", float, float, Motion]
@@ -36,14 +38,14 @@ class Answer:
     source: Source
     rows: list[Any] = field(default_factory=list)
     error: str = ""
-    warned: tuple[str, ...] = ()
+    warned: Names = ()
     fps: float | None = None
     hash: str = ""
 
     @property
-    def in_place(self) -> bool:
-        """Whether it is a clip in place, which was given a path."""
-        return bool(self.warned)
+    def about(self) -> Json:
+        """What rows begin with: the motion, and whether it is a clip in place, which was given a path."""
+        return {"input": str(self.source), "in_place": bool(self.warned)}
 
     @contextmanager
     def tried(self) -> Iterator[None]:
@@ -103,7 +105,7 @@ class Verb:
         answer.fps = motion.fps
         return motion
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Json:
         """What its answers depend on but the motions, for JSON."""
         return {"verb": type(self).__name__, "reading": {k: str(v) for k, v in self.reading.items() if v}}
 
@@ -113,11 +115,6 @@ class Hashed(Verb):
     """Another verb's answers, with the hashes of the files."""
 
     verb: Verb
-
-    @staticmethod
-    def of(verb: Verb) -> "Hashed":
-        """That of a verb."""
-        return Hashed(verb.reading, verb)
 
     @property
     def most(self) -> int:
@@ -150,10 +147,10 @@ class OfModel(Verb, Generic[Kind]):
         """The model."""
         return cast(Kind, load_as(self.MODEL, self.bundle, self.session))
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> Json:
         return {name: value for name, value in vars(self).items() if name != "model"}
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Json:
         """Also the bundle's identity."""
         return {**super().about(), "bundle": Bundle.open(self.bundle).manifest.identity}
 
@@ -169,7 +166,7 @@ class Describe(OfModel[DescribeModel]):
     def __call__(self, sources: Sequence[Source]) -> list[Answer]:
         """The answers, in order; a row for each window, with input, in_place, start, stop and hypotheses."""
         answers = list(map(Answer, sources))
-        windows = list[_Window]()
+        windows = []
         for answer in answers:
             with answer.tried():
                 cut = self.model.windows(self.read(answer))
@@ -184,10 +181,10 @@ class Describe(OfModel[DescribeModel]):
         """Describe windows, each a row of its answer."""
         hypotheses = self.model.describe([part for *_, part in windows], **self.settings)
         for (answer, start, seconds, _), descriptions in zip(windows, hypotheses, strict=True):
-            about = {"input": str(answer.source), "in_place": answer.in_place, "start": start, "stop": start + seconds}
-            answer.rows.append({**about, "hypotheses": [description.to_json() for description in descriptions]})
+            row = {**answer.about, "start": start, "stop": start + seconds}
+            answer.rows.append({**row, "hypotheses": [description.to_json() for description in descriptions]})
 
-    def about(self) -> dict[str, Any]:
+    def about(self) -> Json:
         """Also the settings."""
         return {**super().about(), "settings": dict(self.settings)}
 
@@ -211,8 +208,7 @@ class Timeline(OfModel[DescribeModel]):
     def alone(self, source: Source) -> Answer:
         """The answer of one motion."""
         answer = super().alone(source)
-        about = {"input": str(source), "in_place": answer.in_place}
-        answer.rows = [{**about, **row} for row in answer.rows]
+        answer.rows = [{**answer.about, **row} for row in answer.rows]
         return answer
 
 
@@ -231,7 +227,7 @@ class Embed(OfModel[DescribeModel]):
             with answer.tried():
                 motions.append((answer, self.model.prepared(self.read(answer))))
         for (answer, _), vector in zip(motions, self.model.embed([motion for _, motion in motions]), strict=True):
-            answer.rows = [{"input": str(answer.source), "in_place": answer.in_place, "vector": vector}]
+            answer.rows = [{**answer.about, "vector": vector}]
         return answers
 
 

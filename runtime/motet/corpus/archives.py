@@ -31,7 +31,6 @@ ARCHIVE_ERRORS = (
     OSError,
     EOFError,
     RuntimeError,
-    NotImplementedError,
     ValueError,
 )
 """What reading a damaged, encrypted or strangely packed file raises."""

@@ -19,11 +19,12 @@ from motet.figures.humanoid import (
     to_humanoid,
     with_figure,
 )
-from motet.files import place_of
+from motet.files import Json, place_of
 from motet.formats import contents_of, read_motion, split_part
 from motet.formats.text import Clip, Figure, choice
 from motet.motion.kinematics import global_transforms, heading, positions
 from motet.motion.motion import Motion
+from motet.motion.skeleton import Names
 
 
 @dataclass(frozen=True)
@@ -50,9 +51,9 @@ class Checked:
 
     file: str
     clip: str | None
-    clips: tuple[str, ...]
+    clips: Names
     figure: str | None
-    figures: tuple[str, ...]
+    figures: Names
     frames: int
     fps: float
     joints: int
@@ -66,8 +67,8 @@ class Checked:
     lowest: float | None = None
     travel: float | None = None
     strides: bool = False
-    notes: tuple[str, ...] = ()
-    bones: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    notes: Names = ()
+    bones: Mapping[str, Names] = field(default_factory=dict)
 
     @property
     def seconds(self) -> float:
@@ -84,7 +85,7 @@ class Checked:
         """Whether the figure hardly leaves its place."""
         return self.travel is not None and self.travel < 0.3  # metres
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """All fields, and :attr:`seconds`, :attr:`sure` and :attr:`in_place`."""
         return {**asdict(self), "seconds": self.seconds, "sure": self.sure, "in_place": self.in_place}
 

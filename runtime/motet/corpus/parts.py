@@ -12,7 +12,7 @@ import heapq
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -24,7 +24,8 @@ import numpy as np
 from motet.corpus.answers import Answer, to_json
 from motet.corpus.sources import Source, size_of
 from motet.errors import FormatError, OutputError
-from motet.files import replacing
+from motet.files import Json, replacing
+from motet.formats.text import ContentError, naming
 from motet.jobs import Shard
 
 if sys.platform != "win32":
@@ -33,8 +34,6 @@ if sys.platform != "win32":
 MOST_ITEMS = 10**9
 """Files and answers that a part may say it is of."""
 
-LARGEST_ELEMENT = 3e38
-"""Of a number of a vector: more is none in float32."""
 
 LONGEST_LINE = 64 << 20
 """Bytes of a line that is read: of a thousand times the rows that any answer has."""
@@ -56,7 +55,7 @@ class Part:
     """A part in a folder, with what its answers depend on, among it the verb and the shard."""
 
     folder: Path
-    about: Mapping[str, Any]
+    about: Json
 
     @property
     def path(self) -> Path:
@@ -106,11 +105,13 @@ class Part:
             _append(file, json.dumps({**self.about, "answers": len(sources)}))
             return 0
         # the part is of the same work
-        self._check(_checked_head(lines[0], path), path)
+        with naming(path):
+            self._check(_checked_head(lines[0]), path)
         # and each answer is that of its motion
         kept = lines[1:]
         for number, (line, source) in enumerate(zip(kept, sources, strict=False), start=2):
-            answer = _checked_answer(line, path, number)
+            with naming(path):
+                answer = _checked_answer(line, number)
             if (answer["file"], answer["input"]) != (source.number, str(source)):
                 raise OutputError(
                     f"cannot go on with {path}, line {number}: expected the answer of {source}: remove it"
@@ -119,7 +120,7 @@ class Part:
             raise OutputError(f"cannot go on with {path}: it has more answers than there are motions: remove it")
         return len(kept)
 
-    def _check(self, head: dict[str, Any], path: Path) -> None:
+    def _check(self, head: Json, path: Path) -> None:
         if different := _different(self.about, {key: value for key, value in head.items() if key != "answers"}):
             reason = f"it was begun with another {different}: remove it, or name another folder"
             raise OutputError(f"cannot go on with {path}: {reason}")
@@ -154,7 +155,7 @@ def _locked(path: Path) -> Iterator[Any]:
         yield file
 
 
-def _different(row: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+def _different(row: Json, other: Json) -> str:
     """What two parts differ in, by name."""
     return ", ".join(sorted(key for key in {*row, *other} if row.get(key) != other.get(key)))
 
@@ -189,7 +190,7 @@ def _complete(folders: Sequence[Path]) -> list[Path]:
 
 def _part_files(folders: Sequence[Path]) -> list[Path]:
     """The files of parts, of folders all in them."""
-    paths: list[Path] = []
+    paths = []
     for path in folders:
         paths += sorted(path.glob("*.jsonl*")) if path.is_dir() else [path]
     if not paths:
@@ -200,7 +201,7 @@ def _part_files(folders: Sequence[Path]) -> list[Path]:
 def _by_shard(paths: Sequence[Path]) -> dict[str, Path]:
     """Complete parts that were made alike, by their shards."""
     by_shard: dict[str, Path] = {}
-    first: dict[str, Any] = {}
+    first: Json = {}
     for path in paths:
         about = _head(path)
         if path.suffix == ".partial":
@@ -217,17 +218,17 @@ def _by_shard(paths: Sequence[Path]) -> dict[str, Path]:
     return by_shard
 
 
-def _head(path: Path) -> dict[str, Any]:
+def _head(path: Path) -> Json:
     """What a part's answers depend on, the shard and their number; FormatError where it is no part."""
     try:
-        with path.open("rb") as file:
-            return _checked_head(file.readline(LONGEST_LINE), path)
+        with naming(path), path.open("rb") as file:
+            return _checked_head(file.readline(LONGEST_LINE))
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror or error}") from error
 
 
-def _checked_head(line: bytes, path: Path) -> dict[str, Any]:
-    head = _parsed(line, path, 1)
+def _checked_head(line: bytes) -> Json:
+    head = _parsed(line, 1)
     numbers = [head.get(name) for name in ("files", "answers")]
     counted = all(type(number) is int and 0 <= number <= MOST_ITEMS for number in numbers)
     try:
@@ -235,13 +236,13 @@ def _checked_head(line: bytes, path: Path) -> dict[str, Any]:
             raise ValueError("it does not say its verb, and how many files and answers it is of")
         Shard.parse(str(head.get("shard")))
     except ValueError as error:
-        raise FormatError(path, f"not a part of a corpus's answers: {error}", 1) from error
+        raise ContentError(f"not a part of a corpus's answers: {error}", 1) from error
     return head
 
 
-def _checked_answer(line: bytes, path: Path, number: int) -> dict[str, Any]:
+def _checked_answer(line: bytes, number: int) -> Json:
     """The answer of a line; FormatError for one that is cut or no answer."""
-    answer = _parsed(line, path, number)
+    answer = _parsed(line, number)
     rows = answer.get("rows")
     error = answer.get("error")
     if (
@@ -252,73 +253,72 @@ def _checked_answer(line: bytes, path: Path, number: int) -> dict[str, Any]:
         or not (error is None or isinstance(error, str))
         or not (isinstance(rows, list) and all(isinstance(row, dict) for row in rows))
     ):
-        raise FormatError(path, "expected an answer: file, input, hash, error and rows", number)
+        raise ContentError("expected an answer: file, input, hash, error and rows", number)
     return answer
 
 
-def _parsed(line: bytes, path: Path, number: int) -> dict[str, Any]:
+def _parsed(line: bytes, number: int) -> Json:
     if not line.endswith(b"\n"):
         reason = "the line is cut" if len(line) < LONGEST_LINE else f"the line has more than {LONGEST_LINE} bytes"
-        raise FormatError(path, f"not a part of a corpus's answers: {reason}", number)
+        raise ContentError(f"not a part of a corpus's answers: {reason}", number)
     try:
         parsed = json.loads(line.decode())  # as UTF-8: json would take other encodings, too
     except (ValueError, RecursionError) as error:
-        raise FormatError(path, f"not a part of a corpus's answers: {error}", number) from error
+        raise ContentError(f"not a part of a corpus's answers: {error}", number) from error
     if not isinstance(parsed, dict):
-        raise FormatError(path, "not a part of a corpus's answers: expected a JSON object", number)
+        raise ContentError("not a part of a corpus's answers: expected a JSON object", number)
     return parsed
 
 
 class _Order:
     """Which answers a part is to have: of each of its shard's files, in order, as many in all as its head says."""
 
-    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+    def __init__(self, head: Json) -> None:
         shard = Shard.parse(head["shard"])
-        self.path = path
         self.files = range(shard.number - 1, head["files"], shard.count)
         self.count = head["answers"]
         self.begun = 0  # files
         self.inputs: set[str] = set()  # of the last of them
         self.line = 1
 
-    def take(self, answer: Mapping[str, Any]) -> None:
+    def take(self, answer: Json) -> None:
         """The next answer: of another clip of the same file, or of the next file. FormatError for any other."""
         self.line += 1
         file = answer["file"]
         name = answer["input"]
         if self.begun and file == self.files[self.begun - 1]:
             if name in self.inputs:
-                raise FormatError(self.path, f"the answer of {name} is there twice", self.line)
+                raise ContentError(f"the answer of {name} is there twice", self.line)
         elif self.begun < len(self.files) and file == self.files[self.begun]:
             self.begun += 1
             self.inputs.clear()
         else:
             wanted = self.files[self.begun] if self.begun < len(self.files) else "no more"
-            raise FormatError(self.path, f"expected the answer of file {wanted}, not of {file}", self.line)
+            raise ContentError(f"expected the answer of file {wanted}, not of {file}", self.line)
         self.inputs.add(name)
 
     def end(self) -> None:
         """FormatError where answers are missing."""
         if self.begun < len(self.files):
             reason = f"the answer of file {self.files[self.begun]} is missing: run the command again"
-            raise FormatError(self.path, reason, self.line + 1)
+            raise ContentError(reason, self.line + 1)
         if self.line - 1 != self.count:
             reason = f"it has {self.line - 1} answers instead of {self.count}: run the command again"
-            raise FormatError(self.path, reason, self.line)
+            raise ContentError(reason, self.line)
 
 
-def _answers(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+def _answers(path: Path) -> Iterator[tuple[str, Json]]:
     """The answers of a part, with their lines. FormatError where one is cut, twice, missing or out of order."""
-    with path.open("rb") as file:
-        order = _Order(path, _checked_head(file.readline(LONGEST_LINE), path))
+    with naming(path), path.open("rb") as file:
+        order = _Order(_checked_head(file.readline(LONGEST_LINE)))
         while line := file.readline(LONGEST_LINE):
-            answer = _checked_answer(line, path, order.line + 1)
+            answer = _checked_answer(line, order.line + 1)
             order.take(answer)
             yield line.decode(), answer
-    order.end()
+        order.end()
 
 
-def _in_order(parts: Sequence[Path]) -> Iterator[tuple[str, dict[str, Any]]]:
+def _in_order(parts: Sequence[Path]) -> Iterator[tuple[str, Json]]:
     """The answers of all parts in the order of their files, one of each in memory."""
     return heapq.merge(*map(_answers, parts), key=lambda pair: int(pair[1]["file"]))
 
@@ -360,7 +360,8 @@ def _write_vectors(parts: Sequence[Path], out: Path) -> int:
     count = 0
     for answer, vector in _vectors(parts):
         first = first or vector
-        numbers = all(isinstance(value, int | float) and abs(value) <= LARGEST_ELEMENT for value in vector)
+        # a larger number is none in float32
+        numbers = all(isinstance(value, int | float) and abs(value) <= 3e38 for value in vector)
         if not numbers or len(vector) != len(first):
             raise FormatError(answer["input"], f"its vector is not of {len(first)} numbers: run its command again")
         count += 1
@@ -373,7 +374,7 @@ def _write_vectors(parts: Sequence[Path], out: Path) -> int:
     return count
 
 
-def _vectors(parts: Sequence[Path]) -> Iterator[tuple[dict[str, Any], list[Any]]]:
+def _vectors(parts: Sequence[Path]) -> Iterator[tuple[Json, list[Any]]]:
     """The vectors of rows that have one, with the answer that each is of."""
     for _, answer in _in_order(parts):
         for row in answer["rows"]:

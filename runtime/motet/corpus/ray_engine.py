@@ -13,6 +13,7 @@ from typing import Any
 from motet.corpus.answers import Answer, Verb
 from motet.corpus.sources import Source
 from motet.errors import MotetError
+from motet.files import Json
 from motet.jobs import cores
 
 
@@ -24,7 +25,7 @@ class Actor:
             os.chdir(folder)
         self.verb: Verb = pickle.loads(verb)
 
-    def __call__(self, batch: dict[str, Any]) -> dict[str, list[bytes]]:
+    def __call__(self, batch: Json) -> dict[str, list[bytes]]:
         """Pickled sources to pickled answers."""
         return {"answer": [pickle.dumps(answer) for answer in self.verb(list(map(pickle.loads, batch["source"])))]}
 

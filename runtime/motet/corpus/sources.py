@@ -15,7 +15,7 @@ from motet.errors import FormatError, MotetError, MotionError
 from motet.files import files_in, place_of
 from motet.formats import OF_FOLDERS, READABLE, contents_of, read_motion, split_part
 from motet.formats.amc import skeleton_for
-from motet.formats.text import MARK, Contents, choice, chosen, plain_names, split_clip
+from motet.formats.text import MARK, Clip, Contents, choice, chosen, plain_names, split_clip
 from motet.motion.motion import Motion
 
 
@@ -54,16 +54,8 @@ class Source:
         forbidden = r'[<>:"/\\|?*#\x00-\x1f]|^[. ]|[. ]$'
         parts = self.contents()
         clip = 1 if self.clip is None and self.figure is None and parts.clips else self.clip
-        try:
-            at, place = choice(self.path, parts, clip, self.figure)
-        except FormatError:  # it is said when the file is read
-            return self.name
-        labels = []
-        if at is not None:
-            labels.append(plain_names(parts.clips, forbidden)[at])
-        if place is not None and len(parts.figures) > 1:
-            labels.append(plain_names(parts.figures, forbidden)[place])
-        return "-".join(labels) or self.name
+        figures = plain_names(parts.figures, forbidden) if len(parts.figures) > 1 else []
+        return self._called(parts, clip, plain_names(parts.clips, forbidden), figures)
 
     @property
     def title(self) -> str:
@@ -71,16 +63,18 @@ class Source:
         if not self.part:
             return self.name
         parts = self.contents()
+        return self._called(parts, self.clip, parts.clips, tuple(parts.figures))
+
+    def _called(self, parts: Contents, clip: Clip, clips: Sequence[str], figures: Sequence[str]) -> str:
+        """The names of a clip and of the figure among those of all, where there are some, else the file's."""
         try:
-            clip, figure = choice(self.path, parts, self.clip, self.figure)
+            clip_index, figure_index = choice(self.path, parts, clip, self.figure)
         except FormatError:  # it is said when the file is read
             return self.name
-        titles = []
-        if clip is not None:
-            titles.append(parts.clips[clip])
-        if figure is not None:
-            titles.append(tuple(parts.figures)[figure])
-        return "-".join(titles)
+        names = [] if clip_index is None else [clips[clip_index]]
+        if figure_index is not None and figures:
+            names.append(figures[figure_index])
+        return "-".join(names) or self.name
 
     def read(self, **options: Any) -> Motion:
         """The motion, with options of :func:`motet.read`; FormatError as there, and for a damaged zip."""
@@ -107,7 +101,7 @@ class Source:
 def files_of(places: Sequence[Path]) -> list[Path]:
     """The motion files that are meant: of folders and zips all in them, of patterns what they match, each in order of
     names. FormatError for a folder, zip or pattern without any."""
-    files: list[Path] = []
+    files = []
     for path in places:
         files += _files(path)
     return files

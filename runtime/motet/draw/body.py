@@ -1,15 +1,17 @@
 """The body that figures of people have in pages, pictures and files: a faceless mannequin, made from its outlines.
 
-Tables give key rings along trunk and head, leg, arm and finger in metres, around the humanoid's joints; half-way
-between them lie smooth ones. Trunk, legs and arms are one closed surface: a leg begins with half of the trunk's lowest
-ring and a bridge through the crotch, an arm with the border of a hole in the trunk. Arms are shaped as they mostly are,
-hanging by SLOPE, and then turned up into the T-pose. Each corner belongs to the joint of its ring at first, from where
-weights even out.
+mannequin.json has tables of key rings along trunk and head, leg, arm and finger in metres, around the humanoid's
+joints; half-way between them lie smooth ones. Trunk, legs and arms are one closed surface: a leg begins with half of
+the trunk's lowest ring and a bridge through the crotch, an arm with the border of a hole in the trunk. Arms are shaped
+as they mostly are, hanging by SLOPE, and then turned up into the T-pose. Each corner belongs to the joint of its ring
+at first, from where weights even out.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +19,9 @@ from numpy.typing import NDArray
 
 from motet.draw.figure import COLOURS
 from motet.draw.mesh import Mesh, patch_triangles, ring, smooth_weights, smoothed
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, T_POSE, sided
-from motet.motion.rotations import Array
-from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
+from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, SIDES, T_POSE, joint_of
+from motet.motion.rotations import Array, Indices, Mask
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Triple
 
 BODY, LEFT_PART, RIGHT_PART, MIDDLE_PART = range(4)
 """Parts that have a colour each: of people the body and the bands at wrist and ankle of either side; of others bones of
@@ -30,88 +32,28 @@ INKS = np.array([(168, 179, 198), COLOURS[LEFT], COLOURS[RIGHT], COLOURS[MIDDLE]
 
 BANDS = {"left": LEFT_PART, "right": RIGHT_PART}
 
-TRUNK_RINGS = (
-    (0.855, 0.086, 0.845, -0.106, 0.174, 0.0),
-    (0.905, 0.090, 0.900, -0.118, 0.174, 0.0),
-    (0.955, 0.096, 0.960, -0.114, 0.168, 0.0),
-    (1.020, 0.095, 1.020, -0.090, 0.149, 0.0),
-    (1.090, 0.092, 1.090, -0.078, 0.133, 0.0),
-    (1.170, 0.098, 1.180, -0.082, 0.137, 0.0),
-    (1.280, 0.114, 1.290, -0.098, 0.153, 0.0),
-    (1.365, 0.104, 1.370, -0.100, 0.160, 0.0),
-    (1.430, 0.072, 1.440, -0.088, 0.150, 0.0),
-    (1.452, 0.052, 1.472, -0.074, 0.098, 0.0),
-    (1.466, 0.046, 1.500, -0.064, 0.064, 0.0),
-    (1.496, 0.046, 1.530, -0.056, 0.054, 0.0),
-    (1.522, 0.058, 1.560, -0.060, 0.053, 0.0),
-    (1.530, 0.098, 1.590, -0.076, 0.060, 0.0),
-    (1.570, 0.107, 1.625, -0.094, 0.071, 0.0),
-    (1.625, 0.108, 1.660, -0.102, 0.078, 0.0),
-    (1.685, 0.096, 1.695, -0.096, 0.075, 0.0),
-    (1.733, 0.060, 1.735, -0.064, 0.051, 0.0),
-    (1.750, 0.012, 1.750, -0.016, 0.012, 0.0),
-)
-"""Of each ring its height and place in front, those behind, half its width, and where its middle is from side to side:
-from the crotch to the crown."""
 
-LEG_RINGS = (
-    (0.775, 0.084, 0.775, -0.090, 0.084, 0.091),
-    (0.640, 0.069, 0.640, -0.069, 0.068, 0.091),
-    (0.540, 0.058, 0.540, -0.052, 0.055, 0.090),
-    (0.470, 0.052, 0.470, -0.054, 0.051, 0.090),
-    (0.360, 0.040, 0.360, -0.070, 0.053, 0.091),
-    (0.210, 0.034, 0.210, -0.050, 0.039, 0.090),
-    (0.110, 0.036, 0.100, -0.046, 0.033, 0.090),
-    (0.088, 0.056, 0.018, -0.064, 0.034, 0.091),
-    (0.072, 0.082, 0.000, -0.030, 0.038, 0.093),
-    (0.054, 0.118, 0.000, 0.060, 0.043, 0.096),
-    (0.030, 0.185, 0.000, 0.175, 0.044, 0.098),
-    (0.016, 0.206, 0.006, 0.206, 0.020, 0.096),
-)
-"""As of the trunk, of the left leg from the thigh to the toes."""
-
-ARM_RINGS = (
-    (0.045, 0.054, -0.046, 0.056, -0.056),
-    (0.110, 0.050, -0.048, 0.052, -0.050),
-    (0.195, 0.044, -0.044, 0.044, -0.046),
-    (0.260, 0.038, -0.039, 0.040, -0.042),
-    (0.310, 0.039, -0.040, 0.043, -0.040),
-    (0.370, 0.038, -0.039, 0.043, -0.039),
-    (0.460, 0.028, -0.028, 0.035, -0.032),
-    (0.530, 0.020, -0.020, 0.029, -0.027),
-    (0.585, 0.014, -0.017, 0.041, -0.037),
-    (0.618, 0.004, -0.007, 0.033, -0.029),
-)
-"""Of each ring of the left arm and palm how far from the shoulder it is, and how far it reaches over the arm's axis,
-under it, in front and behind."""
+OUTLINES = json.loads((files("motet.draw") / "mannequin.json").read_text("utf-8"))
+"""Tables of the body, a row for each ring. "trunk", from the crotch to the crown, and "leg", the left one from the
+thigh to the toes: the height of a ring and its place in front, those behind, half its width, and where its middle is
+from side to side. "arm", the left one with its palm: how far from the shoulder a ring is, and how far it reaches
+over the arm's axis, under it, in front and behind. "fingers": a :class:`Finger` each, the middle one first, the
+thumb last. "phalanges": how far along a finger a ring is, and how much of its radius it has."""
 
 
 class Finger(NamedTuple):
     """Where a finger begins along the arm, over it and in front; its length and radius; and in degrees its turn towards
     the thumb's side, and how much it is curled at first and at each of its joints."""
 
-    start: tuple[float, float, float]
+    start: Triple
     length: float
     radius: float
     aside: float
     curl: tuple[float, float]
 
 
-FINGER_SHAPES = (
-    Finger((0.588, -0.003, 0.011), 0.130, 0.0102, 1.0, (8.0, 14.0)),
-    Finger((0.588, -0.003, 0.030), 0.119, 0.0100, 3.0, (7.0, 12.0)),
-    Finger((0.586, -0.003, -0.009), 0.121, 0.0098, -2.0, (9.0, 16.0)),
-    Finger((0.584, -0.003, -0.027), 0.098, 0.0088, -5.0, (10.0, 18.0)),
-    Finger((0.540, -0.008, 0.014), 0.088, 0.0118, 36.0, (14.0, 5.0)),
-)
-"""The middle one first, the thumb last."""
-
-PHALANGES = ((0.0, 1.0), (0.45, 1.06), (0.74, 0.95), (0.94, 0.74), (1.0, 0.3))
-"""Of each ring of a finger how far along it is, and how much of the radius it has."""
-
 RING_CORNERS = 24
-FINGER_RING_CORNERS = 6
-"""Corners of the trunk's rings, the first in front, and of fingers'. Limbs have 16."""
+"""Corners of the trunk's rings, the first in front. Limbs have 16, fingers 6."""
 
 HOLE_ROW = 12
 HOLE_COLUMNS = (4, 16)
@@ -132,26 +74,16 @@ DOWN_ARM = np.array(
 
 TRUNK_JOINTS = ("hips", "spine", "chest", "upperChest", "neck", "head")
 
-Numbers = NDArray[np.intp]
-
-BAND_AT_ARM = 0.535
-BAND_AT_LEG = 0.12
 BAND = 0.025
-"""Where bands are, from the shoulder on and over the ground, and half of their width."""
-
-COARSE_PATCHES = 5
-"""Of the coarsest body: trunk, legs and arms without fingers."""
-
-SMOOTHING_ROUNDS = 6
-"""How often weights even out between neighbours."""
+"""Half of the width of bands."""
 
 
 class Patch(NamedTuple):
     """Rings (R, C) of numbered corners; which squares (R - 1, C) from a ring to the next are drawn; and whether the
     first ring and the last one are closed."""
 
-    grid: Numbers
-    is_drawn: NDArray[np.bool_]
+    grid: Indices
+    is_drawn: Mask
     closes: tuple[bool, bool]
 
 
@@ -161,7 +93,7 @@ class Limb(NamedTuple):
 
     rings: Array
     bones: NDArray[np.str_]
-    in_band: NDArray[np.bool_]
+    in_band: Mask
 
 
 class Corners:
@@ -172,7 +104,7 @@ class Corners:
         self.bones = np.zeros(0, np.intp)
         self.parts = np.zeros(0, np.intp)
 
-    def add(self, rings: Array, bones: Numbers, parts: Numbers) -> Numbers:
+    def add(self, rings: Array, bones: Indices, parts: Indices) -> Indices:
         """Number rings (R, C, 3), with joints and parts that go with (R, C): their numbers (R, C)."""
         size = rings.shape[:2]
         numbers = len(self.places) + np.arange(size[0] * size[1]).reshape(size)
@@ -191,7 +123,8 @@ def human_mesh(level: int = 0) -> Mesh:
     mesh, patches = _whole()
     places = mesh.places.copy()
     triangles = []
-    for patch in patches[: None if level < 2 else COARSE_PATCHES]:
+    # the coarsest body has trunk, legs and arms without fingers
+    for patch in patches[: None if level < 2 else 5]:
         step = min(2**level, patch.grid.shape[1] // 3)
         kept = patch.grid[:: 2**level, ::step]
         triangles.append(patch_triangles(kept, patch.is_drawn[:: 2**level, ::step], patch.closes))
@@ -216,7 +149,7 @@ def _whole() -> tuple[Mesh, list[Patch]]:
     corners = Corners()
     patches = _patches(corners)
     triangles = np.concatenate([patch_triangles(patch.grid, patch.is_drawn, patch.closes) for patch in patches])
-    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], SMOOTHING_ROUNDS)
+    joints, weights = smooth_weights(corners.bones, [patch.grid for patch in patches], 6)
     return _with_arms_up(Mesh(corners.places, triangles, joints, weights, corners.parts)), patches
 
 
@@ -230,14 +163,15 @@ def _patches(corners: Corners) -> list[Patch]:
         on_side = trunk if side == "left" else trunk[:, -np.arange(RING_CORNERS)]
         patches.append(_limb(corners, leg, side, _hip(on_side)))
         patches.append(_limb(corners, arm, side, _shoulder(on_side)))
-    for finger in map(_finger, FINGER_SHAPES):
+    for shape in OUTLINES["fingers"]:
+        finger = _finger(Finger(**shape))
         patches += [_limb(corners, finger, side) for side in LEFT_RIGHT]
     return patches
 
 
-def _trunk(corners: Corners) -> Numbers:
+def _trunk(corners: Corners) -> Indices:
     """Number the trunk's rings (R, C), and after them a bridge from front to back through the crotch."""
-    rings = smoothed(_spanned(TRUNK_RINGS, *ring(RING_CORNERS, 2.3).T))
+    rings = smoothed(_spanned(OUTLINES["trunk"], *ring(RING_CORNERS, 2.3).T))
     trunk = corners.add(rings, _bones_of_trunk(rings), np.array(BODY))
     front = rings[0, 0]
     bridge = front + BRIDGE[:, :1] * (rings[0, RING_CORNERS // 2] - front) + BRIDGE[:, 1:] * [0.0, 1.0, 0.0]
@@ -245,10 +179,10 @@ def _trunk(corners: Corners) -> Numbers:
     return trunk
 
 
-def _limb(corners: Corners, limb: Limb, side: str, start: Numbers | None = None) -> Patch:
+def _limb(corners: Corners, limb: Limb, side: str, start: Indices | None = None) -> Patch:
     """Number a limb's rings on a side, which go on from a ring of the trunk or are closed."""
     sign = 1 if side == "left" else -1
-    bones = np.array([HUMANOID.index(sided(side, bone)) for bone in limb.bones])[:, None]
+    bones = np.array([joint_of(side, bone) for bone in limb.bones])[:, None]
     parts = np.where(limb.in_band, BANDS[side], BODY)[:, None]
     grid = corners.add(limb.rings * [sign, 1, 1], bones, parts)
     if start is not None:
@@ -259,7 +193,7 @@ def _limb(corners: Corners, limb: Limb, side: str, start: Numbers | None = None)
 
 
 def _spanned(table: Sequence[Sequence[float]], front: Array, left: Array) -> Array:
-    """Rings (R, C, 3) of a table like TRUNK or LEG, from how far each corner (C,) is in front and to the left."""
+    """Rings (R, C, 3) of a table like "trunk" or "leg", from how far each corner (C,) is in front and to the left."""
     front_y, front_z, back_y, back_z, half, middle_x = np.array(table).T[..., None]
     x = middle_x + half * left
     y = (front_y + back_y + (front_y - back_y) * front) / 2
@@ -267,19 +201,19 @@ def _spanned(table: Sequence[Sequence[float]], front: Array, left: Array) -> Arr
     return np.stack([x, y, z], axis=-1)
 
 
-def _bones_of_trunk(rings: Array) -> Numbers:
+def _bones_of_trunk(rings: Array) -> Indices:
     """The joint of each corner (R, C): by its ring's height one of the spine, beside it a collar bone or a leg."""
     spine = np.array([HUMANOID.index(name) for name in TRUNK_JOINTS])
     on_spine = np.searchsorted(T_POSE[spine[1:], 1], rings[..., 1].mean(axis=1), "right")
     bones = np.repeat(spine[on_spine][:, None], rings.shape[1], axis=1)
     x, y, _ = np.moveaxis(rings, -1, 0)
-    for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
-        bones[(sign * x > 0.04) & (y > 1.31) & (y < 1.47)] = HUMANOID.index(sided(side, "Shoulder"))
-        bones[(sign * x > 0.04) & (y < 0.92)] = HUMANOID.index(sided(side, "UpperLeg"))
+    for side, sign in SIDES:
+        bones[(sign * x > 0.04) & (y > 1.31) & (y < 1.47)] = joint_of(side, "Shoulder")
+        bones[(sign * x > 0.04) & (y < 0.92)] = joint_of(side, "UpperLeg")
     return bones
 
 
-def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
+def _without_holes(trunk: Indices) -> Mask:
     """Which squares of the trunk are drawn."""
     is_drawn = np.full((len(trunk) - 1, RING_CORNERS), True)
     for column in HOLE_COLUMNS:
@@ -287,12 +221,12 @@ def _without_holes(trunk: Numbers) -> NDArray[np.bool_]:
     return is_drawn
 
 
-def _hip(trunk: Numbers) -> Numbers:
+def _hip(trunk: Indices) -> Indices:
     """Corners (16,) that a left leg begins with: half of the lowest ring from the back, and the bridge."""
     return np.append(trunk[0, RING_CORNERS // 2 :: -1], trunk.size + np.arange(len(BRIDGE)))
 
 
-def _shoulder(trunk: Numbers) -> Numbers:
+def _shoulder(trunk: Indices) -> Indices:
     """Corners (16,) that a left arm begins with: the hole's border from its upper end at the back, over the top."""
     rows = trunk[HOLE_ROW : HOLE_ROW + HOLE + 1, HOLE_COLUMNS[0] : HOLE_COLUMNS[0] + HOLE + 1]
     return np.concatenate([rows[-1, :0:-1], rows[:0:-1, 0], rows[0, :-1], rows[:-1, -1]])
@@ -301,18 +235,19 @@ def _shoulder(trunk: Numbers) -> Numbers:
 def _leg(start: Array) -> Limb:
     """The leg from corners (16, 3) of the trunk on: its rings begin behind, and go round by the outer side."""
     outline = np.roll(ring(len(start), 2.2), 6, axis=0)
-    rings = smoothed(np.concatenate([start[None], _spanned(LEG_RINGS, outline[:, 1], outline[:, 0])]))[1:]
+    rings = smoothed(np.concatenate([start[None], _spanned(OUTLINES["leg"], outline[:, 1], outline[:, 0])]))[1:]
     _, height, ahead = rings.mean(axis=1).T
     bones = np.array(["UpperLeg", "LowerLeg", "Foot"])[np.searchsorted([-0.5, -0.08], -height)]
     bones[ahead > 0.13] = "Toes"
-    return Limb(rings, bones, np.abs(height - BAND_AT_LEG) < BAND)
+    # its band is over the ankle
+    return Limb(rings, bones, np.abs(height - 0.12) < BAND)
 
 
 def _arm(start: Array) -> Limb:
     """The arm and the palm from corners (16, 3) of the trunk on: its rings begin behind, and go round over the top."""
     # rings as wide above, below, in front and behind as the arm is there
     up, ahead = np.roll(ring(len(start), 2.2), 2, axis=0).T
-    along, over, under, front, back = np.array(ARM_RINGS).T[..., None]
+    along, over, under, front, back = np.array(OUTLINES["arm"]).T[..., None]
     height = np.where(up > 0, over, -under) * up
     depth = np.where(ahead > 0, front, -back) * ahead
     rings = _hanging(np.stack(np.broadcast_arrays(along, height, depth), axis=-1))
@@ -320,7 +255,8 @@ def _arm(start: Array) -> Limb:
     # each ring belongs to the bone at its distance from the shoulder
     reach = (rings.mean(axis=1) - SHOULDER) @ DOWN_ARM[0]
     bones = np.array(["UpperArm", "LowerArm", "Hand"])[np.searchsorted([0.28, 0.53], reach)]
-    return Limb(rings, bones, np.abs(reach - BAND_AT_ARM) < BAND)
+    # its band is at the wrist
+    return Limb(rings, bones, np.abs(reach - 0.535) < BAND)
 
 
 def _hanging(places: Array) -> Array:
@@ -331,8 +267,8 @@ def _hanging(places: Array) -> Array:
 
 def _finger(finger: Finger) -> Limb:
     """A chain of bones, each more curled than the one before."""
-    share, wide = np.array(PHALANGES).T[..., None]
-    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(PHALANGES)))[:, None]
+    share, wide = np.array(OUTLINES["phalanges"]).T[..., None]
+    curl = np.radians(finger.curl[0] + finger.curl[1] * np.arange(len(share)))[:, None]
     aside = np.radians(finger.aside)
     way = np.cos(curl) * [np.cos(aside), 0.0, np.sin(aside)] - [0.0, 1.0, 0.0] * np.sin(curl)
     middles = finger.start + np.cumsum(np.diff(share, axis=0, prepend=0.0) * finger.length * way, axis=0)
@@ -344,7 +280,7 @@ def _finger(finger: Finger) -> Limb:
 
 def _rings_around(middles: Array, upward: Array, sideways: Array, radii: Array) -> Array:
     """Rings (R, 6, 3) around middles (R, 3) in planes that two axes (R, 3) and (3,) span, with radii (R, 1)."""
-    up, side = ring(FINGER_RING_CORNERS).T[..., None]
+    up, side = ring(6).T[..., None]
     rings: Array = middles[:, None] + radii[:, None] * (up * upward[:, None] + side * sideways)
     return rings
 
@@ -352,8 +288,8 @@ def _rings_around(middles: Array, upward: Array, sideways: Array, radii: Array) 
 def _with_arms_up(mesh: Mesh) -> Mesh:
     """The mesh in the T-pose, whose joints bring it back to where it was shaped when arms hang by SLOPE."""
     places = mesh.places
-    for side, sign in zip(LEFT_RIGHT, (1, -1), strict=True):
-        arm = [HUMANOID.index(sided(side, bone)) for bone in ("UpperArm", "LowerArm", "Hand")]
+    for side, sign in SIDES:
+        arm = [joint_of(side, bone) for bone in ("UpperArm", "LowerArm", "Hand")]
         share = (mesh.weights * np.isin(mesh.joints, arm)).sum(axis=1)
         shoulder = SHOULDER * [sign, 1, 1]
         hangs = DOWN_ARM.T * np.outer([1, sign, 1], [1, sign, 1])

@@ -16,7 +16,7 @@ from motet.errors import MotionError
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton, sides_of
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Names, Skeleton, sides_of
 
 COLOURS = {LEFT: (236, 122, 52), RIGHT: (58, 124, 226), MIDDLE: (176, 182, 196)}
 """sRGB of 0 to 255; ``player.html`` has the same."""
@@ -70,7 +70,7 @@ class Body:
         return max(self.skeleton.height, 0.62 * longest) or 1.0
 
     @cached_property
-    def sides(self) -> tuple[str, ...]:
+    def sides(self) -> Names:
         """The side of each joint, told from its name."""
         return sides_of(self.skeleton.names)
 
@@ -136,8 +136,7 @@ class Body:
 
     @cached_property
     def _rest(self) -> Array:
-        rest: Array = self.skeleton.rest_positions / self.height
-        return rest
+        return self.skeleton.rest_positions / self.height
 
     @cached_property
     def _in_trunk(self) -> tuple[bool, ...]:
@@ -165,18 +164,17 @@ def _radius(beyond: float) -> float:
 
 @dataclass(frozen=True)
 class Figure:
-    """A motion as points and bones.
+    """A motion as the points of a body.
 
+    first: the joint of its skeleton that the body begins with.
     points: (T, P, 3) in body heights, y up, the ground at y = 0: the J joints, then jaw and crown if there is a head.
-    bones: which points they join.
     heading: where the figure faces in its first frame: radians about y, 0 is +z, a quarter turn is +x.
-    fps: frames per second.
     """
 
+    body: Body
+    first: int
     points: Array
-    bones: tuple[Bone, ...]
     heading: float
-    fps: float
 
 
 def figure_of(motion: Motion) -> Figure:
@@ -185,19 +183,18 @@ def figure_of(motion: Motion) -> Figure:
     if not len(motion):
         raise MotionError("this motion has no frames to show")
     first = first_of(motion)
-    skeleton = below(skeleton, first)
-    body = Body(skeleton)
+    body = Body(below(skeleton, first))
     points = positions(motion)[:, first:] / body.height
     if not np.abs(points).max() < 1e6:
         raise MotionError("joints are over 1e+06 body heights from the origin: too far to show")
     lowest = float(points[..., 1].min())
     # a figure that moves up and down stands on y = 0 if its lowest point is that near
-    stands = f"{skeleton.names[0]}.ty" in motion.channels and abs(lowest) < 0.1
+    stands = f"{skeleton.names[first]}.ty" in motion.channels and abs(lowest) < 0.1
     points[:, :, 1] -= 0.0 if stands else lowest
-    return Figure(body.points(points), body.bones, _heading(points[0], body.sides), motion.fps)
+    return Figure(body, first, body.points(points), _heading(points[0], body.sides))
 
 
-def _heading(points: Array, sides: tuple[str, ...]) -> float:
+def _heading(points: Array, sides: Names) -> float:
     """Where joints (J, 3) face, at right angles to the way from those of the right to those of the left."""
     if LEFT not in sides:
         return 0.0

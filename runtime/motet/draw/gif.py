@@ -21,8 +21,6 @@ from motet.motion.rotations import Array
 Colour = tuple[int, int, int]
 
 BACKGROUND = (232, 235, 241)
-GRID_COLOUR = (150, 158, 176)
-SHADOW_COLOUR = (166, 172, 186)
 
 DRAWN_LARGER = 3
 """Pictures are drawn larger by this factor and scaled down, for smooth edges."""
@@ -77,7 +75,7 @@ class Stage:
         local = corners - [target[0], 0.0, target[1]]
         self._draw_ground(draw, target)
         normals = normals_of(corners, mesh.triangles)[mesh.triangles[:, 0]]
-        image.paste(SHADOW_COLOUR, mask=self._shadow(local[mesh.triangles[normals @ SUN > -0.3]]))
+        image.paste((166, 172, 186), mask=self._shadow(local[mesh.triangles[normals @ SUN > -0.3]]))
         self._draw_body(draw, mesh, corners, *self._seen(local))
         return image.resize((self.size, self.size), Image.Resampling.BOX)
 
@@ -116,7 +114,7 @@ class Stage:
         """A line through places (N, 3), each piece of it as dark as its share (N - 1,) of 1."""
         pixels = self._seen(line)[0].tolist()
         for start, end, share in zip(pixels[:-1], pixels[1:], shares.tolist(), strict=True):
-            draw.line([*start, *end], fill=_mixed(BACKGROUND, GRID_COLOUR, share), width=DRAWN_LARGER - 1)
+            draw.line([*start, *end], fill=_mixed(BACKGROUND, (150, 158, 176), share), width=DRAWN_LARGER - 1)
 
     def _shadow(self, triangles: Array) -> Image.Image:
         """How much of a shadow of triangles (F, 3, 3) there is at each pixel."""

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.motion.rotations import Array, unit
+from motet.motion.rotations import Array, Indices, Mask, unit
 
-Surface = tuple[Array, NDArray[np.intp]]
+Surface = tuple[Array, Indices]
 """Corners (V, 3), and triangles (F, 3) of them."""
 
 
@@ -22,10 +21,10 @@ class Mesh:
     """
 
     places: Array
-    triangles: NDArray[np.intp]
-    joints: NDArray[np.intp]
+    triangles: Indices
+    joints: Indices
     weights: Array
-    parts: NDArray[np.intp]
+    parts: Indices
 
     @property
     def normals(self) -> Array:
@@ -46,7 +45,7 @@ class Mesh:
         return mixed
 
 
-def normals_of(places: Array, triangles: NDArray[np.intp]) -> Array:
+def normals_of(places: Array, triangles: Indices) -> Array:
     """Normals (V, 3) of corners (V, 3), from the triangles around each, weighed by their areas."""
     a, b, c = places[triangles.T]
     across = np.cross(b - a, c - a)
@@ -81,7 +80,7 @@ def loft(rings: Array) -> Surface:
     return rings.reshape(-1, 3), patch_triangles(numbers, numbers[1:] >= 0, (True, True))
 
 
-def patch_triangles(grid: NDArray[np.intp], is_drawn: NDArray[np.bool_], closes: tuple[bool, bool]) -> NDArray[np.intp]:
+def patch_triangles(grid: Indices, is_drawn: Mask, closes: tuple[bool, bool]) -> Indices:
     """Triangles (F, 3) of a surface through rings (R, C) of numbered corners, as of :func:`loft`.
 
     is_drawn: (R - 1, C) from which corners a square leads to the next ring. closes: whether the first ring and the last
@@ -118,9 +117,7 @@ def ring(corners: int, power: float = 2.0) -> Array:
     return corners_on_it
 
 
-def smooth_weights(
-    joints: NDArray[np.intp], grids: Sequence[NDArray[np.intp]], times: int
-) -> tuple[NDArray[np.intp], Array]:
+def smooth_weights(joints: Indices, grids: Sequence[Indices], times: int) -> tuple[Indices, Array]:
     """The three joints that carry corners most, and their weights: both (V, 3).
 
     joints: (V,) of each corner its only joint at first. grids: rings (R, C) of corners, which are neighbours along and
@@ -135,7 +132,7 @@ def smooth_weights(
     return _largest(weights)
 
 
-def _neighbours(grid: NDArray[np.intp]) -> NDArray[np.intp]:
+def _neighbours(grid: Indices) -> Indices:
     """Pairs (E, 2) of neighbours in a grid (R, C), each both ways."""
     along = np.stack([grid, np.roll(grid, 1, axis=1)])
     across = np.stack([grid[:-1], grid[1:]])
@@ -143,7 +140,7 @@ def _neighbours(grid: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.concatenate([pairs, pairs[:, ::-1]])
 
 
-def _largest(weights: Array) -> tuple[NDArray[np.intp], Array]:
+def _largest(weights: Array) -> tuple[Indices, Array]:
     """Of weights (V, J) the three largest of each corner: their joints and they, both (V, 3), with a sum of 1."""
     most = np.argsort(-weights, axis=1, kind="stable")[:, :3]
     largest = np.take_along_axis(weights, most, axis=1)

@@ -23,12 +23,9 @@ from numpy.typing import NDArray
 from motet.draw.mesh import Mesh
 from motet.draw.skinned import Skinned, person, skinned
 from motet.errors import MotionError
-from motet.files import File, place_of, write_whole
+from motet.files import File, Json, place_of, write_whole
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
-
-COARSER = (1, 2)
-"""Levels of coarser bodies of people."""
 
 LARGEST_INT16 = 32767
 """The largest int16."""
@@ -63,7 +60,7 @@ def write_many(
 
 def _write(file: File, shown: Sequence[tuple[Skinned, str, Captions | None]], title: str | None) -> None:
     title = place_of(file).stem if title is None else title
-    meshes: list[Mesh] = []
+    meshes = []
     bodies = []
     figures = []
     for figure, name, captions in shown:
@@ -74,7 +71,7 @@ def _write(file: File, shown: Sequence[tuple[Skinned, str, Captions | None]], ti
     write_whole(file, filled(source("motet.draw", "player.html"), title, {"bodies": bodies, "figures": figures}))
 
 
-def figure_data(figure: Skinned, name: str, captions: Captions | None = None) -> dict[str, Any]:
+def figure_data(figure: Skinned, name: str, captions: Captions | None = None) -> Json:
     """A figure in the player's format, ready for JSON; see the module's docstring."""
     return {
         "name": name,
@@ -82,7 +79,7 @@ def figure_data(figure: Skinned, name: str, captions: Captions | None = None) ->
         "frames": len(figure.turns),
         "heading": figure.heading,
         "captions": _captions_data(captions or ()),
-        "parents": list(figure.parents),
+        "parents": figure.skeleton.parents.tolist(),
         "offsets": np.round(figure.moves[0], 5).tolist(),
         "scales": np.round(figure.scales, 4).tolist(),
         "root": _text(figure.moves[:, 0], "<f4"),
@@ -98,34 +95,34 @@ def _captions_data(captions: Captions) -> list[list[Any]]:
     return [[float(start), text] for start, text in captions]
 
 
-def _turns_data(turns: Array) -> dict[str, Any]:
+def _turns_data(turns: Array) -> Json:
     """The joints that turn, and their quaternions."""
     turning = np.abs(turns - np.eye(3)).max(axis=(0, 2, 3)) >= 1e-6
     quaternions = rotmat_to_quat(turns[:, turning])
     return {"turning": np.flatnonzero(turning).tolist(), "turns": _text(np.round(quaternions * LARGEST_INT16), "<i2")}
 
 
-def _moves_data(moves: Array) -> dict[str, Any]:
+def _moves_data(moves: Array) -> Json:
     """The joints that move in their parents' frames, and their places there in steps."""
     moving = np.flatnonzero(np.ptp(moves[:, 1:], axis=0).max(axis=-1) > 1e-5) + 1
     step = float(max(1e-4, np.abs(moves[:, moving]).max(initial=0) / LARGEST_INT16))
     return {"step": step, "moving": moving.tolist(), "moves": _text(np.round(moves[:, moving] / step), "<i2")}
 
 
-def body_data(mesh: Mesh, rest: Array) -> dict[str, Any]:
+def body_data(mesh: Mesh, rest: Array) -> Json:
     """A mesh in heights and where its joints rest (K, 3), as pages hold them, see the module's docstring; of the body
     of people also coarser ones, each within the last, for shadows and for figures that are small."""
-    body: dict[str, Any] = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
+    body: Json = {"rest": np.round(rest, 5).tolist(), **_mesh_data(mesh)}
     if mesh is person():
         finer = body
-        for level in COARSER:
+        for level in (1, 2):
             coarse = _mesh_data(person(level))
             finer["coarse"] = coarse
             finer = coarse
     return body
 
 
-def _mesh_data(mesh: Mesh) -> dict[str, Any]:
+def _mesh_data(mesh: Mesh) -> Json:
     step = float(np.abs(mesh.places).max() / LARGEST_INT16)
     return {
         "step": step,
@@ -142,7 +139,7 @@ def _text(values: NDArray[Any], kind: str) -> str:
     return b64encode(values.astype(kind).tobytes()).decode()
 
 
-def filled(template: str, title: str, data: dict[str, Any], **parts: str) -> str:
+def filled(template: str, title: str, data: Json, **parts: str) -> str:
     """The HTML of a template: ``{{TITLE}}``, ``{{DATA}}`` (as JSON), the parts of all pages, and ``parts`` by name."""
     stage = "\n".join(source("motet.draw", file) for file in ("gl.js", "skin.js", "ground.js", "scene.js"))
     texts = {

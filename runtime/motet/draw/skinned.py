@@ -12,14 +12,24 @@ from functools import cache
 import numpy as np
 
 from motet.draw.body import LEFT_PART, MIDDLE_PART, RIGHT_PART, human_mesh
-from motet.draw.figure import SAME_SPOT, Body, Bone, below, figure_of, first_of
+from motet.draw.figure import SAME_SPOT, Body, Bone, figure_of
 from motet.draw.mesh import Mesh, loft, ring, together
 from motet.errors import MotionError
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, SURE_OF_JOINTS, Figure, leg_length, sided, to_humanoid
-from motet.motion.kinematics import global_transforms, local_rotations, local_translations, skeleton_of
+from motet.figures.humanoid import (
+    HUMANOID,
+    LEFT_RIGHT,
+    SURE_OF_JOINTS,
+    T_POSE,
+    Figure,
+    joint_of,
+    leg_length,
+    sided,
+    to_humanoid,
+)
+from motet.motion.kinematics import Transforms, chained, global_transforms, local_rotations, local_translations
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, angle_of, product, rotated, unit
-from motet.motion.skeleton import LEFT, MIDDLE, RIGHT
+from motet.motion.rotations import UP, Array, angle_of, unit
+from motet.motion.skeleton import LEFT, MIDDLE, RIGHT, Skeleton
 
 PART_OF_SIDE = {LEFT: LEFT_PART, RIGHT: RIGHT_PART, MIDDLE: MIDDLE_PART}
 
@@ -37,30 +47,25 @@ WIDTHS = {"UpperLeg": ("hips",), "UpperArm": ("upperChest", "leftShoulder", "rig
 
 @dataclass(frozen=True, eq=False)
 class Skinned:
-    """A motion of T frames on a mesh that K joints carry, of which the first is the root; the ground is y = 0.
+    """A motion of T frames on a mesh that a skeleton's K joints carry; the ground is y = 0.
 
     rest: (K, 3) where the joints are in the mesh. scales: (K, 3) how much larger a figure is than the mesh, along the
-    axes of each joint. parents: (K,) of each joint, -1 for the root. turns: (T, K, 3, 3) in the parents' frames.
-    moves: (T, K, 3) places in the parents' frames. heading: where it faces at first, in radians about y, 0 is z.
+    axes of each joint. turns: (T, K, 3, 3) in the parents' frames. moves: (T, K, 3) places in the parents' frames.
+    heading: where it faces at first, in radians about y, 0 is z.
     """
 
     mesh: Mesh
     rest: Array
     scales: Array
-    parents: tuple[int, ...]
+    skeleton: Skeleton
     turns: Array
     moves: Array
     heading: float
     fps: float
 
-    def frames(self) -> tuple[Array, Array]:
+    def frames(self) -> Transforms:
         """Rotations (T, K, 3, 3) and places (T, K, 3) of the joints in the world."""
-        turns = self.turns.copy()
-        places = self.moves.copy()
-        for joint, parent in enumerate(self.parents[1:], start=1):
-            places[:, joint] = places[:, parent] + rotated(turns[:, parent], places[:, joint])
-            turns[:, joint] = product(turns[:, parent], turns[:, joint])
-        return turns, places
+        return chained(self.skeleton, self.turns.copy(), self.moves.copy())
 
     def corners(self, turns: Array, places: Array) -> Array:
         """Corners (V, 3) of the mesh in one frame of :meth:`frames`: turns (K, 3, 3) and places (K, 3)."""
@@ -90,14 +95,12 @@ def _on_person(motion: Motion) -> Skinned | None:
         scales = _proportions(retargeted.figure, motion)
         motion = retargeted.motion
     height = Body(HUMANOID).height
-    parents = tuple(joint.parent for joint in HUMANOID.joints)
     # joints turn as the humanoid's, and are as far from their parents as theirs are
     turns = local_rotations(motion)
-    moves = np.tile(HUMANOID.offsets * scales[list(parents)], (len(motion), 1, 1))
+    moves = np.tile(HUMANOID.offsets * scales[HUMANOID.parents], (len(motion), 1, 1))
     moves[:, 0] = local_translations(motion)[:, 0]
-    rest = (HUMANOID.rest_positions + HUMANOID.offsets[0]) / height
     heading = float(angle_of(turns[0, 0, 0, 2], turns[0, 0, 2, 2]))
-    return Skinned(person(), rest, scales, parents, turns, moves / height, heading, motion.fps)
+    return Skinned(person(), T_POSE / height, scales, HUMANOID, turns, moves / height, heading, motion.fps)
 
 
 @cache
@@ -112,32 +115,31 @@ def _proportions(figure: Figure, motion: Motion) -> Array:
     the humanoid's joints, of which those of arms are x and of legs and trunk y."""
     body = figure.fitted.body
     places = global_transforms(motion[:: max(1, len(motion) // 100)])[1] * (leg_length() / figure.fitted.leg)
-    # limbs, along their bones
-    scales = np.ones((len(HUMANOID.joints), 3))
-    for bone, end, axis in BONE_ENDS:
-        for side in LEFT_RIGHT:
-            if sided(side, end) in body.joints:
-                ratio = _length_ratio(places, body.joints, sided(side, bone), sided(side, end))
-                scales[HUMANOID.index(sided(side, bone)), axis] = ratio
+    scales = _proportions_of_limbs(places, body.joints)
     # the trunk, upwards
     trunk = body.middle(places, "UpperArm") - body.middle(places, "UpperLeg")
     scales[_indices("spine", "chest", "upperChest"), 1] = _ratio(trunk, np.array([0.48]))
     # shoulders and hips, sideways
     for part, bones in WIDTHS.items():
-        usual_wide = 2 * HUMANOID.rest_positions[HUMANOID.index(sided("left", part)), :1]
+        usual_wide = 2 * HUMANOID.rest_positions[joint_of("left", part), :1]
         scales[_indices(*bones), 0] = _ratio(body.to_left(places, part), usual_wide)
+    return scales
+
+
+def _proportions_of_limbs(places: Array, joints: Mapping[str, int]) -> Array:
+    """As :func:`_proportions`, of limbs along their bones alone, from places (T, J, 3) of a figure's joints."""
+    scales = np.ones((len(HUMANOID.joints), 3))
+    for bone, end, axis in BONE_ENDS:
+        for side in LEFT_RIGHT:
+            if sided(side, end) in joints:
+                vectors = places[:, joints[sided(side, bone)]] - places[:, joints[sided(side, end)]]
+                usual = HUMANOID.rest_positions[joint_of(side, bone)] - HUMANOID.rest_positions[joint_of(side, end)]
+                scales[joint_of(side, bone), axis] = _ratio(vectors, usual)
     return scales
 
 
 def _indices(*bones: str) -> list[int]:
     return list(map(HUMANOID.index, bones))
-
-
-def _length_ratio(places: Array, joints: Mapping[str, int], start: str, end: str) -> float:
-    """How much longer a bone of a figure is than the humanoid's, from places of its joints (T, J, 3)."""
-    usual = HUMANOID.rest_positions
-    vectors = places[:, joints[start]] - places[:, joints[end]]
-    return _ratio(vectors, usual[HUMANOID.index(start)] - usual[HUMANOID.index(end)])
 
 
 def _ratio(vectors: Array, usual: Array) -> float:
@@ -149,9 +151,9 @@ def _ratio(vectors: Array, usual: Array) -> float:
 def _on_bones(motion: Motion) -> Skinned:
     """The round bones of a motion's own skeleton."""
     figure = figure_of(motion)
-    first = first_of(motion)
-    skeleton = below(skeleton_of(motion), first)
-    body = Body(skeleton)
+    first = figure.first
+    body = figure.body
+    skeleton = body.skeleton
     # the root as in the world, all others as in their parents
     turns = local_rotations(motion)[:, first:]
     moves = local_translations(motion)[:, first:] / body.height
@@ -159,9 +161,8 @@ def _on_bones(motion: Motion) -> Skinned:
     moves[:, 0] = figure.points[:, 0]
     rest = body.points(skeleton.rest_positions / body.height)
     mesh = mesh_of_bones(body, rest, moves)
-    parents = tuple(joint.parent for joint in skeleton.joints)
-    scales = np.ones((len(parents), 3))
-    return Skinned(mesh, rest[: len(parents)], scales, parents, turns, moves, figure.heading, figure.fps)
+    joints = len(skeleton.joints)
+    return Skinned(mesh, rest[:joints], np.ones((joints, 3)), skeleton, turns, moves, figure.heading, motion.fps)
 
 
 def mesh_of_bones(body: Body, rest: Array, moves: Array) -> Mesh:
@@ -192,8 +193,7 @@ def _capsule(bone: Bone, rest: Array, end_carrier: int, corners: int = 10) -> Me
 
 def _unit_rings(axis: Array, corners: int) -> Array:
     """Rings (6, C, 3) around an axis on balls of radius 1, upright where it has no length."""
-    axis = unit(axis) if axis.any() else np.array([0.0, 1.0, 0.0])
+    axis = unit(axis) if axis.any() else UP
     side = unit(np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))]))
     around = ring(corners) @ np.stack([side, np.cross(axis, side)])
-    rings: Array = np.cos(CAPS) * around + np.sin(CAPS) * axis
-    return rings
+    return np.cos(CAPS) * around + np.sin(CAPS) * axis

@@ -18,8 +18,7 @@ SUN = unit(np.array([0.42, 1.0, 0.5]))
 
 POSE_WIDTH = 110
 POSE_HEIGHT = 190
-POSE_SPACING = 0.75
-"""Pixels of a pose, and heights from one to the next."""
+"""Pixels of a pose."""
 
 
 class Shape(NamedTuple):
@@ -74,7 +73,8 @@ def lit(mesh: Mesh, corners: Array) -> Array:
 def _drawn(shape: Shape, number: int) -> str:
     """A pose of the strip by its number, after its shadow."""
     origin = [POSE_WIDTH * (number + 0.5), POSE_HEIGHT - 14]
-    scale = POSE_WIDTH / POSE_SPACING * np.array([1, -1])
+    # from one pose to the next 0.75 of a height
+    scale = POSE_WIDTH / 0.75 * np.array([1, -1])
     shadow = "".join(_paths(origin + scale * shape.shadow))
     body = []
     for path, ink in zip(_paths(origin + scale * shape.triangles), shape.inks.astype(np.uint8), strict=True):

@@ -28,9 +28,6 @@ TOLERATED = 0.015
 """Metres that a wrist, an elbow or an ankle may be under the floor: to lift the wrist of an arm that stands on it bends
 the arm."""
 
-SOFT = 0.1
-"""Seconds before and after, in which what is under the floor leaves and returns."""
-
 
 def above_floor(motion: Motion) -> Motion:
     """A motion of the humanoid, on a ground at height 0, with nothing under the floor.
@@ -43,7 +40,8 @@ def above_floor(motion: Motion) -> Motion:
     rotations, places = global_transforms(motion)
     turned = np.array(rotations)
     places = np.array(places)
-    reach = SOFT * motion.fps
+    # what is under the floor leaves and returns in a tenth of a second before and after
+    reach = 0.1 * motion.fps
     thickness = _thickness()
     limbs = [joint for joint, name in enumerate(HUMANOID.names) if name.endswith(LIMB_ENDS)]
 

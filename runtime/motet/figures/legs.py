@@ -72,8 +72,8 @@ def with_legs(rotations: Floats, legs: list[list[Quaternion]]) -> Floats:
 
 def joints_of(limb: Limb, hips: Quaternion, place: Vector) -> tuple[list[Quaternion], list[Vector]]:
     """Rotations and places of a leg's joints where the hips are."""
-    turned = list[Quaternion]()
-    places = list[Vector]()
+    turned = []
+    places = []
     above = hips
     # down the leg, each joint is where the one above it takes its offset
     for local, offset in zip(limb.local, limb.offsets, strict=True):

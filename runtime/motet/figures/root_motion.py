@@ -30,7 +30,6 @@ from motet.motion.kinematics import (
 )
 from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, axis_to_rotmat, inverse, product, rotated
-from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -98,23 +97,13 @@ def to_figure_of(motion: Motion, like: Motion) -> Motion:
         )
         motion = motion.continuous().resample(like.fps)
     skeleton = skeleton_of(like)
-    if not _same_figure(skeleton_of(motion), skeleton):
+    if not skeleton_of(motion).is_like(skeleton, 1e-3, first=1):
         log.warning("retargeted the second motion to the figure of the first")
         motion = from_humanoid(on_humanoid(motion), like)
     elif set(motion.channels) == set(like.channels):
         return replace(motion.select(like.channels, like.units), skeleton=skeleton)
     rotations = by_name(skeleton, local_rotations(motion))
     return continued(like[-1:], rotations, by_name(skeleton, local_translations(motion)))
-
-
-def _same_figure(skeleton: Skeleton, other: Skeleton) -> bool:
-    """Whether two skeletons have the same joints and unit, and offsets within a thousandth of the height."""
-    if len(skeleton.joints) != len(other.joints) or skeleton.metres_per_unit != other.metres_per_unit:
-        return False
-    for joint, like in zip(skeleton.joints, other.joints, strict=True):
-        if replace(joint, offset=like.offset) != like:
-            return False
-    return bool(np.abs(skeleton.offsets[1:] - other.offsets[1:]).max(initial=0) <= 1e-3 * other.height)
 
 
 def placed_after(motion: Motion, before: Motion, seconds: float, turn: float) -> Motion | None:

@@ -1,16 +1,17 @@
 """Files of motion: one record per format, chosen by the extension.
 
 A format's module has ``read(file, **options) -> Motion``, ``write(file, motion)`` or both, where a file is a path or a
-binary file object; both raise motet's errors and leave nothing half-written. If its files hold several motions
-or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes "clip", "figure" or both. To
-add a format, write its module and add its record to :data:`FORMATS`, which help texts, the table of
-docs/reference/formats.md and the lists of corpora are built from.
+binary file object; both raise motet's errors and leave nothing half-written. What parses the content of a file raises
+:class:`~motet.formats.text.ContentError`, to which ``read``, marked as ``names_file``, adds the file's name. If its
+files hold several motions or skeletons, it also has ``contents(file)``, which returns their names, and ``read`` takes
+"clip", "figure" or both. To add a format, write its module and add its record to :data:`FORMATS`, which help texts, the
+table of docs/reference/formats.md and the lists of corpora are built from.
 """
 
 import logging
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,12 +22,12 @@ import numpy as np
 
 from motet.errors import FormatError, MotionError, OutputError
 from motet.figures.humanoid import JointMap, from_humanoid, grounded, on_humanoid, rig
-from motet.figures.root_motion import travel_on_root
+from motet.figures.root_motion import in_place, travel_on_root
 from motet.files import File, check_place, place_of
-from motet.formats.text import Clip, Contents, Figure, split_clip
+from motet.formats.text import Clip, Contents, Figure, naming, split_clip
 from motet.motion.motion import Motion, motions_of, rest_motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton, metres
+from motet.motion.skeleton import Names, Skeleton, metres
 
 if TYPE_CHECKING:
     from motet.formats.gltf_character import Nodes
@@ -38,6 +39,7 @@ log = logging.getLogger(__name__)
 class Format:
     """One format of motion files.
 
+    keeps: which parts of a motion a file holds, for the docs.
     reader: the module of motet with its ``read``, imported on first use; empty if it is not read.
     writer: the function of motet that writes it, imported on first use; empty if it is not written.
     options: the keyword arguments of its ``read``.
@@ -48,17 +50,13 @@ class Format:
 
     extension: str
     name: str
+    keeps: str
     reader: str = ""
     writer: str = ""
-    options: tuple[str, ...] = ()
+    options: Names = ()
     mocap: bool = False
     loose: bool = False
     needs: str = ""
-
-    @property
-    def keeps(self) -> str:
-        """Which parts of a motion a file holds, for the docs."""
-        return _KEEPS[self.extension]
 
     def module(self) -> Any:
         """The module that reads it."""
@@ -70,36 +68,92 @@ class Format:
         return function
 
 
-_CHARACTER = "a skeleton and its animations, each a clip, or its rest pose"
-_KEEPS = {
-    ".amc": "everything; AMC need not state its frame rate: 120 unless the file or `fps=` gives another",
-    ".bvh": "everything but the unit of length",
-    ".npz": "everything, bit for bit; from AMASS and mocap of videos (SMPL), the body joints",
-    ".csv": "values, units and frame rate, no skeleton",
-    ".xml": "angles and root; the skeleton is not in the file",
-    ".glb": "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
-    ".gltf": _CHARACTER,
-    ".vrm": f"{_CHARACTER}; written by `--onto`, the avatar itself ([humanoid.md](../humanoid.md#characters))",
-    ".vrma": "the humanoid: motions of other human figures are retargeted ([humanoid.md](../humanoid.md))",
-    ".fbx": "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`",
-    ".html": "a page with a player: orbit, play, scrub, no network",
-    ".gif": "an animated picture; needs Pillow: `pip install 'motet[plot]'`",
-}
 _NODES = ("clip", "figure", "rest")
 
 FORMATS = (
-    Format(".amc", "Acclaim, with its .asf", "formats.amc", "formats.amc.write", ("asf", "fps", "partial"), mocap=True),
-    Format(".bvh", "Biovision", "formats.bvh", "formats.bvh.write", ("figure", "partial"), mocap=True),
-    Format(".npz", "motet's own; SMPL", "formats.npz", "formats.npz.write", ("fps",), mocap=True),
-    Format(".csv", "table", "formats.csv", "formats.csv.write"),
-    Format(".xml", "MMM of KIT", "formats.mmm"),
-    Format(".glb", "glTF 2.0", "formats.gltf", "formats.glb.write", _NODES, mocap=True, loose=True),
-    Format(".gltf", "glTF 2.0, as text", "formats.gltf", options=_NODES, loose=True),
-    Format(".vrm", "VRM avatar", "formats.gltf", options=_NODES, loose=True),
-    Format(".vrma", "VRM Animation", "formats.gltf", "formats.glb.write_vrma", _NODES, mocap=True, loose=True),
-    Format(".fbx", "FBX", "formats.fbx", options=_NODES, mocap=True, loose=True),
-    Format(".html", "web page", writer="draw.page.write"),
-    Format(".gif", "picture", writer="draw.gif.write", needs="PIL"),
+    Format(
+        ".amc",
+        "Acclaim, with its .asf",
+        "everything; AMC need not state its frame rate: 120 unless the file or `fps=` gives another",
+        "formats.amc",
+        "formats.amc.write",
+        ("asf", "fps", "partial"),
+        mocap=True,
+    ),
+    Format(
+        ".bvh",
+        "Biovision",
+        "everything but the unit of length",
+        "formats.bvh",
+        "formats.bvh.write",
+        ("figure", "partial"),
+        mocap=True,
+    ),
+    Format(
+        ".npz",
+        "motet's own; SMPL",
+        "everything, bit for bit; from AMASS and mocap of videos (SMPL), the body joints",
+        "formats.npz",
+        "formats.npz.write",
+        ("fps",),
+        mocap=True,
+    ),
+    Format(".csv", "table", "values, units and frame rate, no skeleton", "formats.csv", "formats.csv.write"),
+    Format(".xml", "MMM of KIT", "angles and root; the skeleton is not in the file", "formats.mmm"),
+    Format(
+        ".glb",
+        "glTF 2.0",
+        "a skeleton and its animations, each a clip; written with a body, for viewers and engines",
+        "formats.gltf",
+        "formats.glb.write",
+        _NODES,
+        mocap=True,
+        loose=True,
+    ),
+    Format(
+        ".gltf",
+        "glTF 2.0, as text",
+        "a skeleton and its animations, each a clip, or its rest pose",
+        "formats.gltf",
+        options=_NODES,
+        loose=True,
+    ),
+    Format(
+        ".vrm",
+        "VRM avatar",
+        "a skeleton and its animations, each a clip, or its rest pose; written by `--onto`, the "
+        "avatar itself ([humanoid.md](../humanoid.md#characters))",
+        "formats.gltf",
+        options=_NODES,
+        loose=True,
+    ),
+    Format(
+        ".vrma",
+        "VRM Animation",
+        "the humanoid: motions of other human figures are retargeted ([humanoid.md](../humanoid.md))",
+        "formats.gltf",
+        "formats.glb.write_vrma",
+        _NODES,
+        mocap=True,
+        loose=True,
+    ),
+    Format(
+        ".fbx",
+        "FBX",
+        "a skeleton and its takes, each a clip; needs ufbx: `pip install 'motet[fbx]'`",
+        "formats.fbx",
+        options=_NODES,
+        mocap=True,
+        loose=True,
+    ),
+    Format(".html", "web page", "a page with a player: orbit, play, scrub, no network", writer="draw.page.write"),
+    Format(
+        ".gif",
+        "picture",
+        "an animated picture; needs Pillow: `pip install 'motet[plot]'`",
+        writer="draw.gif.write",
+        needs="PIL",
+    ),
 )
 
 READABLE = tuple(kind.extension for kind in FORMATS if kind.reader)
@@ -179,13 +233,11 @@ def read_motion(  # noqa: PLR0913  options, each of which has a default
         "rest": rest,
     }
     options = _options_for(path, kind, settings)
-    try:
+    with naming(file):
         with np.errstate(over="ignore", invalid="ignore"):  # Motion refuses infinite values
             motion: Motion = kind.module().read(file, **options)
         log.debug("read %s: %r", path, motion)
         return motion if unit is None else _in_unit(path, motion, unit, kind.loose)
-    except MotionError as error:
-        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
 
 
 def _options_for(path: Path, kind: Format, settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -203,7 +255,7 @@ def split_part(file: File, format: str | None = None) -> tuple[File, str | None,
     file, named = split_clip(file, READABLE)
     if named is None:
         return file, None, None
-    extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
+    extension = _extension(file, format)
     has_only_figures = extension in FIGURED and extension not in CLIPPED
     return (file, None, named) if has_only_figures else (file, named, None)
 
@@ -227,7 +279,7 @@ def _in_unit(path: Path, motion: Motion, unit_name: str | float, loose: bool) ->
     return motion
 
 
-def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
+def clips(file: File, *, format: str | None = None) -> Names:
     """The names of the motions in a file, for ``clip`` of :func:`read_motion`.
 
     They are unique; empty if the format holds one motion per file, or the file holds none. format: see
@@ -236,7 +288,7 @@ def clips(file: File, *, format: str | None = None) -> tuple[str, ...]:
     return contents_of(file, format=format).clips
 
 
-def figures_in(file: File, *, format: str | None = None) -> tuple[str, ...]:
+def figures_in(file: File, *, format: str | None = None) -> Names:
     """The names of the skeletons in a file, for ``figure`` of :func:`read_motion`.
 
     They are unique; empty if the format holds one skeleton per file, or none. Errors like :func:`clips`.
@@ -294,7 +346,8 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     A character from a glTF file stands on the ground, and z becomes its facing direction at rest. MotionError, with the
     reason, if the motion's figure or the character is not human.
     """
-    if motion.skeleton and _same_figure(motion.skeleton, character.rest.skeleton):
+    skeleton = character.rest.skeleton
+    if motion.skeleton and skeleton and motion.skeleton.is_like(skeleton, 1e-6):
         return motion
     # over the humanoid, which every human figure is brought to
     humanoid_motion = on_humanoid(motion)
@@ -307,16 +360,6 @@ def put_onto(motion: Motion, character: Character) -> Motion:
     except MotionError as error:
         raise MotionError(f"the character cannot take a motion: {error}") from error
     return travel_on_root(put, joint_map)
-
-
-def _same_figure(skeleton: Skeleton, other: Skeleton | None) -> bool:
-    if other is None or skeleton.metres_per_unit != other.metres_per_unit:
-        return False
-    at_origin = [replace(joint, offset=(0.0, 0.0, 0.0)) for joint in skeleton.joints]
-    others_at_origin = [replace(joint, offset=(0.0, 0.0, 0.0)) for joint in other.joints]
-    if at_origin != others_at_origin:
-        return False
-    return bool(np.abs(skeleton.offsets - other.offsets).max() <= 1e-6 * other.height)
 
 
 def write_motion(
@@ -362,6 +405,13 @@ def _moving(moving: Any) -> Motion:
     return motion
 
 
+def shaped(motion: Motion, character: Character | None, fps: float | None, is_in_place: bool) -> Motion:
+    """A motion as it is to be written: on a character, at another frame rate, in place."""
+    motion = put_onto(motion, character) if character else motion
+    motion = motion.resample(fps) if fps else motion
+    return in_place(motion) if is_in_place else motion
+
+
 def write_on(file: File, motion: Motion, character: Character | None, *, format: str | None = None) -> None:
     """Write a motion like :func:`write_motion`; if a character is given, the motion is already on its skeleton."""
     kind = check_writable(file, format)
@@ -384,7 +434,7 @@ def write_all_on(file: File, motions: Mapping[str, Motion], character: Character
         gltf_character.write_onto(file, motions, character.nodes)
 
 
-def check_writable(file: File, format: str | None = None, allowed: tuple[str, ...] = WRITABLE) -> Format:
+def check_writable(file: File, format: str | None = None, allowed: Names = WRITABLE) -> Format:
     """The format; an unwritable path or a disallowed extension is refused before long work starts."""
     kind = _format(file, format, allowed, "write")
     if kind.needs and find_spec(kind.needs) is None:
@@ -395,12 +445,16 @@ def check_writable(file: File, format: str | None = None, allowed: tuple[str, ..
     return kind
 
 
-def _format(file: File, format: str | None, allowed: tuple[str, ...], verb: str) -> Format:
-    # the format that the caller names, or else the extension
-    extension = place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"
+def _format(file: File, format: str | None, allowed: Names, verb: str) -> Format:
+    extension = _extension(file, format)
     if extension in allowed:
         return next(kind for kind in FORMATS if kind.extension == extension)
     what = f"files of type {extension!r}" if extension else "a file without an extension"
     if extension == ".c3d":
         what += ", which hold markers without a skeleton: first solve for one in the program that recorded them"
     raise FormatError(place_of(file), f"cannot {verb} {what}; expected one of {' '.join(allowed)}")
+
+
+def _extension(file: File, format: str | None) -> str:
+    """The format that the caller names, or else the extension."""
+    return place_of(file).suffix.lower() if format is None else f".{format.lower().removeprefix('.')}"

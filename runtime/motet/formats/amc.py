@@ -16,7 +16,7 @@ from motet.formats.asf import CMU_METRES, Asf, Dofs, Line, asf_text, read_skelet
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Joint
+from motet.motion.skeleton import Joint, Names
 
 T = TypeVar("T")
 
@@ -26,6 +26,7 @@ Layout = dict[str, int]
 """The bones of a frame in the file's order, and how many values each has."""
 
 
+@text.names_file
 def read(file: File, asf: str | Path | None = None, fps: float | None = None, partial: bool = False) -> Motion:
     """Read an AMC file and the ASF file of its skeleton.
 
@@ -40,17 +41,17 @@ def read(file: File, asf: str | Path | None = None, fps: float | None = None, pa
     path = place_of(file)
     lines = text.read_text(file).split("\n")
     if asf is None and not isinstance(file, str | Path):
-        raise FormatError(path, "a file object has no folder to find the skeleton in: pass it as asf")
+        raise text.ContentError("a file object has no folder to find the skeleton in: pass it as asf")
     skeleton = read_skeleton(asf if asf is not None else _find_asf(path))
     # the lines before the first frame state the unit and the rate
-    header, unit, stated_fps = _header(path, lines, skeleton)
-    text.check_rate(path, stated_fps, fps)
+    header, unit, stated_fps = _header(lines, skeleton)
+    text.check_rate(stated_fps, fps)
     # the first frame says which bones every frame has
-    layout = _layout(path, words_of(lines, header), skeleton.dofs)
+    layout = _layout(words_of(lines, header), skeleton.dofs)
     values = _frames(path, lines, header, layout, partial)
     channels = _channels(layout, skeleton.dofs)
     rates = [rate for rate in (stated_fps, fps, 120.0) if rate is not None]
-    rate = text.frame_rate(rates[0], path)
+    rate = text.frame_rate(rates[0])
     return Motion(values, channels, text.units_of(channels, unit), rate, skeleton.skeleton)
 
 
@@ -72,14 +73,14 @@ def _find_asf(path: Path) -> Path:
         try:
             files = sorted(folder.iterdir()) if folder.is_dir() else []
         except OSError as error:
-            raise FormatError(path, f"cannot look for a skeleton in {folder}: {error.strerror}") from error
+            raise text.ContentError(f"cannot look for a skeleton in {folder}: {error.strerror}") from error
         if skeleton := skeleton_for(path.stem, {file.stem: file for file in files if file.suffix.lower() == ".asf"}):
             return skeleton
     names = " or ".join(f"{stem}.asf" for stem in stems)
-    raise FormatError(path, f"no skeleton found: expected {names}, or a single .asf, beside it or in ../asf")
+    raise text.ContentError(f"no skeleton found: expected {names}, or a single .asf, beside it or in ../asf")
 
 
-def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | None]:
+def _header(lines: list[str], asf: Asf) -> tuple[int, str, float | None]:
     """The number of lines before the first frame, the angle unit, and the frame rate if a comment states it."""
     unit = asf.angle
     fps = None
@@ -88,34 +89,34 @@ def _header(path: Path, lines: list[str], asf: Asf) -> tuple[int, str, float | N
         if word in (":degrees", ":radians"):
             unit = word[1:4]
         elif rate := re.fullmatch(r"(?:# fps|:samples-per-second)\s+(\S+)", word):
-            fps = text.frame_rate(text.number(rate[1], path, line + 1), path, line + 1)
+            fps = text.frame_rate(text.number(rate[1], line + 1), line + 1)
         elif word and word[0] not in "#:":
             return line, unit, fps
     return len(lines), unit, fps
 
 
-def _layout(path: Path, lines: Iterator[Line], dofs: Dofs) -> Layout:
+def _layout(lines: Iterator[Line], dofs: Dofs) -> Layout:
     """The first frame's bones, each with its number of values; those of the skeleton if there is no frame."""
     line, words = next(lines, (0, []))
     if not words:
         return {bone: len(names) for bone, names in dofs.items()}
     if not _is_frame_number(words):
-        raise FormatError(path, f"expected a frame number alone on its line, not {quoted(' '.join(words))}", line)
-    layout: Layout = {}
+        raise text.ContentError(f"expected a frame number alone on its line, not {quoted(' '.join(words))}", line)
+    layout = {}
     for line, words in lines:
         if _is_frame_number(words):
             break
         if words[0] in layout:
-            raise FormatError(path, f"bone {quoted(words[0])} appears twice in a frame", line)
+            raise text.ContentError(f"bone {quoted(words[0])} appears twice in a frame", line)
         if words[0] not in dofs:
-            raise FormatError(path, f"bone {quoted(words[0])} has no degrees of freedom in the skeleton file", line)
+            raise text.ContentError(f"bone {quoted(words[0])} has no degrees of freedom in the skeleton file", line)
         layout[words[0]] = len(dofs[words[0]])
     return layout
 
 
-def _channels(bones: Iterable[str], dofs: Dofs) -> tuple[str, ...]:
+def _channels(bones: Iterable[str], dofs: Dofs) -> Names:
     """The channels of bones, each bone's in the order of its degrees of freedom."""
-    channels: list[str] = []
+    channels = []
     for bone in bones:
         channels += [f"{bone}.{dof}" for dof in dofs[bone]]
     return tuple(channels)
@@ -128,23 +129,23 @@ def _is_frame_number(words: list[str]) -> bool:
 def _frames(path: Path, lines: list[str], header: int, layout: Layout, partial: bool) -> Array:
     """All values (T, D); if ``partial``, without a last frame that is not like the others."""
     try:
-        return _values(path, lines, header, layout)
-    except FormatError:
+        return _values(lines, header, layout)
+    except text.ContentError:
         frame_numbers = [line for line, content in enumerate(lines) if content.rstrip().isdecimal()]
         if not partial or not frame_numbers:
             raise
-        values = _values(path, lines[: frame_numbers[-1]], header, layout)
+        values = _values(lines[: frame_numbers[-1]], header, layout)
         log.info("%s: the last frame is truncated and was left out", path)
         return values
 
 
-def _values(path: Path, lines: list[str], header: int, layout: Layout) -> Array:
+def _values(lines: list[str], header: int, layout: Layout) -> Array:
     """All values (T, D); FormatError for a line that is not like that of the first frame."""
     values = _values_at_once(lines[header:], layout)
     if values is None:
         # a fault: line by line, to name the place
-        _check_lines(path, lines, header, layout)
-        rows = [text.numbers(words[1:], path, line) for line, words in words_of(lines, header)]
+        _check_lines(lines, header, layout)
+        rows = [text.numbers(words[1:], line) for line, words in words_of(lines, header)]
         values = np.concatenate(rows).reshape(-1, sum(layout.values()))
     return values
 
@@ -176,7 +177,7 @@ def _with_ends(lines: list[str]) -> str:
     return " ; ".join([*filter(str.strip, lines), ""])
 
 
-def _check_lines(path: Path, lines: list[str], header: int, layout: Layout) -> None:
+def _check_lines(lines: list[str], header: int, layout: Layout) -> None:
     """FormatError for the first line that is not like that of the first frame, whatever its values are."""
     frame = {"": 0} | layout  # the lines of a frame: its number, and a line for each bone
     expected = cycle(frame.items())
@@ -190,12 +191,12 @@ def _check_lines(path: Path, lines: list[str], header: int, layout: Layout) -> N
         is_expected = words[0] == bone if bone else is_number
         if not is_expected:
             wanted = f"bone {bone!r}" if bone else "a frame number"
-            raise FormatError(path, f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
+            raise text.ContentError(f"expected {wanted}, as in the first frame, not {quoted(words[0])}", line)
         if len(words) - 1 != count:
-            raise FormatError(path, f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
+            raise text.ContentError(f"bone {bone!r} needs {count} values, not {len(words) - 1}", line)
         bone, count = next(expected)
     if bone:
-        raise FormatError(path, f"truncated frame: bone {bone!r} is missing", line)
+        raise text.ContentError(f"truncated frame: bone {bone!r} is missing", line)
 
 
 def write(file: File, motion: Motion) -> None:
@@ -229,7 +230,7 @@ def write(file: File, motion: Motion) -> None:
     write_whole(path, "\n".join([*frames, ""]))
 
 
-def _dofs_of(motion: Motion, joint: Joint) -> tuple[str, ...]:
+def _dofs_of(motion: Motion, joint: Joint) -> Names:
     """The joint's channels in the motion's order if the rotation order allows it: the first one turns first."""
     dofs = []
     for channel in motion.channels:

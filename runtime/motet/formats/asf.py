@@ -9,19 +9,29 @@ bone's channels, first applied first: ``rx ry rz`` is R = Rz Ry Rx, and so is ``
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
-from motet.errors import FormatError, MotionError, quoted
-from motet.formats.text import NOWHERE, Names, Triple, complete_order, number, read_text, spaced, triple
+from motet.errors import quoted
+from motet.files import File
+from motet.formats.text import (
+    NOWHERE,
+    ContentError,
+    UniqueNames,
+    complete_order,
+    names_file,
+    number,
+    read_text,
+    spaced,
+    triple,
+)
 from motet.motion.rotations import euler_to_rotmat, rotmat_to_euler
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
 
 CMU_METRES = 0.0254 / 0.45
 """CMU writes ``length 0.45`` for lengths in inches times 0.45. Other values have no known meaning."""
 
-Dofs = Mapping[str, tuple[str, ...]]
+Dofs = Mapping[str, Names]
 """Of each joint with channels their names, such as "rx"."""
 
 Line = tuple[int, list[str]]
@@ -47,39 +57,37 @@ class _Bone:
     name: str
     reach: Triple = NOWHERE
     axis: Triple = NOWHERE
-    dofs: tuple[str, ...] = ()
+    dofs: Names = ()
     children: list[str] = field(default_factory=list)
     order: str = "XYZ"
 
 
-def read_skeleton(path: str | Path) -> Asf:
+@names_file
+def read_skeleton(path: File) -> Asf:
     """Read an ASF file, without limits and masses.
 
     FormatError with file and line if it is not one, a bone has no direction, length or axis, or the hierarchy omits
     one.
     """
-    return _skeleton(Path(path), read_text(path))
+    return _skeleton(read_text(path))
 
 
 @lru_cache(maxsize=16)
-def _skeleton(path: Path, text: str) -> Asf:
+def _skeleton(text: str) -> Asf:
     """A folder mostly holds motions of a few people: each skeleton is parsed once."""
     # the units, which the rest is in
-    sections = _sections(path, text)
+    sections = _sections(text)
     units = _units(sections.get("units", []))
     angle = units["angle"].lower()[:3]
     if angle not in ("deg", "rad"):
-        raise FormatError(path, f"angles in {quoted(units['angle'])}: expected deg or rad")
+        raise ContentError(f"angles in {quoted(units['angle'])}: expected deg or rad")
     # bones, then the tree of joints that they span
-    bones = _read_bones(path, sections, 1.0 if angle == "deg" else 180 / np.pi)
+    bones = _read_bones(sections, 1.0 if angle == "deg" else 180 / np.pi)
     joints = _joints(bones)
     if lost := bones.keys() - {joint.name for joint in joints}:
-        raise FormatError(path, f"the hierarchy does not reach bone {quoted(min(lost))}")
+        raise ContentError(f"the hierarchy does not reach bone {quoted(min(lost))}")
     dofs = {bone.name: bone.dofs for bone in bones.values() if bone.dofs}
-    try:
-        skeleton = Skeleton(tuple(joints), CMU_METRES if units["length"] == "0.45" else None)
-    except MotionError as error:
-        raise FormatError(path, str(error)) from error
+    skeleton = Skeleton(tuple(joints), CMU_METRES if units["length"] == "0.45" else None)
     return Asf(skeleton, dofs, angle)
 
 
@@ -92,7 +100,7 @@ def _units(lines: Lines) -> dict[str, str]:
     return units
 
 
-def _sections(path: Path, text: str) -> dict[str, Lines]:
+def _sections(text: str) -> dict[str, Lines]:
     """The lines of each section by its keyword; FormatError where a required one is missing."""
     sections: dict[str, Lines] = {"": []}
     section = sections[""]
@@ -102,31 +110,31 @@ def _sections(path: Path, text: str) -> dict[str, Lines]:
         else:
             section.append((line, words))
     if "root" not in sections or "hierarchy" not in sections:
-        raise FormatError(path, "an ASF file needs the sections :root, :bonedata and :hierarchy")
+        raise ContentError("an ASF file needs the sections :root, :bonedata and :hierarchy")
     return sections
 
 
-def _read_bones(path: Path, sections: Mapping[str, Lines], factor: float) -> dict[str, _Bone]:
+def _read_bones(sections: Mapping[str, Lines], factor: float) -> dict[str, _Bone]:
     """All bones with their children, by name. factor: degrees in the file's unit of angles."""
     # bones in the order of the file, and then the hierarchy, which names them
-    bones = {"root": _root(path, sections["root"], factor)}
-    for begin, block in _blocks(path, sections.get("bonedata", [])):
-        bone = _bone(path, begin, block, factor)
+    bones = {"root": _root(sections["root"], factor)}
+    for begin, block in _blocks(sections.get("bonedata", [])):
+        bone = _bone(begin, block, factor)
         if not bone.name or bone.name in bones:
-            raise FormatError(path, f"bone names must be unique and not empty, not {quoted(bone.name)}", begin)
+            raise ContentError(f"bone names must be unique and not empty, not {quoted(bone.name)}", begin)
         bones[bone.name] = bone
-    _hang_children(path, sections["hierarchy"], bones)
+    _hang_children(sections["hierarchy"], bones)
     return bones
 
 
-def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
+def _blocks(lines: Lines) -> Iterator[tuple[int, Lines]]:
     """The lines between each ``begin`` and ``end``, with the line of ``begin``."""
     start = 0
     block: Lines = []
     for line, words in lines:
         word = words[0].lower()
         if word in ("begin", "end") and (word == "begin") == bool(start):
-            raise FormatError(path, f"{word!r} where {'a bone' if start else 'no bone'} has begun", line)
+            raise ContentError(f"{word!r} where {'a bone' if start else 'no bone'} has begun", line)
         if word == "begin":
             start = line
             block = []
@@ -136,22 +144,22 @@ def _blocks(path: Path, lines: Lines) -> Iterator[tuple[int, Lines]]:
         else:
             block.append((line, words))
     if start:
-        raise FormatError(path, "a bone without 'end'", start)
+        raise ContentError("a bone without 'end'", start)
 
 
-def _root(path: Path, lines: Lines, factor: float) -> _Bone:
+def _root(lines: Lines, factor: float) -> _Bone:
     """The root, with its position in place of its reach."""
     # of the lines that may be absent, these are the defaults
     entries = {"position": (0, ["", "0", "0", "0"]), "axis": (0, ["XYZ"]), "order": (0, [""])}
     entries["orientation"] = entries["position"]
     entries |= _entries(lines)
     line, position = entries["position"]
-    reach = triple(position[1:], path, line)
+    reach = triple(position[1:], line)
     line, angles = entries["orientation"]
     _, axis_order = entries["axis"]
-    axis = _axis(path, line, [*angles, axis_order[-1]], factor)
+    axis = _axis(line, [*angles, axis_order[-1]], factor)
     line, order = entries["order"]
-    dofs = _dofs(path, line, order, known=("tx", "ty", "tz", "rx", "ry", "rz"))
+    dofs = _dofs(line, order, known=("tx", "ty", "tz", "rx", "ry", "rz"))
     return _Bone("root", reach, axis, dofs)
 
 
@@ -160,31 +168,31 @@ def _entries(lines: Lines) -> dict[str, Line]:
     return {words[0].lower(): (line, words) for line, words in lines}
 
 
-def _bone(path: Path, begin: int, lines: Lines, factor: float) -> _Bone:
+def _bone(begin: int, lines: Lines, factor: float) -> _Bone:
     entries = {"dof": (0, [""]), "name": (0, [""])} | _entries(lines)
     if missing := [word for word in ("direction", "length", "axis") if word not in entries]:
-        raise FormatError(path, f"this bone has no {' or '.join(missing)}", begin)
+        raise ContentError(f"this bone has no {' or '.join(missing)}", begin)
     # the offset of its child is its direction times its length
     line, length_words = entries["length"]
-    length = number((*length_words, "")[1], path, line)
+    length = number((*length_words, "")[1], line)
     line, direction = entries["direction"]
-    reach = [repr(value * length) for value in triple(direction[1:], path, line)]
+    reach = [repr(value * length) for value in triple(direction[1:], line)]
     # its degrees of freedom, its name, and the axis that they turn about
     line, dof_words = entries["dof"]
-    dofs = _dofs(path, line, dof_words, known=("rx", "ry", "rz"))
+    dofs = _dofs(line, dof_words, known=("rx", "ry", "rz"))
     _, name_words = entries["name"]
     line, axis_words = entries["axis"]
-    axis = _axis(path, line, axis_words, factor)
-    return _Bone(name_words[-1], triple(reach, path, begin), axis, dofs)
+    axis = _axis(line, axis_words, factor)
+    return _Bone(name_words[-1], triple(reach, begin), axis, dofs)
 
 
-def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:
+def _axis(line: int, words: list[str], factor: float) -> Triple:
     """Angles in the order of the letters that follow them, as angles about x, y, z of ``Joint.axis``."""
     order = words[-1].lower()
     if sorted(order) != ["x", "y", "z"]:
         reason = f"expected an axis of three angles and their order, such as XYZ, not {quoted(' '.join(words[1:]))}"
-        raise FormatError(path, reason, line)
-    x, y, z = triple(words[1:-1], path, line)
+        raise ContentError(reason, line)
+    x, y, z = triple(words[1:-1], line)
     if order == "xyz":
         return x * factor, y * factor, z * factor
     # the first letter turns first, so it is the last of the product
@@ -193,25 +201,25 @@ def _axis(path: Path, line: int, words: list[str], factor: float) -> Triple:
     return x, y, z
 
 
-def _dofs(path: Path, line: int, words: list[str], known: tuple[str, ...]) -> tuple[str, ...]:
+def _dofs(line: int, words: list[str], known: Names) -> Names:
     dofs = tuple(word.lower() for word in words[1:])
     if not set(dofs) <= set(known) or len(set(dofs)) < len(dofs):
         reason = f"degrees of freedom {quoted(' '.join(words[1:]))}: expected each of {' '.join(known)} at most once"
-        raise FormatError(path, reason, line)
+        raise ContentError(reason, line)
     return dofs
 
 
-def _hang_children(path: Path, lines: Lines, bones: dict[str, _Bone]) -> None:
+def _hang_children(lines: Lines, bones: dict[str, _Bone]) -> None:
     hung = {"root"}
     for line, words in lines:
         if len(words) == 1 and words[0].lower() in ("begin", "end"):
             continue
         if unknown := [name for name in words if name not in bones]:
             reason = f"the hierarchy names bone {quoted(unknown[0])}, which is not in :bonedata"
-            raise FormatError(path, reason, line)
+            raise ContentError(reason, line)
         for child in words[1:]:
             if child in hung:
-                raise FormatError(path, f"bone {quoted(child)} has two parents", line)
+                raise ContentError(f"bone {quoted(child)} has two parents", line)
             hung.add(child)
             bones[words[0]].children.append(child)
 
@@ -290,9 +298,9 @@ def _bone_text(bone: _Bone, number: int) -> str:
 
 def _bones(asf: Asf) -> list[_Bone]:
     """The root, with the position in place of its reach, and all bones that the skeleton needs."""
-    bones: dict[str, _Bone] = {}
+    bones = {}
     joints = asf.skeleton.joints
-    names = Names(asf.skeleton.names)
+    names = UniqueNames(asf.skeleton.names)
     tips = _tips(asf)
     for i, joint in enumerate(joints):
         if i in tips:
@@ -312,7 +320,7 @@ def _bones(asf: Asf) -> list[_Bone]:
     return list(bones.values())
 
 
-def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: Names) -> list[_Bone]:
+def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: UniqueNames) -> list[_Bone]:
     """Add the children of a bone with this end; those that start elsewhere hang on bones without channels that lead
     there, which are returned."""
     bases = []
@@ -325,7 +333,7 @@ def _add_children(bone: _Bone, end: Triple, children: list[Joint], names: Names)
     return bases
 
 
-def _bone_at(joint: Joint, dofs: tuple[str, ...]) -> _Bone:
+def _bone_at(joint: Joint, dofs: Names) -> _Bone:
     """The bone of a joint, without reach and children."""
     axis = joint.axis
     # in the order of the joint's own rotation: some readers take one for the other

@@ -15,23 +15,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from motet.errors import FormatError, MotionError, quoted
+from motet.errors import MotionError, quoted
 from motet.files import File, place_of, write_whole
 from motet.formats import text
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array, rotmats_to_euler
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
 
 log = logging.getLogger(__name__)
 
 CHANNEL_NAMES = {f"{axis}position": f"t{axis}" for axis in "xyz"} | {f"{axis}rotation": f"r{axis}" for axis in "xyz"}
 """Channels in small letters -> their names in a motion."""
 
-MOST_EMPTY_FRAMES = 10**7
-"""Frames of a file without channels."""
 
-
+@text.names_file
 def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motion:
     """Read a BVH file: channels in the file's order, units "deg" and "length".
 
@@ -45,46 +43,45 @@ def read(file: File, partial: bool = False, figure: text.Figure = None) -> Motio
     path = place_of(file)
     lines = text.read_text(file).split("\n")
     # the skeletons, each from a ROOT
-    figures, motion_line = _hierarchy(path, lines)
+    figures, motion_line = _hierarchy(lines)
     number = text.chosen(path, _figure_names(figures), figure, "figure")
     # the number of frames and their rate
-    header = _motion_header(path, lines, motion_line)
+    header = _motion_header(lines, motion_line)
     # a line holds the channels of all figures, one after the other
     widths = [len(_channel_names(nodes)) for nodes in figures]
-    frames = _frames(path, lines, header, sum(widths), partial)
+    frames = _frames(lines, header, sum(widths), partial)
+    _check_count(path, len(frames), header, partial)
     first_column = sum(widths[:number])
     values = frames[:, first_column : first_column + widths[number]]
-    return _motion(path, figures[number], values, header.fps)
+    return _motion(figures[number], values, header.fps)
 
 
-def _motion(path: Path, nodes: "list[_Node]", values: Array, fps: float) -> Motion:
+def _motion(nodes: "list[_Node]", values: Array, fps: float) -> Motion:
     """The motion of one figure with the values (T, D) of its channels."""
     channels = _channel_names(nodes)
-    joints = tuple(_joint(path, node) for node in nodes)
+    joints = tuple(_joint(node) for node in nodes)
     return Motion(values, channels, text.units_of(channels, "deg"), fps, Skeleton(joints))
 
 
-def _channel_names(nodes: "list[_Node]") -> tuple[str, ...]:
+def _channel_names(nodes: "list[_Node]") -> Names:
     """The channels of a figure, such as "Hips.tx", in the order of the file."""
-    channels: list[str] = []
+    channels = []
     for node in nodes:
         channels += [f"{node.name}.{kind}" for kind in node.channels]
     return tuple(channels)
 
 
-def _frames(path: Path, lines: list[str], header: "_Header", width: int, partial: bool) -> Array:
+def _frames(lines: list[str], header: "_Header", width: int, partial: bool) -> Array:
     """The values (T, width) of all frames; FormatError where they are not those that the file declares."""
     if not width:
         # without channels nothing else confirms the number
-        if header.frames > MOST_EMPTY_FRAMES:
+        if header.frames > 10**7:
             reason = f"the file declares {header.frames} frames and has no channels"
-            raise FormatError(path, reason, header.line)
+            raise text.ContentError(reason, header.line)
         return np.zeros((header.frames, 0))
     if partial:
         lines = _complete_lines(lines, header.line, width)
-    values = _values(path, lines, header.line, width)
-    _check_count(path, len(values), header, partial)
-    return values
+    return _values(lines, header.line, width)
 
 
 def _complete_lines(lines: list[str], start: int, width: int) -> list[str]:
@@ -106,16 +103,17 @@ def _check_count(path: Path, held: int, header: "_Header", partial: bool) -> Non
         log.info("%s: read %d of the declared %d frames", path, held, declared)
     elif held < declared:
         reason = f"the file declares {declared} frames but holds {held}: correct the line 'Frames:'"
-        raise FormatError(path, f"{reason}, or read it with partial=True (--partial)", header.line)
+        raise text.ContentError(f"{reason}, or read it with partial=True (--partial)", header.line)
 
 
+@text.names_file
 def contents(file: File) -> text.Contents:
     """The ROOTs; FormatError like :func:`read` for what precedes the line MOTION."""
-    figures, _ = _hierarchy(place_of(file), text.read_text(file).split("\n"))
+    figures, _ = _hierarchy(text.read_text(file).split("\n"))
     return text.Contents((), dict.fromkeys(_figure_names(figures), ()))
 
 
-def _figure_names(figures: "list[list[_Node]]") -> tuple[str, ...]:
+def _figure_names(figures: "list[list[_Node]]") -> Names:
     return text.part_names((nodes[0].name for nodes in figures), "figure")
 
 
@@ -124,20 +122,20 @@ class _Node:
     name: str
     parent: int
     line: int
-    offset: text.Triple | None = None
-    channels: tuple[str, ...] = ()
+    offset: Triple | None = None
+    channels: Names = ()
 
 
-def _joint(path: Path, node: _Node) -> Joint:
+def _joint(node: _Node) -> Joint:
     if node.offset is None:
-        raise FormatError(path, f"joint {quoted(node.name)} has no OFFSET", node.line)
+        raise text.ContentError(f"joint {quoted(node.name)} has no OFFSET", node.line)
     turns = "".join(kind[1] for kind in node.channels if kind[0] == "r")
     return Joint(node.name, node.parent, node.offset, text.complete_order(turns))
 
 
-def _hierarchy(path: Path, lines: list[str]) -> tuple[list[list[_Node]], int]:
+def _hierarchy(lines: list[str]) -> tuple[list[list[_Node]], int]:
     """The joints of each ROOT, and the number of the line MOTION after them."""
-    hierarchy = _Hierarchy(path)
+    hierarchy = _Hierarchy()
     for line, content in enumerate(lines, 1):
         # braces may stand beside other statements: each becomes a piece of its own
         for piece in content.replace("{", "\n{\n").replace("}", "\n}\n").split("\n"):
@@ -146,7 +144,7 @@ def _hierarchy(path: Path, lines: list[str]) -> tuple[list[list[_Node]], int]:
             if hierarchy.is_complete() and statement.lower().split()[0] == "motion":
                 return hierarchy.figures, line
             hierarchy.take(statement, line)
-    raise FormatError(path, "not a BVH file, or truncated: the line MOTION is missing")
+    raise text.ContentError("not a BVH file, or truncated: the line MOTION is missing")
 
 
 class _Hierarchy:
@@ -156,12 +154,11 @@ class _Hierarchy:
     joint has been named and its brace must follow.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self) -> None:
         self.figures: list[list[_Node]] = []
         self.open_nodes: list[int] = []
         self.is_declared = False
-        self.names = text.Names()
+        self.names = text.UniqueNames()
 
     def is_complete(self) -> bool:
         """Whether the line MOTION may follow."""
@@ -180,13 +177,13 @@ class _Hierarchy:
             case "}" if self.open_nodes and not self.is_declared:
                 self.open_nodes.pop()
             case "offset" if self.open_nodes and not self.is_declared:
-                self._open_node().offset = text.triple(rest.split(), self.path, line)
+                self._open_node().offset = text.triple(rest.split(), line)
             case "channels" if self.open_nodes and not self.is_declared:
-                self._open_node().channels = _channels(self.path, rest.split(), line)
+                self._open_node().channels = _channels(rest.split(), line)
             case "hierarchy" if not self.figures:
                 pass
             case _:
-                raise FormatError(self.path, f"{quoted(statement)} does not belong here", line)
+                raise text.ContentError(f"{quoted(statement)} does not belong here", line)
         self.is_declared = False
 
     def _open_node(self) -> _Node:
@@ -196,11 +193,11 @@ class _Hierarchy:
         """Add a joint, or the end of one."""
         if self.is_declared or bool(self.open_nodes) == (kind == "root"):
             reason = f"{quoted(statement)} does not belong here: expected trees of joints"
-            raise FormatError(self.path, reason, line)
+            raise text.ContentError(reason, line)
         # a ROOT begins another figure, whose names are its own
         if kind == "root":
             self.figures.append([])
-            self.names = text.Names()
+            self.names = text.UniqueNames()
         parent = self.open_nodes[-1] if self.open_nodes else -1
         if kind == "end":
             name = self._open_node().name + END_SUFFIX
@@ -208,17 +205,17 @@ class _Hierarchy:
         self.is_declared = True
 
 
-def _channels(path: Path, words: list[str], line: int) -> tuple[str, ...]:
+def _channels(words: list[str], line: int) -> Names:
     """The channels after their count, as "tx" ... "rz"; FormatError for others, or another count."""
     channels = []
     for word in words[1:]:
         if word.lower() not in CHANNEL_NAMES:
             expected = "expected one of Xposition ... Zposition, Xrotation ... Zrotation"
-            raise FormatError(path, f"channel {quoted(word)}: {expected}", line)
+            raise text.ContentError(f"channel {quoted(word)}: {expected}", line)
         channels.append(CHANNEL_NAMES[word.lower()])
     if words[:1] != [str(len(channels))] or len(set(channels)) < len(channels):
         reason = f"CHANNELS needs a count and that many different channels, not {quoted(' '.join(words))}"
-        raise FormatError(path, reason, line)
+        raise text.ContentError(reason, line)
     return tuple(channels)
 
 
@@ -230,7 +227,7 @@ class _Header(NamedTuple):
     fps: float
 
 
-def _motion_header(path: Path, lines: list[str], motion_line: int) -> _Header:
+def _motion_header(lines: list[str], motion_line: int) -> _Header:
     """The lines "Frames:" and "Frame Time:", in either order; FormatError for any other before both."""
     frames = None
     fps = None
@@ -239,21 +236,21 @@ def _motion_header(path: Path, lines: list[str], motion_line: int) -> _Header:
         if entry and entry[1].lower() == "frames" and re.fullmatch("[0-9]{1,15}", entry[2]):
             frames = int(entry[2])
         elif entry and entry[1].lower() != "frames":
-            fps = _fps(path, entry[2], line)
+            fps = _fps(entry[2], line)
         elif content.strip():
             reason = f"expected 'Frames: N' and 'Frame Time: SECONDS', not {quoted(content.strip())}"
-            raise FormatError(path, reason, line)
+            raise text.ContentError(reason, line)
         if frames is not None and fps is not None:
             return _Header(line, frames, fps)
-    raise FormatError(path, "the file ends before 'Frames:' and 'Frame Time:'", len(lines))
+    raise text.ContentError("the file ends before 'Frames:' and 'Frame Time:'", len(lines))
 
 
-def _fps(path: Path, word: str, line: int) -> float:
+def _fps(word: str, line: int) -> float:
     """The frame rate of a frame time: whole if its digits allow only one whole number."""
-    seconds = text.number(word, path, line)
+    seconds = text.number(word, line)
     if not seconds > 0:
-        raise FormatError(path, f"frame time {word} s is out of range: expected more than 0", line)
-    fps = text.frame_rate(1 / seconds, path, line)
+        raise text.ContentError(f"frame time {word} s is out of range: expected more than 0", line)
+    fps = text.frame_rate(1 / seconds, line)
     # half a unit of the last digit that is written, and a little more
     precision = 0.51 * 10.0 ** int(Decimal(word).as_tuple().exponent)
     possible = []
@@ -263,7 +260,7 @@ def _fps(path: Path, word: str, line: int) -> float:
     return possible[0] if len(possible) == 1 else fps
 
 
-def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
+def _values(lines: list[str], start: int, width: int) -> Array:
     """The frames (T, width) after the header, one per line or not; FormatError if one is truncated."""
     frames = lines[start:]
     # nearly all files have a frame in each line, which numpy reads at once
@@ -276,10 +273,10 @@ def _values(path: Path, lines: list[str], start: int, width: int) -> Array:
     # a fault: line by line, to name the place
     count = sum(len(content.split()) for content in frames)
     for line, content in enumerate(frames, start=start + 1):
-        row = text.numbers(content.split(), path, line)
+        row = text.numbers(content.split(), line)
         if count % width and len(row) not in (0, width):
-            raise FormatError(path, f"truncated frame: a frame has {width} values, this line has {len(row)}", line)
-    raise FormatError(path, f"{count} values do not make complete frames of {width}")
+            raise text.ContentError(f"truncated frame: a frame has {width} values, this line has {len(row)}", line)
+    raise text.ContentError(f"{count} values do not make complete frames of {width}")
 
 
 def write(file: File, motion: Motion) -> None:
@@ -322,8 +319,8 @@ def _rows(motion: Motion, joints: list[int], translated: set[int]) -> Array:
 def _tree(motion: Motion, translated: set[int]) -> tuple[list[str], list[int]]:
     """The lines of the hierarchy, and the joints written as ROOT or JOINT in their order; others are End Sites."""
     skeleton = skeleton_of(motion)
-    lines: list[str] = []
-    joints: list[int] = []
+    lines = []
+    joints = []
     waiting: list[tuple[int | None, int]] = [(0, 0)]  # joints, or None for a closing brace, and their depth
     while waiting:
         i, depth = waiting.pop()

@@ -9,14 +9,12 @@ import io
 import re
 from array import array
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from motet.errors import FormatError
-from motet.files import File, place_of, write_whole
-from motet.formats.text import frame_rate, number, numbers, read_text
+from motet.files import File, write_whole
+from motet.formats.text import ContentError, frame_rate, names_file, number, numbers, read_text
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 
@@ -30,9 +28,9 @@ class Channels(NamedTuple):
     units: list[str]
 
 
+@names_file
 def read(file: File) -> Motion:
     """Read a table: values unchanged, no skeleton. FormatError names the file and line at fault."""
-    path = place_of(file)
     fps: float | None = None
     header: list[str] = []
     channels = Channels([], [])
@@ -40,26 +38,26 @@ def read(file: File) -> Motion:
     # a comment with the rate, the header, then a frame in each row
     for line, row in _rows(file):
         if row[0].startswith("#"):
-            fps = _stated_rate(path, ",".join(row), line) or fps
+            fps = _stated_rate(",".join(row), line) or fps
         elif not header:
             header = row
-            channels = _channels(path, header)
+            channels = _channels(header)
         elif len(row) == len(header):
-            values.extend(numbers(row, path, line))
+            values.extend(numbers(row, line))
         else:
-            raise FormatError(path, f"expected {len(header)} values, not {len(row)}", line)
+            raise ContentError(f"expected {len(header)} values, not {len(row)}", line)
     if not header:
-        raise _no_header(path)
+        raise _no_header()
     table = np.array(values).reshape(-1, len(header))
-    fps = fps or _rate_of_times(path, table[:, 0])
+    fps = fps or _rate_of_times(table[:, 0])
     return Motion(table[:, 1:], tuple(channels.names), tuple(channels.units), fps)
 
 
-def _stated_rate(path: Path, comment: str, line: int) -> float | None:
+def _stated_rate(comment: str, line: int) -> float | None:
     """The frame rate that a comment states, if it does."""
     if not comment.startswith(COMMENT):
         return None
-    return frame_rate(number(comment.removeprefix(COMMENT), path, line), path, line)
+    return frame_rate(number(comment.removeprefix(COMMENT), line), line)
 
 
 def _rows(file: File) -> Iterator[tuple[int, list[str]]]:
@@ -70,36 +68,36 @@ def _rows(file: File) -> Iterator[tuple[int, list[str]]]:
             if row:
                 yield reader.line_num, row
     except csv.Error as error:
-        raise FormatError(place_of(file), f"not a table: {error}", reader.line_num) from error
+        raise ContentError(f"not a table: {error}", reader.line_num) from error
 
 
-def _rate_of_times(path: Path, times: Array) -> float:
+def _rate_of_times(times: Array) -> float:
     """The frame rate of times (T,) in seconds; FormatError where they are not evenly spaced."""
     # without a rate, the times must be spaced within a hundredth
     steps = np.diff(times)
     if not len(steps) or steps.min() <= 0 or np.ptp(steps) > 0.01 * steps.mean():
-        raise FormatError(path, f"times are not evenly spaced: add a comment line '{COMMENT}30'")
-    return frame_rate(float(1 / steps.mean()), path)
+        raise ContentError(f"times are not evenly spaced: add a comment line '{COMMENT}30'")
+    return frame_rate(float(1 / steps.mean()))
 
 
-def _channels(path: Path, header: Sequence[str]) -> Channels:
+def _channels(header: Sequence[str]) -> Channels:
     """The channels of a header; FormatError for another header."""
     if header[0] == "Format Version":
-        raise FormatError(path, "this is a table of Motive, which has no skeleton: export BVH or FBX there")
+        raise ContentError("this is a table of Motive, which has no skeleton: export BVH or FBX there")
     if len(header) == 1 and ";" in header[0]:
-        raise FormatError(path, "its columns are separated by semicolons: expected commas, and decimals with a point")
+        raise ContentError("its columns are separated by semicolons: expected commas, and decimals with a point")
     channels = Channels([], [])
     for title in header[1:]:
         if channel := re.fullmatch(r"(.+) \[(.+)\]", title):
             channels.names.append(channel[1])
             channels.units.append(channel[2])
     if header[0] != "time" or len(channels.names) < len(header) - 1:
-        raise _no_header(path)
+        raise _no_header()
     return channels
 
 
-def _no_header(path: Path) -> FormatError:
-    return FormatError(path, "the header must be 'time,CHANNEL [UNIT],...', as in 'time,root.tx [length]'")
+def _no_header() -> ContentError:
+    return ContentError("the header must be 'time,CHANNEL [UNIT],...', as in 'time,root.tx [length]'")
 
 
 def write(file: File, motion: Motion) -> None:

@@ -24,9 +24,9 @@ from motet.draw.figure import Body
 from motet.draw.mesh import Mesh
 from motet.draw.skinned import mesh_of_bones
 from motet.errors import MotionError
-from motet.figures.humanoid import BONES, FINGERS, HUMANOID, LEFT_RIGHT, grounded, on_humanoid, relaxed, sided
-from motet.files import File, write_whole
-from motet.formats.gltf_data import COMPONENTS, Json
+from motet.figures.humanoid import BONES, FINGERS, HUMANOID, SIDES, grounded, on_humanoid, relaxed, sided
+from motet.files import File, Json, write_whole
+from motet.formats.gltf_data import COMPONENTS
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
@@ -145,7 +145,7 @@ def container(document: Json, content: bytes | bytearray) -> bytes:
 
 def joint_nodes(skeleton: Skeleton) -> list[Json]:
     """A node for each joint, at rest, in their order."""
-    nodes: list[Json] = []
+    nodes = []
     for joint, children in zip(skeleton.joints, skeleton.children, strict=True):
         nodes.append({"name": joint.name, "translation": list(joint.offset)})
         if children:
@@ -171,7 +171,7 @@ def animation(buffer: Buffer, name: str, motion: Motion, tracks: Iterable[Track]
     # tracks of equally many frames share their times
     times = {len(motion): buffer.add(np.arange(len(motion)) / motion.fps, bounded=True)}
     samplers: list[Json] = []
-    channels: list[Json] = []
+    channels = []
     for node, path, values in tracks:
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         if len(values) not in times:
@@ -223,7 +223,7 @@ def _with_fingers() -> Skeleton:
     """The humanoid with VRM's fingers after its joints."""
     # fingers hang on the hands, mirrored for the right one
     joints = {joint.name: joint for joint in HUMANOID.joints}
-    for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
+    for side, sign in SIDES:
         for part, (parent, (x, y, z), order) in FINGERS.items():
             above = list(joints).index(sided(side, parent))
             joints[sided(side, part)] = Joint(sided(side, part), above, (sign * x, y, z), order)

@@ -14,27 +14,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.errors import FormatError, MotionError, listed, quoted
+from motet.errors import MotionError, listed, quoted
 from motet.figures.humanoid import BONES, map_of
-from motet.files import File, place_of
-from motet.formats.gltf_data import REST_TRANSFORM, Gltf, Json, Tracks, broken, parse
+from motet.files import File, Json, place_of
+from motet.formats.gltf_data import REST_TRANSFORM, Gltf, Tracks, broken, parse
 from motet.formats.text import (
     Clip,
+    ContentError,
     Contents,
-    Names,
+    UniqueNames,
     choice,
     chosen,
     most_poses,
+    names_file,
     part_names,
     split_clip,
 )
 from motet.formats.text import Figure as FigureChoice
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion, rest_motion
-from motet.motion.rotations import Array, inverse, product, rotated
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.rotations import Array, Indices, inverse, product, rotated
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -45,9 +46,6 @@ has a thousand joints."""
 
 NodeSet = set[int]
 """Nodes of a file, by their numbers in it."""
-
-LATE_START = 0.5
-"""Seconds before the first key from which on a file's start is told; many programs count frames from 1."""
 
 
 def read(file: File, clip: Clip = None, rest: File | None = None, figure: FigureChoice = None) -> Motion:
@@ -66,10 +64,10 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
         scene = _scene(file)
         gltf = scene.gltf
         stance = {} if rest is None else _stance(rest)
-        parts = _contents(scene, scene.names, map(moved, scene.animations))
+        parts = _contents(scene)
         take = _take(scene, *choice(gltf.path, parts, clip, figure))
         if stance and not stance.keys() & set(take.figure.names):
-            raise FormatError(gltf.path, "the file of the rest pose shares no joint name with this figure")
+            raise ContentError("the file of the rest pose shares no joint name with this figure")
         # every angle is counted from the rest pose of the nodes, whatever their own axes
         rest_turns, rest_places = _rested(take, stance)
         skeleton = skeleton_at(_joint_names(gltf, take.figure), take.figure.parents, rest_places)
@@ -80,7 +78,7 @@ def read(file: File, clip: Clip = None, rest: File | None = None, figure: Figure
 def _joint_names(gltf: Gltf, figure: "Figure") -> list[str]:
     """The names of a figure's joints: VRM's for the bones of its humanoid, and unique ones for the others."""
     bones = {node: bone for bone, node in gltf.humanoid().items() if bone in BONES}
-    unique_names = Names(bones.values())  # other joints with such a name are renamed
+    unique_names = UniqueNames(bones.values())  # other joints with such a name are renamed
     names = []
     for node, name in zip(figure.nodes, figure.names, strict=True):
         names.append(bones.get(node) or unique_names.unique(name))
@@ -90,23 +88,23 @@ def _joint_names(gltf: Gltf, figure: "Figure") -> list[str]:
 def contents(file: File) -> Contents:
     """The animations that move a figure, and the figures; FormatError like :func:`read`."""
     with broken(place_of(file)):
-        scene = _scene(file)
-        return _contents(scene, scene.names, map(moved, scene.animations))
+        return _contents(_scene(file))
 
 
-def contents_of_takes(file: File, names: Sequence[str], takes: Sequence[NodeSet]) -> Contents:
+def contents_of_takes(file: File, takes: Mapping[str, NodeSet]) -> Contents:
     """The figures of a file, with clips that are not in it, by their names and the nodes that each moves."""
     with broken(place_of(file)):
-        return _contents(_scene(file), names, takes)
+        return _contents(_scene(file), takes)
 
 
-def _contents(scene: "_Scene", names: Sequence[str], takes: Iterable[NodeSet]) -> Contents:
-    moved_by = dict(zip(names, takes, strict=True))
+def _contents(scene: "_Scene", takes: Mapping[str, NodeSet] | None = None) -> Contents:
+    if takes is None:
+        takes = dict(zip(scene.names, map(moved, scene.animations), strict=True))
     figures = {}
     for title, joints in scene.figures.items():
         near = above(scene.gltf, joints)
-        figures[title] = tuple(name for name in names if moved_by[name] & near)
-    return Contents(tuple(names), figures)
+        figures[title] = tuple(name for name, nodes in takes.items() if nodes & near)
+    return Contents(tuple(takes), figures)
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ class _Scene:
     gltf: Gltf
     figures: dict[str, NodeSet]
     animations: list[Json]
-    names: tuple[str, ...]
+    names: Names
 
 
 def _scene(file: File) -> _Scene:
@@ -132,17 +130,18 @@ def _scene(file: File) -> _Scene:
     near = above(gltf, set().union(*parts))
     moving = [animation for animation in animations if moved(animation) & near]
     if animations and not moving:
-        raise FormatError(gltf.path, "its animations move no joint of its skeleton: export the armature's animations")
+        raise ContentError("its animations move no joint of its skeleton: export the armature's animations")
     names = part_names(str(animation.get("name", "")) for animation in moving)
     return _Scene(gltf, dict(zip(titles, parts, strict=True)), moving, names)
 
 
+@names_file
 def _stance(file: File) -> dict[str, Array]:
     """The rotations (3, 3) of a file's joints in the world, by name: at rest, or at the start of a named clip."""
     extensions = (".glb", ".gltf", ".vrm", ".vrma")
     file, clip = split_clip(file, extensions)
     if isinstance(file, str | Path) and Path(file).suffix.lower() not in extensions:
-        raise FormatError(place_of(file), f"a rest pose must come from a file of {' '.join(extensions)}")
+        raise ContentError(f"a rest pose must come from a file of {' '.join(extensions)}")
     with broken(place_of(file)):
         scene = _scene(file)
         take = _take(scene, None if clip is None else chosen(scene.gltf.path, scene.names, clip), None)
@@ -155,7 +154,7 @@ class Figure:
 
     nodes: tuple[int, ...]
     parents: tuple[int, ...]
-    names: tuple[str, ...]
+    names: Names
 
 
 @dataclass(frozen=True)
@@ -270,7 +269,7 @@ def figures(gltf: Gltf, moved: NodeSet) -> list[NodeSet]:
     sets = [humanoid, *_skins(gltf)]
     joints_of_all = set().union(*sets)
     if unknown := joints_of_all.difference(range(len(gltf.parents))):
-        raise FormatError(gltf.path, f"joints that are not nodes: {listed(sorted(map(str, unknown)))}")
+        raise ContentError(f"joints that are not nodes: {listed(sorted(map(str, unknown)))}")
     roots = _roots(gltf)
     animated = _animated(gltf, moved, roots)
     if not joints_of_all:
@@ -290,19 +289,19 @@ def _skins(gltf: Gltf) -> list[NodeSet]:
     """The joints of each skin; FormatError for too many skins."""
     skins = gltf.objects("skins")
     if len(skins) > MAX_SKINS:
-        raise FormatError(gltf.path, f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
+        raise ContentError(f"it has {len(skins)} skins: expected at most {MAX_SKINS}")
     return [set(skin.get("joints", [])) for skin in skins]
 
 
-def _no_skeleton(gltf: Gltf, moved: NodeSet) -> FormatError:
+def _no_skeleton(gltf: Gltf, moved: NodeSet) -> ContentError:
     """The error for a file without joints, with what its animations move instead."""
     if gltf.document.get("extensions", {}).get("VRMC_vrm_animation", {}).get("expressions"):
-        return FormatError(gltf.path, "it animates only expressions of a face, and no bones: it has no motion")
+        return ContentError("it animates only expressions of a face, and no bones: it has no motion")
     reason = "expected a skin with joints or a VRM humanoid"
     if moved:
         names = listed([quoted(gltf.name(node)) for node in sorted(moved)])
         reason = f"its animations move only {names}, and nothing below"
-    return FormatError(gltf.path, f"no skeleton: {reason}; export the armature, too")
+    return ContentError(f"no skeleton: {reason}; export the armature, too")
 
 
 def _grouped(gltf: Gltf, sets: list[NodeSet], moved: NodeSet, roots: Mapping[int, int]) -> list[NodeSet]:
@@ -330,7 +329,7 @@ def _humans(gltf: Gltf, groups: list[NodeSet]) -> list[NodeSet]:
             figure = figure_of(gltf, joints)
             skeleton = skeleton_at(figure.names, figure.parents, places[0, list(figure.nodes)])
             map_of(rest_motion(skeleton))
-        except (FormatError, MotionError):
+        except MotionError:
             continue
         humans.append(joints)
     return humans
@@ -410,10 +409,10 @@ def figure_of(gltf: Gltf, joints: NodeSet) -> Figure:
     inside = above(gltf, joints) - over
     nodes = tuple(node for node in gltf.order if node in inside or _is_end(gltf, node, inside))
     if len(nodes) > MAX_JOINTS:
-        raise FormatError(gltf.path, f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
+        raise ContentError(f"its skeleton has {len(nodes)} joints: expected at most {MAX_JOINTS}")
     index_of = {node: i for i, node in enumerate(nodes)}
     parents = tuple(index_of.get(gltf.parents[node], -1) for node in nodes)
-    unique_names = Names()
+    unique_names = UniqueNames()
     names = tuple(unique_names.unique(gltf.name(node)) for node in nodes)
     return Figure(nodes, parents, names)
 
@@ -453,16 +452,17 @@ def _tracks(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> tuple[Tra
 def _frame_times(gltf: Gltf, name: str, times_of_tracks: list[Array]) -> tuple[Array, float]:
     """The times (T,) of an animation's frames by the times (K,) of its tracks' keys, and its frame rate."""
     if not all(map(len, times_of_tracks)):
-        raise FormatError(gltf.path, f"its animation {quoted(name)} has tracks without keys")
+        raise ContentError(f"its animation {quoted(name)} has tracks without keys")
     # from the first key of any track to the last
     start = min(times[0] for times in times_of_tracks)
     end = max(times[-1] for times in times_of_tracks)
-    if start > LATE_START:
+    # many programs count frames from 1: a start that is later than half a second is told
+    if start > 0.5:
         log.warning("%s: its animation %s starts at %.3g s: read from there", gltf.path, quoted(name), start)
     fps = _rate(times_of_tracks)
     count = (end - start) * fps + 1
     if not count * len(gltf.objects("nodes")) < most_poses(gltf.size):
-        raise FormatError(gltf.path, f"{end - start:g} s at {fps:g} fps is too many frames")
+        raise ContentError(f"{end - start:g} s at {fps:g} fps is too many frames")
     return start + np.arange(round(count)) / fps, fps
 
 
@@ -473,7 +473,7 @@ Keys = dict[tuple[int, str], tuple[Array, Array, str]]
 def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
     """The keys of some nodes; FormatError where times and values differ in number."""
     samplers = animation.get("samplers", [])
-    keys: Keys = {}
+    keys = {}
     for channel, node, path in _channels(animation):
         if node not in nodes:
             continue
@@ -486,7 +486,7 @@ def _keys(gltf: Gltf, animation: Json, name: str, nodes: NodeSet) -> Keys:
         if values.size != expected * len(REST_TRANSFORM[path]):
             counts = f"{times.size} times and {len(values)} values, not {expected},"
             track = f"the {path} of {quoted(gltf.name(node))}"
-            raise FormatError(gltf.path, f"its animation {quoted(name)} has {counts} for {track}: export it again")
+            raise ContentError(f"its animation {quoted(name)} has {counts} for {track}: export it again")
         keys[node, path] = (times.reshape(-1), values, interpolation)
     return keys
 
@@ -547,7 +547,7 @@ def _sampled(times: Array, values: Array, kind: str, frames: Array, name: str) -
     return between
 
 
-def _keys_around(times: Array, frames: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _keys_around(times: Array, frames: Array) -> tuple[Indices, Indices]:
     """The keys (T,) at or before the times of frames (T,), and those after them; of a single key this one."""
     before = np.searchsorted(times, frames + 1e-6, side="right") - 1
     before = np.clip(before, 0, max(len(times) - 2, 0))
@@ -578,5 +578,4 @@ def _on_great_circle(low: Array, high: Array, share: Array) -> Array:
     sine = np.where(is_near, 1.0, np.sin(angle))
     weight_low = np.where(is_near, 1 - share, np.sin((1 - share) * angle) / sine)
     weight_high = np.where(is_near, share, np.sin(share * angle) / sine)
-    turned: Array = weight_low * low + weight_high * high
-    return turned
+    return weight_low * low + weight_high * high

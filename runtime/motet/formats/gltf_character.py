@@ -11,18 +11,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import FormatError, quoted
 from motet.figures.humanoid import BONES, REQUIRED, JointMap, check_map
-from motet.files import File, place_of, write_whole
+from motet.files import File, Json, place_of, write_whole
 from motet.formats import Character
 from motet.formats.glb import Buffer, Track, animation, container, with_body
 from motet.formats.gltf import figure_of, figures, likeliest, moved, skeleton_at
-from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, Json, broken, parse, read_beside
+from motet.formats.gltf_data import GLTF_MAX_BYTES, Gltf, broken, parse, read_beside
+from motet.formats.text import ContentError, naming
 from motet.motion.kinematics import local_rotations, local_translations
 from motet.motion.motion import Motion, rest_motion
-from motet.motion.rotations import Array, product, quat_to_rotmat, rotated, rotmat_to_quat
+from motet.motion.rotations import Array, Indices, product, quat_to_rotmat, rotated, rotmat_to_quat
 from motet.motion.skeleton import Skeleton
 
 log = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "im
 Primitive = tuple[int, dict[str, int], int | None]
 """The node of a primitive of a mesh, its attributes, and its skin if it has one."""
 
-Skinned = tuple[Array, NDArray[np.intp]]
+Skinned = tuple[Array, Indices]
 """Points (P, 3) in the world at rest, and the joint (P,) of each, -1 for none."""
 
 
@@ -117,8 +117,7 @@ class Nodes:
 
 def read_character(file: File) -> Character:
     """Read a character to put motions onto; FormatError like :func:`motet.formats.gltf.read`."""
-    path = place_of(file)
-    with broken(path):
+    with broken(place_of(file)):
         # the figure that moves, in the world at rest
         gltf = parse(file)
         all_moved = set().union(*map(moved, gltf.objects("animations")))
@@ -128,7 +127,7 @@ def read_character(file: File) -> Character:
         skeleton = skeleton_at(figure.names, figure.parents, places[joints])
         # frames of joints must be invertible to write tracks for their nodes
         if not np.abs(np.linalg.det(linear[joints])).min() > 0:
-            raise FormatError(path, "nodes of its skeleton have scale 0: apply scales when exporting")
+            raise ContentError("nodes of its skeleton have scale 0: apply scales when exporting")
         nodes = Nodes(gltf, figure.nodes, skeleton, linear, places)
         return Character(rest_motion(skeleton), _joint_map(nodes), nodes, _skin(nodes))
 
@@ -139,7 +138,7 @@ def _joint_map(nodes: Nodes) -> JointMap | None:
     if not bones:
         return None
     if missing := [bone for bone in REQUIRED if bone not in bones]:
-        raise FormatError(nodes.gltf.path, f"its VRM humanoid lacks bones that VRM requires: {', '.join(missing)}")
+        raise ContentError(f"its VRM humanoid lacks bones that VRM requires: {', '.join(missing)}")
     # the bones of the spine and the neck, upwards; others one by one
     spine = tuple(bones[bone] for bone in ("spine", "chest", "upperChest") if bone in bones)
     neck = (bones["neck"],) if "neck" in bones else ()
@@ -154,8 +153,8 @@ def _skin(nodes: Nodes) -> dict[int, Array]:
     """
     try:
         parts = list(_meshes(nodes))
-    except FormatError as error:
-        log.info("estimating soles from the joints instead of the mesh: %s", error)
+    except ContentError as error:
+        log.info("estimating soles from the joints instead of the mesh: %s: %s", nodes.gltf.path, error)
         return {}
     if not parts:
         return {}
@@ -194,7 +193,7 @@ def _meshes(nodes: Nodes) -> Iterator[Skinned]:
 def _primitives(gltf: Gltf) -> list[Primitive]:
     """All primitives of meshes, each that a skin moves once, since it is where its joints are, whatever node has it.
     FormatError, before anything is computed, where these are too many points."""
-    primitives: dict[tuple[object, ...], Primitive] = {}
+    primitives = {}
     for node, primitive in _placed_primitives(gltf):
         attributes = primitive["attributes"]
         skin = gltf.objects("nodes")[node].get("skin") if "JOINTS_0" in attributes else None
@@ -203,7 +202,7 @@ def _primitives(gltf: Gltf) -> list[Primitive]:
     accessors = gltf.objects("accessors")
     points = sum(accessors[attributes["POSITION"]]["count"] for _, attributes, _ in primitives.values())
     if points > MAX_POINTS:
-        raise FormatError(gltf.path, f"the meshes of its nodes have {points} points, more than {MAX_POINTS}")
+        raise ContentError(f"the meshes of its nodes have {points} points, more than {MAX_POINTS}")
     return list(primitives.values())
 
 
@@ -217,12 +216,12 @@ def _placed_primitives(gltf: Gltf) -> Iterator[tuple[int, Json]]:
         primitives = gltf.objects("meshes")[properties["mesh"]]["primitives"]
         visited += len(primitives)
         if visited > MAX_PRIMITIVES:
-            raise FormatError(gltf.path, f"its nodes have more than {MAX_PRIMITIVES} primitives of meshes")
+            raise ContentError(f"its nodes have more than {MAX_PRIMITIVES} primitives of meshes")
         for primitive in primitives:
             yield node, primitive
 
 
-def _skinned(nodes: Nodes, skin: Json, points: Array, joints: NDArray[np.intp], weights: Array) -> Skinned:
+def _skinned(nodes: Nodes, skin: Json, points: Array, joints: Indices, weights: Array) -> Skinned:
     """The points (P, 3) moved by joints of a skin (P, K) with weights (P, K), and the heaviest joint of each."""
     # each joint moves every point, weighted; then the sum of weights is divided out
     linear, places = _bound(nodes, skin)
@@ -313,13 +312,13 @@ def _embedded_images(gltf: Gltf) -> list[Json]:
         embedded = dict(image)
         uri = image.get("uri", "data:")
         if not uri.startswith("data:"):
-            content = read_beside(gltf.path, "image", uri, room + 1, gltf.beside)
+            content = read_beside("image", uri, room + 1, gltf.beside)
             room -= len(content)
             media = next((PICTURES[start] for start in PICTURES if content.startswith(start)), None)
             if media is None:
-                raise FormatError(gltf.path, f"its image {quoted(uri)} is no PNG, JPEG, WebP or KTX picture")
+                raise ContentError(f"its image {quoted(uri)} is no PNG, JPEG, WebP or KTX picture")
             if room < 0:
-                raise FormatError(gltf.path, f"its buffers and images are over {GLTF_MAX_BYTES} bytes in total")
+                raise ContentError(f"its buffers and images are over {GLTF_MAX_BYTES} bytes in total")
             embedded["uri"] = _data_uri(media, content)
         images.append(embedded)
     return images
@@ -346,7 +345,8 @@ def write_clip(file: File, motion: Motion, nodes: Nodes) -> None:
     clip = animation(buffer, "motion", motion, tracks)
     skin = {"joints": [number_of[node] for node in joints]}
     inverse_bind = _inverse_bind(nodes.linear[joints], nodes.places[joints])
-    bare = _bare_nodes(nodes, number_of)
+    with naming(gltf.path):
+        bare = _bare_nodes(nodes, number_of)
     document = with_body(buffer, motion, nodes.skeleton, bare, clip, skin, inverse_bind)
     write_whole(file, container(document, buffer.content))
 

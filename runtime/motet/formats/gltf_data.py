@@ -18,9 +18,9 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from motet.errors import FormatError, MotionError, quoted
-from motet.files import File, place_of
-from motet.formats.text import read_bytes
+from motet.errors import MotionError, quoted
+from motet.files import File, Json, place_of
+from motet.formats.text import ContentError, names_file, naming, read_bytes
 from motet.motion.rotations import Array, frames_last, product, quat_to_rotmat, rotated, rotmat_to_quat
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -34,9 +34,6 @@ MAX_NODES = 20_000
 """Nodes of a file: a figure has a few hundred."""
 
 
-Json = dict[str, Any]
-"""A JSON object."""
-
 Tracks = Mapping[tuple[int, str], Array]
 """(Node, "translation", "rotation" or "scale") -> values (T, 3 or 4)."""
 
@@ -47,12 +44,13 @@ REST_TRANSFORM = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.
 @contextmanager
 def broken(path: Path) -> Iterator[None]:
     """Turn errors from misplaced or mistyped content into FormatError."""
-    try:
-        yield
-    except MotionError as error:
-        raise error if isinstance(error, FormatError) else FormatError(path, str(error)) from error
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise FormatError(path, f"broken glTF file: {type(error).__name__}: {str(error)[:200]}") from error
+    with naming(path):
+        try:
+            yield
+        except MotionError:
+            raise
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            raise ContentError(f"broken glTF file: {type(error).__name__}: {str(error)[:200]}") from error
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class Gltf:
         for index, node in enumerate(nodes):
             for child in node.get("children", []):
                 if not 0 <= child < len(nodes) or parents[child] != -1 or child == index:
-                    raise FormatError(self.path, f"its nodes are not a tree: node {child} below node {index}")
+                    raise ContentError(f"its nodes are not a tree: node {child} below node {index}")
                 parents[child] = index
         return tuple(parents)
 
@@ -101,7 +99,7 @@ class Gltf:
             order[node] = len(order)
             waiting.extend(reversed(self.objects("nodes")[node].get("children", [])))
         if len(order) < len(self.parents):
-            raise FormatError(self.path, "its nodes are not a tree: some of them form a cycle")
+            raise ContentError("its nodes are not a tree: some of them form a cycle")
         return order
 
     def humanoid(self) -> dict[str, int]:
@@ -118,7 +116,7 @@ class Gltf:
         """A node's name, or one made from its number; FormatError if it is not text."""
         name = self.objects("nodes")[node].get("name") or f"node{node}"
         if not isinstance(name, str):
-            raise FormatError(self.path, f"the name of node {node} is not text")
+            raise ContentError(f"the name of node {node} is not text")
         return name
 
     def local(self, node: int) -> dict[str, Array]:
@@ -172,14 +170,14 @@ class Gltf:
             try:
                 values = self._decoded(index)
             except (KeyError, IndexError, TypeError, ValueError) as error:
-                if isinstance(error, FormatError):
+                if isinstance(error, ContentError):
                     raise
-                raise FormatError(self.path, f"accessor {index} is broken: {str(error)[:200]}") from error
+                raise ContentError(f"accessor {index} is broken: {str(error)[:200]}") from error
             if not np.isfinite(values).all():
-                raise FormatError(self.path, f"accessor {index} holds numbers that are not finite")
+                raise ContentError(f"accessor {index} holds numbers that are not finite")
             self._numbers[0] += values.size
             if self._numbers[0] > self.size:
-                raise FormatError(self.path, "its arrays overlap: they hold more numbers than the file has bytes")
+                raise ContentError("its arrays overlap: they hold more numbers than the file has bytes")
             values.setflags(write=False)
             self._arrays[index] = values
         return self._arrays[index]
@@ -194,7 +192,7 @@ class Gltf:
         if "bufferView" in accessor:
             values = self._rows(index, accessor, kind, count, width).astype(np.float64)
         elif count * width > self.size:
-            raise FormatError(self.path, f"accessor {index} has more zeros than the file has bytes")
+            raise ContentError(f"accessor {index} has more zeros than the file has bytes")
         else:
             values = np.zeros((count, width))
         if "sparse" in accessor:
@@ -209,11 +207,11 @@ class Gltf:
         indices = sparse["indices"]
         kind = np.dtype(COMPONENTS[indices["componentType"]])
         if kind.kind != "u":
-            raise FormatError(self.path, f"accessor {index} is broken: its sparse indices are not unsigned integers")
+            raise ContentError(f"accessor {index} is broken: its sparse indices are not unsigned integers")
         places = self._rows(index, indices, kind, sparse["count"], 1)[:, 0].astype(np.int64)
         if (np.diff(places) <= 0).any() or (places >= count).any():
             reason = f"its sparse indices do not rise, or reach beyond its {count} elements"
-            raise FormatError(self.path, f"accessor {index} is broken: {reason}")
+            raise ContentError(f"accessor {index} is broken: {reason}")
         return places
 
     def _rows(self, index: int, part: Json, kind: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
@@ -225,7 +223,7 @@ class Gltf:
         stride = stride or size
         beyond = count and start + stride * (count - 1) + size > len(content)
         if count < 0 or start < 0 or stride < size or beyond:
-            raise FormatError(self.path, f"accessor {index} extends beyond its buffer: the file is truncated")
+            raise ContentError(f"accessor {index} extends beyond its buffer: the file is truncated")
         rows = np.lib.stride_tricks.as_strided(
             np.frombuffer(content, np.uint8, offset=start), (count, size), (stride, 1), writeable=False
         )
@@ -249,14 +247,14 @@ class Gltf:
         if find_spec("meshopt") is None:
             remedy = "install the extra with  pip install 'motet[meshopt]', or unpack the file with"
             command = "npx gltfpack -i IN.glb -o OUT.glb -noq -kn -ac"
-            raise FormatError(self.path, f"its animations are packed by meshoptimizer: {remedy}  {command}")
+            raise ContentError(f"its animations are packed by meshoptimizer: {remedy}  {command}")
         content = self._packed(packed)
         decode = import_module("meshopt").decode_gltf_buffer
         kind = (packed["count"], packed["byteStride"], packed["mode"], packed.get("filter"))
         try:
             unpacked: bytes = decode(content, *kind).tobytes()
         except (ValueError, TypeError) as error:
-            raise FormatError(self.path, f"a packed part is broken: {str(error)[:200]}") from error
+            raise ContentError(f"a packed part is broken: {str(error)[:200]}") from error
         return unpacked
 
     def _packed(self, packed: Json) -> bytes:
@@ -265,61 +263,62 @@ class Gltf:
         length = packed["byteLength"]
         content: bytes = self.buffers[packed["buffer"]][start : start + length]
         if not 0 <= start <= start + length or len(content) < length:
-            raise FormatError(self.path, "a packed part extends beyond its buffer: the file is truncated")
+            raise ContentError("a packed part extends beyond its buffer: the file is truncated")
         count = packed["count"]
         stride = packed["byteStride"]
         room = MAX_UNPACKED - sum(map(len, self._unpacked.values()))
         # bytes that one packed byte can expand to: a block of 256 equal bytes takes two bits
         if not (count > 0 and stride > 0 and count * stride <= min(room, 1024 * length)):
             reason = f"a packed part of {length} bytes cannot hold {count} elements of {stride} bytes"
-            raise FormatError(self.path, reason)
+            raise ContentError(reason)
         return content
 
 
+@names_file
 def parse(file: File) -> Gltf:
     """Read a file's parts; FormatError if it is not glTF 2.0, is truncated, or lacks its buffers."""
     path = place_of(file)
     content = read_bytes(file)
     # a binary file has both parts; a text file names the buffers
-    text, binary = _chunks(path, content) if content[:4] == b"glTF" else (content, b"")
+    text, binary = _chunks(content) if content[:4] == b"glTF" else (content, b"")
     try:
         document = json.loads(text)
         version = document["asset"]["version"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise FormatError(path, f"not a glTF file: {str(error)[:200]}") from error
+        raise ContentError(f"not a glTF file: {str(error)[:200]}") from error
     if not str(version).startswith("2."):
-        raise FormatError(path, f"glTF version {str(version)[:20]}: expected 2.0")
+        raise ContentError(f"glTF version {str(version)[:20]}: expected 2.0")
     if len(document.get("nodes", [])) > MAX_NODES:
-        raise FormatError(path, f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
+        raise ContentError(f"it has {len(document['nodes'])} nodes: expected at most {MAX_NODES}")
     beside = path.parent if isinstance(file, str | Path) and content[:4] != b"glTF" else None
-    return Gltf(path, document, _buffers(path, document, binary, beside), beside)
+    return Gltf(path, document, _buffers(document, binary, beside), beside)
 
 
-def _buffers(path: Path, document: Json, binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
+def _buffers(document: Json, binary: bytes, beside: Path | None) -> tuple[bytes, ...]:
     """The contents of all buffers; FormatError for sizes out of range."""
     buffers = document.get("buffers", [])
     sizes = [buffer["byteLength"] for buffer in buffers]
     if not all(isinstance(size, int) and size >= 0 for size in sizes) or sum(sizes) > GLTF_MAX_BYTES:
-        raise FormatError(path, f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
-    return tuple(_buffer(path, buffer, binary, beside) for buffer in buffers)
+        raise ContentError(f"its buffers declare invalid sizes, or over {GLTF_MAX_BYTES} bytes in total")
+    return tuple(_buffer(buffer, binary, beside) for buffer in buffers)
 
 
-def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
+def _chunks(content: bytes) -> tuple[bytes, bytes]:
     """The JSON text and the binary part of a GLB file."""
     chunks: dict[bytes, bytes] = {}
     place = 12
     while place + 8 <= len(content):
         length, kind = struct.unpack_from("<I4s", content, place)
         if place + 8 + length > len(content):
-            raise FormatError(path, "truncated GLB file: it ends within a chunk")
+            raise ContentError("truncated GLB file: it ends within a chunk")
         chunks.setdefault(kind, content[place + 8 : place + 8 + length])
         place += 8 + length
     if b"JSON" not in chunks:
-        raise FormatError(path, "truncated GLB file: it has no JSON chunk")
+        raise ContentError("truncated GLB file: it has no JSON chunk")
     return chunks[b"JSON"], chunks.get(b"BIN\0", b"")
 
 
-def _buffer(path: Path, buffer: Json, binary: bytes, beside: Path | None) -> bytes:
+def _buffer(buffer: Json, binary: bytes, beside: Path | None) -> bytes:
     """The content of a buffer, up to its declared size; files in the folder ``beside`` only if given."""
     uri = buffer.get("uri")
     size = buffer["byteLength"]
@@ -327,13 +326,13 @@ def _buffer(path: Path, buffer: Json, binary: bytes, beside: Path | None) -> byt
         return binary[:size]
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])[:size]
-    return read_beside(path, "buffer", uri, size, beside)
+    return read_beside("buffer", uri, size, beside)
 
 
-def read_beside(path: Path, what: str, uri: str, size: int, beside: Path | None) -> bytes:
+def read_beside(what: str, uri: str, size: int, beside: Path | None) -> bytes:
     """At most ``size`` bytes of a file that a .gltf names; FormatError if it is none in the folder ``beside``."""
     if beside is None:
-        raise FormatError(path, f"its {what} {quoted(uri)} is a separate file, which requires a .gltf given by path")
+        raise ContentError(f"its {what} {quoted(uri)} is a separate file, which requires a .gltf given by path")
     place = beside / unquote(uri)
     try:
         if place.resolve().is_relative_to(beside.resolve()) and not place.is_symlink() and place.is_file():
@@ -341,8 +340,8 @@ def read_beside(path: Path, what: str, uri: str, size: int, beside: Path | None)
                 if stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
                     return opened.read(size)
     except (OSError, ValueError, RuntimeError) as error:  # RuntimeError: a loop of links, before Python 3.13
-        raise FormatError(path, f"its {what} {quoted(uri)} cannot be read: {error}") from error
-    raise FormatError(path, f"its {what} {quoted(uri)} is not a file in its folder")
+        raise ContentError(f"its {what} {quoted(uri)} cannot be read: {error}") from error
+    raise ContentError(f"its {what} {quoted(uri)} is not a file in its folder")
 
 
 def _without_links(name: str, flags: int) -> int:

@@ -15,7 +15,6 @@ import json
 import math
 import zipfile
 from collections.abc import Iterator
-from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
@@ -24,11 +23,11 @@ from numpy.typing import NDArray
 
 from motet.errors import FormatError
 from motet.files import File, place_of, write_whole
-from motet.formats.text import check_rate, frame_rate, most_poses, read_bytes
+from motet.formats.text import ContentError, check_rate, frame_rate, most_poses, names_file, read_bytes
 from motet.motion.kinematics import motion_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, product, rotvec_to_rotmat
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Names, Skeleton
 
 NPZ_MAX_BYTES = 2**29
 """Bytes of an unpacked array: over an hour of a hundred channels at 120 fps."""
@@ -77,6 +76,7 @@ RATE_ARRAYS = ("mocap_framerate", "mocap_frame_rate", "fps")
 """Arrays that hold the frame rate of SMPL's, one or another."""
 
 
+@names_file
 def read(file: File, fps: float | None = None) -> Motion:
     """Read a motion written by :func:`write`, or the 22 body joints of a file of SMPL bodies, such as AMASS.
 
@@ -84,7 +84,6 @@ def read(file: File, fps: float | None = None) -> Motion:
     rate. FormatError where arrays are missing, do not fit or are of another kind, or where the file states another
     rate.
     """
-    path = place_of(file)
     content = read_bytes(file)
     kind = "an .npz motion written by motet"
     try:
@@ -92,16 +91,16 @@ def read(file: File, fps: float | None = None) -> Motion:
             names = {name.removesuffix(".npy") for name in archive.namelist()}
             if parts := next(filter(names.issuperset, ROTATIONS), None):
                 kind = "a file of SMPL bodies"
-                return _smpl(path, archive, names, parts, len(content), fps)
-            motion = _motet(path, archive, names)
-            check_rate(path, motion.fps, fps)
+                return _smpl(archive, names, parts, len(content), fps)
+            motion = _motet(archive, names)
+            check_rate(motion.fps, fps)
             return motion
-    except FormatError:
+    except ContentError:
         raise
     # a damaged archive makes zipfile, its unpackers, numpy and json raise errors of a dozen types
     except Exception as error:
         reason = error.args[0] if isinstance(error, KeyError) else error
-        raise FormatError(path, f"not {kind}: {str(reason)[:200]}") from error
+        raise ContentError(f"not {kind}: {str(reason)[:200]}") from error
 
 
 def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
@@ -131,8 +130,7 @@ def array(archive: zipfile.ZipFile, name: str, kinds: str) -> NDArray[Any]:
 def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """Shape, whether columns come first, and dtype of an array, from the beginning of its file."""
     headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    header: tuple[tuple[int, ...], bool, np.dtype[Any]] = headers[npy.read_magic(stream)](stream)
-    return header
+    return headers[npy.read_magic(stream)](stream)
 
 
 ARRAYS = {"values": "fiu", "channels": "U", "units": "U", "fps": "fiu", "skeleton": "U"}
@@ -149,24 +147,22 @@ UNSUPPORTED_ARRAYS = {
 """An array of files that are not read -> what these are."""
 
 
-def _motet(path: Path, archive: zipfile.ZipFile, names: set[str]) -> Motion:
+def _motet(archive: zipfile.ZipFile, names: set[str]) -> Motion:
     for name, kind in UNSUPPORTED_ARRAYS.items():
         if name in names and not names >= ARRAYS.keys():
-            raise FormatError(path, f"this is {kind}; expected a motion from motet, AMASS or other SMPL bodies")
+            raise ContentError(f"this is {kind}; expected a motion from motet, AMASS or other SMPL bodies")
     values, channels, units, fps, skeleton = (array(archive, name, kinds) for name, kinds in ARRAYS.items())
     bones = Skeleton.from_json(json.loads(str(skeleton))) if str(skeleton) else None
-    rate = frame_rate(float(fps), path)
+    rate = frame_rate(float(fps))
     return Motion(values, tuple(map(str, channels.tolist())), tuple(map(str, units.tolist())), rate, bones)
 
 
-def _smpl(
-    path: Path, archive: zipfile.ZipFile, names: set[str], parts: tuple[str, ...], size: int, fps: float | None
-) -> Motion:
+def _smpl(archive: zipfile.ZipFile, names: set[str], parts: Names, size: int, fps: float | None) -> Motion:
     # rotations in their parents' frames
-    turned = _joints(path, archive, parts, size)
+    turned = _joints(archive, parts, size)
     # where the root is, in metres
-    trans = _path_of_root(path, archive, names, len(turned))
-    rate = _rate(path, archive, names, fps)
+    trans = _path_of_root(archive, names, len(turned))
+    rate = _rate(archive, names, fps)
 
     # rotations in the world, y up
     if parts[-1] != "body_pose":
@@ -178,70 +174,70 @@ def _smpl(
     return motion_of(Skeleton(AMASS_JOINTS, metres_per_unit=1.0), turned, {0: trans}, rate)
 
 
-def _joints(path: Path, archive: zipfile.ZipFile, parts: tuple[str, ...], size: int) -> Array:
+def _joints(archive: zipfile.ZipFile, parts: Names, size: int) -> Array:
     """Rotations (T, 22, 3, 3) of the body's joints, each in its parent's frame."""
     with archive.open(f"{parts[0]}.npy") as stream:
         shape = _header(stream)[0]
     if not shape:
-        raise FormatError(path, f"{parts[0]} is a single number: expected its frames")
+        raise ContentError(f"{parts[0]} is a single number: expected its frames")
     # a small file must not become a large motion
     if shape[0] * len(AMASS_JOINTS) >= most_poses(size):
-        raise FormatError(path, f"{shape[0]} frames are too many for a file of {size} bytes")
-    each = [_rotations(path, part, array(archive, part, "fiu").astype(np.float64)) for part in parts]
+        raise ContentError(f"{shape[0]} frames are too many for a file of {size} bytes")
+    each = [_rotations(part, array(archive, part, "fiu").astype(np.float64)) for part in parts]
     turned = np.concatenate(each, axis=1)
     if turned.shape[1] < len(AMASS_JOINTS):
         expected = f"expected {len(AMASS_JOINTS)} or more"
-        raise FormatError(path, f"{' and '.join(parts)}: {turned.shape[1]} joints, {expected}")
+        raise ContentError(f"{' and '.join(parts)}: {turned.shape[1]} joints, {expected}")
     return np.array(turned[:, : len(AMASS_JOINTS)])
 
 
-def _path_of_root(path: Path, archive: zipfile.ZipFile, names: set[str], frames: int) -> Array:
+def _path_of_root(archive: zipfile.ZipFile, names: set[str], frames: int) -> Array:
     """The translation (T, 3) of the root in metres."""
     place = next(filter(names.__contains__, ("trans", "transl")), None)
     if place is None:
-        raise FormatError(path, "no translation of the root: expected an array trans or transl")
+        raise ContentError("no translation of the root: expected an array trans or transl")
     trans = array(archive, place, "fiu").astype(np.float64)
     # the root has a place in each frame
     if trans.shape != (frames, 3) or not np.isfinite(trans).all():
-        raise FormatError(path, f"{place} must be ({frames}, 3) finite numbers, not {trans.shape}")
+        raise ContentError(f"{place} must be ({frames}, 3) finite numbers, not {trans.shape}")
     return trans
 
 
-def _rate(path: Path, archive: zipfile.ZipFile, names: set[str], fps: float | None) -> float:
+def _rate(archive: zipfile.ZipFile, names: set[str], fps: float | None) -> float:
     """The frame rate that a file states, or else the one that was given."""
     name = next(filter(names.__contains__, RATE_ARRAYS), None)
     if name is not None:
-        stated = frame_rate(float(array(archive, name, "fiu")), path)
-        check_rate(path, stated, fps)
+        stated = frame_rate(float(array(archive, name, "fiu")))
+        check_rate(stated, fps)
         return stated
     if fps is None:
-        raise FormatError(
-            path, f"no frame rate, as an array {' or '.join(RATE_ARRAYS)}: give it by --fps-in, in Python fps="
+        raise ContentError(
+            f"no frame rate, as an array {' or '.join(RATE_ARRAYS)}: give it by --fps-in, in Python fps="
         )
-    return frame_rate(fps, path)
+    return frame_rate(fps)
 
 
-def _rotations(path: Path, name: str, values: Array) -> Array:
+def _rotations(name: str, values: Array) -> Array:
     """Rotations (T, J, 3, 3) of joints, from vectors (T, 3 J) or (T, J, 3), or matrices (T, J, 3, 3) or (T, 3, 3)."""
     if not np.isfinite(values).all():
-        raise FormatError(path, f"{name} holds numbers that are not finite")
+        raise ContentError(f"{name} holds numbers that are not finite")
     # the root's may come without an axis of joints
     if values.ndim == 3 and values.shape[1:] == (3, 3) and name in ("global_orient", "root_orient"):
         values = values[:, None]
     if values.ndim == 4 and values.shape[2:] == (3, 3):
-        _check_matrices(path, name, values)
+        _check_matrices(name, values)
         return np.array(values)
     if values.ndim not in (2, 3) or math.prod(values.shape[1:]) % 3:
         shapes = "(frames, 3 times joints), (frames, joints, 3) or (frames, joints, 3, 3)"
-        raise FormatError(path, f"{name} of shape {values.shape}: expected {shapes}")
+        raise ContentError(f"{name} of shape {values.shape}: expected {shapes}")
     return rotvec_to_rotmat(values.reshape(len(values), -1, 3))
 
 
-def _check_matrices(path: Path, name: str, matrices: Array) -> None:
+def _check_matrices(name: str, matrices: Array) -> None:
     """FormatError where some of the matrices (T, J, 3, 3) are no rotations."""
     differences = matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3)
     if np.abs(differences).max(initial=0.0) > 0.01 or np.linalg.det(matrices).min(initial=1.0) < 0:
-        raise FormatError(path, f"{name} holds matrices that are no rotations")
+        raise ContentError(f"{name} holds matrices that are no rotations")
 
 
 def write(file: File, motion: Motion) -> None:

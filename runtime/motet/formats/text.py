@@ -6,25 +6,28 @@ Walk of file.glb or, if there is no such clip, the figure of that name.
 
 import logging
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from difflib import get_close_matches
+from functools import wraps
 from itertools import permutations
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Concatenate, Literal, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
-from motet.errors import FormatError, listed, quoted
+from motet.errors import FormatError, MotionError, listed, quoted
 from motet.files import File, place_of
 from motet.motion.kinematics import AXES, local_translations, skeleton_of
 from motet.motion.motion import TURN, Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Joint, Skeleton
+from motet.motion.skeleton import Joint, Names, Skeleton, Triple
 
 log = logging.getLogger(__name__)
 
-Triple = tuple[float, float, float]
+P = ParamSpec("P")
+T = TypeVar("T")
 
 NOWHERE: Triple = (0.0, 0.0, 0.0)
 
@@ -42,8 +45,38 @@ class Contents(NamedTuple):
     figures: each of its skeletons -> the clips that move it.
     """
 
-    clips: tuple[str, ...]
-    figures: dict[str, tuple[str, ...]]
+    clips: Names
+    figures: dict[str, Names]
+
+
+class ContentError(MotionError):
+    """What breaks the rules of a format, in a file that is yet to be named: the reason, and the line (from 1)."""
+
+    def __init__(self, reason: str, line: int | None = None) -> None:
+        super().__init__(reason)
+        self.line = line
+
+
+@contextmanager
+def naming(file: File) -> Iterator[None]:
+    """What is wrong with a file's content as a FormatError that names the file."""
+    try:
+        yield
+    except FormatError:
+        raise
+    except MotionError as error:
+        raise FormatError(place_of(file), str(error), getattr(error, "line", None)) from error
+
+
+def names_file(read: Callable[Concatenate[File, P], T]) -> Callable[Concatenate[File, P], T]:
+    """A function that reads a file, and names it in its errors."""
+
+    @wraps(read)
+    def named(file: File, /, *arguments: P.args, **options: P.kwargs) -> T:
+        with naming(file):
+            return read(file, *arguments, **options)
+
+    return named
 
 
 MARK = "#"
@@ -69,11 +102,11 @@ def read_bytes(file: File, most: int | None = None) -> bytes:
                 content = opened.read(limit)
         else:
             missing = "a link that leads nowhere" if path.is_symlink() else "no such file"
-            raise FormatError(path, "it is not a file" if path.exists() else missing)
+            raise ContentError("it is not a file" if path.exists() else missing)
     except OSError as error:
-        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+        raise ContentError(f"cannot be read: {error.strerror}") from error
     if most is not None and len(content) > most:
-        raise FormatError(path, f"it is too large: expected at most {most} bytes")
+        raise ContentError(f"it is too large: expected at most {most} bytes")
     return content
 
 
@@ -84,7 +117,7 @@ def read_text(file: File) -> str:
     """
     content = read_bytes(file)
     if b"\0" in content:
-        raise FormatError(place_of(file), "not a text file")
+        raise ContentError("not a text file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -113,32 +146,32 @@ def table(lines: Sequence[str]) -> Array | None:
     return values if np.isfinite(values).all() else None
 
 
-def check_rate(path: Path, stated: float | None, expected: float | None) -> None:
+def check_rate(stated: float | None, expected: float | None) -> None:
     """FormatError where a file states another frame rate than the one that its reader was called with."""
     if stated is not None and expected is not None and abs(stated - expected) > 1e-6 * stated:
-        raise FormatError(path, f"the file states {stated:g} fps, but {expected:g} was given")
+        raise ContentError(f"the file states {stated:g} fps, but {expected:g} was given")
 
 
-def numbers(words: Sequence[str], path: Path, line: int | None) -> list[float]:
+def numbers(words: Sequence[str], line: int | None) -> list[float]:
     """Finite numbers; FormatError with file and line for any other word."""
     if finite(words) is None:
         # the first word at fault, and why it may be there
         wrong = next(word for word in words if finite([word]) is None)
         comma = ": decimals are written with a point, not a comma" if re.fullmatch(r"[-+]?\d*,\d+", wrong) else ""
-        raise FormatError(path, f"{quoted(wrong)} is not a finite number{comma}", line)
+        raise ContentError(f"{quoted(wrong)} is not a finite number{comma}", line)
     return [float(word) for word in words]
 
 
-def number(word: str, path: Path, line: int | None) -> float:
+def number(word: str, line: int | None) -> float:
     """One finite number; FormatError like :func:`numbers`."""
-    return numbers([word], path, line)[0]
+    return numbers([word], line)[0]
 
 
-def triple(words: Sequence[str], path: Path, line: int) -> Triple:
+def triple(words: Sequence[str], line: int) -> Triple:
     """Three finite numbers; FormatError like :func:`numbers`."""
-    values = numbers(words, path, line)
+    values = numbers(words, line)
     if len(values) != 3:
-        raise FormatError(path, f"expected three numbers, not {len(values)}", line)
+        raise ContentError(f"expected three numbers, not {len(values)}", line)
     return values[0], values[1], values[2]
 
 
@@ -147,11 +180,11 @@ def spaced(values: Iterable[float]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def frame_rate(fps: float, path: Path, line: int | None = None) -> float:
+def frame_rate(fps: float, line: int | None = None) -> float:
     """A file's frame rate; FormatError if it is none of :data:`FRAME_RATES`."""
     low, high = FRAME_RATES
     if not low <= fps <= high:
-        raise FormatError(path, f"frame rate {fps:g} is out of range: expected {low:g} to {high:g}", line)
+        raise ContentError(f"frame rate {fps:g} is out of range: expected {low:g} to {high:g}", line)
     return fps
 
 
@@ -160,7 +193,7 @@ def most_poses(size: int) -> int:
     return min(MAX_POSES, FREE_POSES + size)
 
 
-def units_of(channels: Iterable[str], angle: str) -> tuple[str, ...]:
+def units_of(channels: Iterable[str], angle: str) -> Names:
     """The units of translations, "length", and of Euler angles, which are in the unit ``angle``."""
     return tuple("length" if name[-2] == "t" else angle for name in channels)
 
@@ -171,7 +204,7 @@ def complete_order(axes: str) -> str:
     return next(order for order in map("".join, permutations("zyx")) if re.fullmatch(pattern, order))
 
 
-class Names:
+class UniqueNames:
     """Hands out unique names: a name already taken gets the suffix _2, _3, ..."""
 
     def __init__(self, taken: Iterable[str] = ()) -> None:
@@ -192,7 +225,7 @@ class Names:
 
 def plain_names(names: Iterable[str], forbidden: str) -> list[str]:
     """Unique non-empty names, with ``_`` for every character that matches the regular expression ``forbidden``."""
-    plain = Names()
+    plain = UniqueNames()
     return [plain.unique(re.sub(forbidden, "_", name) or "_") for name in names]
 
 
@@ -207,7 +240,7 @@ def with_names(motion: Motion, names: Sequence[str]) -> Motion:
     return replace(motion, channels=channels, skeleton=Skeleton(joints, skeleton.metres_per_unit))
 
 
-def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, tuple[str, ...]]:
+def with_still_offsets(path: str | Path, motion: Motion) -> tuple[Motion, Names]:
     """The motion with constant translations turned into offsets of the skeleton, and the joints that still translate.
 
     The root keeps its translation and is not among those joints; all translations are in "length".
@@ -233,7 +266,7 @@ def _still_joints(motion: Motion) -> tuple[list[Joint], list[str]]:
     the root, whose translation changes."""
     skeleton = skeleton_of(motion)
     joints = list(skeleton.joints)
-    moving: list[str] = []
+    moving = []
     translations = local_translations(motion)
     moved = {channel.rpartition(".")[0] for channel in motion.channels if channel[-2] == "t"}
     # a translation that does not change is an offset
@@ -263,9 +296,9 @@ def _check_channels(path: str | Path, motion: Motion) -> None:
         raise FormatError(path, f"holds only Euler angles and translations of joints, not {', '.join(wrong)}")
 
 
-def part_names(names_in_file: Iterable[str], kind: str = "clip") -> tuple[str, ...]:
+def part_names(names_in_file: Iterable[str], kind: str = "clip") -> Names:
     """Unique names for a file's clips or figures, in order: printable and on one line, "clip3" for an empty third."""
-    names = Names()
+    names = UniqueNames()
     return tuple(names.unique(_tidy(name) or f"{kind}{i}") for i, name in enumerate(names_in_file, start=1))
 
 
@@ -355,7 +388,7 @@ def split_clip(file: File, extensions: Sequence[str]) -> tuple[File, str | None]
         return file, None
     # every mark may be the one: in names of files it is allowed
     parts = str(file).split(MARK)
-    ways: list[tuple[Path, str]] = []
+    ways = []
     for i in range(1, len(parts)):
         path = Path(MARK.join(parts[:i]))
         if path.suffix.lower() in extensions:

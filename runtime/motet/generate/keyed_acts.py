@@ -165,7 +165,9 @@ def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | N
 def _orders_in(words: Sequence[str], stems: Iterable[str]) -> Iterator[Order]:
     """The orders with one of some stems whose words are all among some words."""
     of_words = stems_of(words)
-    orders = {order.sentence: order for a_stem in stems for order in _orders().get(a_stem, ())}
+    orders: dict[str, Order] = {}
+    for a_stem in stems:
+        orders |= {order.sentence: order for order in _orders().get(a_stem, ())}
     for order in orders.values():
         if order.stems <= of_words and order.particles <= set(words):
             yield order
@@ -219,7 +221,9 @@ def stems_of(words: Iterable[str]) -> frozenset[str]:
 @cache
 def verbs() -> frozenset[str]:
     """The stems of the first words of all orders, which say what is done."""
-    first_words = [sentence.split()[0] for sentences in says().values() for sentence in sentences]
+    first_words = []
+    for sentences in says().values():
+        first_words += [sentence.split()[0] for sentence in sentences]
     return stems_of(first_words) - BODY_STEMS
 
 

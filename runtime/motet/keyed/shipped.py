@@ -14,10 +14,9 @@ LIBRARY = files("motet.keyed") / "library"
 
 
 @cache
-def _says_by_file() -> Mapping[str, Mapping[str, tuple[str, ...]]]:
+def _says_by_file() -> Mapping[str, Mapping[str, list[str]]]:
     """File -> the name of each of its acts -> its sentences."""
-    tables = tomllib.loads((LIBRARY / "says.toml").read_text(encoding="utf-8"))
-    return {file: {name: tuple(sentences) for name, sentences in acts.items()} for file, acts in tables.items()}
+    return tomllib.loads((LIBRARY / "says.toml").read_text(encoding="utf-8"))
 
 
 @cache
@@ -25,16 +24,15 @@ def says() -> Mapping[str, tuple[str, ...]]:
     """The name of each act -> its sentences."""
     sentences: dict[str, tuple[str, ...]] = {}
     for acts in _says_by_file().values():
-        sentences |= acts
+        sentences |= {name: tuple(of_act) for name, of_act in acts.items()}
     return sentences
 
 
 @cache
 def _acts_of(file: str) -> Mapping[str, KeyedAct]:
     """The acts of a file by name."""
-    sentences = _says_by_file()[file]
     with as_file(LIBRARY / f"{file}.toml") as path:
-        return {name: replace(act, says=sentences[name]) for name, act in read(path).items()}
+        return {name: replace(act, says=says()[name]) for name, act in read(path).items()}
 
 
 def shipped(name: str) -> KeyedAct:

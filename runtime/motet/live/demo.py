@@ -18,9 +18,6 @@ from motet.predict.model import PredictModel
 from motet.steering.model import SteerModel
 
 PROMPTS = ("a person waves", "a person kicks", "someone bows", "a man walks in a circle")
-GIVEN = 1.0
-FUTURE = 5.0
-"""Seconds of the walk that is given, and of its prediction."""
 
 
 MOST_JOINED_FRAMES = 120
@@ -63,8 +60,9 @@ def _pages(place: Path) -> Iterator[Card]:
 
 
 def _predicted(place: Path, walk: Motion, writer: CodesModel) -> Card:
-    start_of_walk = walk[: round(GIVEN * walk.fps) + 1]
-    future = load_as(PredictModel, "predict").predict(start_of_walk, seconds=FUTURE, append=True, beyond=writer)
+    start_of_walk = walk[: round(1.0 * walk.fps) + 1]
+    # a second of the walk is given, five are predicted
+    future = load_as(PredictModel, "predict").predict(start_of_walk, seconds=5.0, append=True, beyond=writer)
     write(place / "predict.html", future, [(0.0, "given"), (start_of_walk.duration, "predicted")], "motet predict")
     return Card("predict.html", "Predict", "A second of a walk is given; the rest goes on from it.", future)
 

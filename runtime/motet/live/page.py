@@ -5,7 +5,6 @@ bundle's own numbers: its settings, and its tables, gzipped.
 """
 
 from dataclasses import asdict
-from typing import Any
 
 from motet.bundle.packing import packed
 from motet.draw.figure import Body
@@ -13,7 +12,7 @@ from motet.draw.page import body_data, filled, source
 from motet.draw.skinned import person
 from motet.errors import BundleError, ControlError
 from motet.figures.humanoid import HUMANOID, T_POSE
-from motet.files import File, place_of, write_whole
+from motet.files import File, Json, place_of, write_whole
 from motet.settings import checked_int
 from motet.steering.foot_lock import FootLockSettings
 from motet.steering.model import SteerModel
@@ -44,7 +43,7 @@ def live_page(model: SteerModel, characters: int = 1, title: str = "motet") -> s
     return filled(source("motet.live", "page.html"), title, data, CONTROL=source("motet.live", "control.js"))
 
 
-def net_data(model: SteerModel) -> dict[str, Any]:
+def net_data(model: SteerModel) -> Json:
     """All that ``control.js`` steers a figure with, ready for JSON: ``Given`` of ``livePage.ts``, and the bytes."""
     manifest = model.manifest
     kinds = (SteeringSettings, FootLockSettings)
@@ -59,7 +58,7 @@ def net_data(model: SteerModel) -> dict[str, Any]:
     }
 
 
-def live_body() -> dict[str, Any]:
+def live_body() -> Json:
     """The body that is drawn on the humanoid, and its height in metres."""
     height = Body(HUMANOID).height
     return {"height": height, **body_data(person(), T_POSE / height)}

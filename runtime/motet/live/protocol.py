@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from motet.errors import ControlError, ControlWarning, MotetError, TextError, TextWarning, collected, each_once, quoted
 from motet.figures.humanoid import BONES, HUMANOID, LEFT_RIGHT
+from motet.files import Json
 from motet.settings import checked_int
 from motet.steering.model import SteerModel
 from motet.steering.pose import Pose
@@ -72,7 +73,7 @@ class ClientSession:
         self.heard += 1
         return [*unknown, *each_once(notes)]
 
-    def _obey(self, kind: str, arguments: dict[str, Any]) -> list[str]:
+    def _obey(self, kind: str, arguments: Json) -> list[str]:
         """Do what a message says; why an act is not known, and what is answered to a sentence."""
         if kind == "start":
             self._start(arguments)
@@ -88,7 +89,7 @@ class ClientSession:
             getattr(self.session, kind)(**{**nowhere, **arguments})
         return []
 
-    def _start(self, arguments: dict[str, Any]) -> None:
+    def _start(self, arguments: Json) -> None:
         characters = arguments.pop("characters", 1)
         positions = arguments.pop("positions", False)
         checked_int("characters", characters, 1, CLIENT_FIGURES, ControlError)
@@ -114,7 +115,7 @@ class ClientSession:
             "contacts": pose.contacts,
             **({"positions": pose.positions()} if self.positions else {}),
         }
-        characters = list[dict[str, Any]]()
+        characters = []
         columns = [np.round(values.astype(np.float64), 5).tolist() for values in parts.values()]
         for values in zip(*columns, strict=True):
             characters.append(dict(zip(parts, values, strict=True)))
@@ -128,8 +129,7 @@ class ClientSession:
 def hello(model: SteerModel) -> str:
     """The first message: gaits with their speeds in m/s (lowest, usual, highest), the rate, and the figure."""
     speeds = {gait: [low, model.usual[gait], high] for gait, (low, high) in model.speeds.items()}
-    joints = [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in HUMANOID.joints]
-    return message("hello", fps=model.fps, gaits=speeds, bones=list(BONES), joints=joints)
+    return message("hello", fps=model.fps, gaits=speeds, bones=list(BONES), joints=HUMANOID.outline())
 
 
 def message(kind: str, **fields: Any) -> str:
@@ -137,40 +137,50 @@ def message(kind: str, **fields: Any) -> str:
     return json.dumps({"type": kind, **fields}, separators=(",", ":"), allow_nan=False)
 
 
-def parsed(text: str | bytes) -> tuple[str, dict[str, Any]]:
-    """The type of a client's message and what it says, without what is null; ProtocolError for one that is none."""
+def from_json(text: str | bytes) -> Any:
+    """The value of JSON, without infinite numbers; ValueError for what is none."""
 
     def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is no number")
 
+    try:
+        return json.loads(text, parse_constant=refuse)
+    except RecursionError as fault:
+        raise ValueError(fault) from fault
+
+
+def parsed(text: str | bytes) -> tuple[str, Json]:
+    """The type of a client's message and what it says, without what is null; ProtocolError for one that is none."""
     # a JSON object of a known type
     if not isinstance(text, str):
         raise ProtocolError("messages must be text, not binary")
     try:
-        document = json.loads(text, parse_constant=refuse)
-    except (ValueError, RecursionError) as fault:
+        document = from_json(text)
+    except ValueError as fault:
         raise ProtocolError(f"a message must be JSON: {fault}") from fault
     kind = document.pop("type", None) if isinstance(document, dict) else None
     if not isinstance(kind, str) or kind not in KEYS:
         raise ProtocolError(f'a message must be an object whose "type" is one of {", ".join(KEYS)}')
     # whose values are known and fit
     arguments = {name: value for name, value in document.items() if value is not None}
+    _check_arguments(kind, arguments)
+    return kind, arguments
+
+
+def _check_arguments(kind: str, arguments: Json) -> None:
+    """ProtocolError for what a type of message does not have, or does not take, and where it lacks what it needs."""
     for name, value in arguments.items():
         if name not in KEYS[kind]:
             raise ProtocolError(f"{kind}: {quoted(name)} is unknown; expected one of {', '.join(KEYS[kind])}")
         if wanted := _unfit(kind, name, value):
             raise ProtocolError(f"{kind}, {name}: expected {wanted}")
-    # and that says what its type needs
     if kind in REQUIRED_FIELDS and REQUIRED_FIELDS[kind] not in arguments:
         raise ProtocolError(f"{kind}: expected {REQUIRED_FIELDS[kind]}")
-    return kind, arguments
 
 
 def _unfit(kind: str, name: str, value: Any) -> str | None:
     """What a value should be, where it is not."""
-    if name in ("speed", "direction", "facing", "velocity", "places", "points", "here") and not _numeric(
-        value, depth=2
-    ):
+    if name in NUMBER_FIELDS and not _numeric(value, depth=2):
         return f"numbers up to {LARGEST_COMMAND:g}, or lists of them"
     one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
     if name == "gait" and not (isinstance(value, str) or one_for_each):

@@ -9,7 +9,7 @@ import socket
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 from motet.errors import MotetError, OutputError, TextError, TextWarning, collected
 from motet.generate.base import GenerateModel
@@ -70,7 +70,7 @@ class Connection(ServerConnection):
                 super().data_received(data[start : start + (1 << 12)])
 
     def abort(self) -> None:
-        """See :class:`Wire`."""
+        """Close it at once."""
         self.transport.abort()
 
     def process_event(self, event: Event) -> None:
@@ -95,22 +95,6 @@ def connection_options(limits: Limits) -> dict[str, Any]:
         "ping_timeout": limits.ping,
         "close_timeout": 1,
     }
-
-
-class Wire(Protocol):
-    """A connection to a client; ConnectionClosed where it is closed."""
-
-    async def send(self, text: str, /) -> None:
-        """Send a message."""
-
-    async def recv(self) -> str | bytes:
-        """The client's next message."""
-
-    async def close(self, code: int, reason: str) -> None:
-        """Close it, and say why."""
-
-    def abort(self) -> None:
-        """Close it at once."""
 
 
 class LiveClients:
@@ -140,7 +124,7 @@ class LiveClients:
         ClientSession(model, characters)  # refuses now what it would refuse every client
         self._clients: list[ClientSession] = []
 
-    async def connected(self, connection: "Connection") -> None:
+    async def connected(self, connection: Connection) -> None:
         """All of one client of a connection that is open."""
         # the system holds no more for a client than this, either
         connection.transport.get_extra_info("socket").setsockopt(
@@ -148,7 +132,7 @@ class LiveClients:
         )
         await self.client(connection)
 
-    async def client(self, connection: Wire) -> None:
+    async def client(self, connection: Connection) -> None:
         """All of one client, until it goes or is dropped: ticks and its messages, side by side."""
         if len(self._clients) >= self.limits.clients or self._figures() + self.characters > self.limits.figures:
             reason = f"there are {len(self._clients)} clients already, of {self._figures()} figures"
@@ -175,7 +159,7 @@ class LiveClients:
     def _figures(self) -> int:
         return sum(client.session.characters for client in self._clients)
 
-    async def _listen(self, connection: Wire, client: ClientSession) -> None:
+    async def _listen(self, connection: Connection, client: ClientSession) -> None:
         tick = 0
         count = 0
         while True:
@@ -201,7 +185,7 @@ class LiveClients:
             with suppress(TextError), collected(TextWarning):  # of which the client is told
                 await asyncio.to_thread(words.act, sentence)
 
-    async def _tick(self, connection: Wire, client: ClientSession) -> None:
+    async def _tick(self, connection: Connection, client: ClientSession) -> None:
         clock = asyncio.get_running_loop().time
         due = clock()
         while True:
@@ -212,14 +196,14 @@ class LiveClients:
             due = max(due + 1 / self.rate, clock() - 0.1)  # what is late is not made up for
             await asyncio.sleep(due - clock())
 
-    async def _send(self, connection: Wire, text: str) -> None:
+    async def _send(self, connection: Connection, text: str) -> None:
         try:
             async with asyncio.timeout(self.limits.stall):
                 await connection.send(text)
         except TimeoutError:
             raise ProtocolError(f"took no frames for {self.limits.stall:g} s") from None
 
-    async def _drop(self, connection: Wire, reason: str) -> None:
+    async def _drop(self, connection: Connection, reason: str) -> None:
         """Say why, as far as the client still listens, and close: it broke a rule (1008)."""
         short = reason.encode()[:120].decode(errors="ignore")  # a frame that closes has room for 123 bytes
         try:

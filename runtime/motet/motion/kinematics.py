@@ -18,12 +18,15 @@ from motet.motion.rotations import (
     rotated,
     rotmats_to_euler,
 )
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton
 
 AXES = ("x", "y", "z")
 
+Transforms = tuple[Array, Array]
+"""Rotations (T, J, 3, 3) and positions (T, J, 3) of joints."""
 
-def channels_of(joint: str, letter: str) -> tuple[str, ...]:
+
+def channels_of(joint: str, letter: str) -> Names:
     """The channels of a joint's translation ("t"), Euler angles ("r") or exponential map ("e"), along x, y and z."""
     return tuple(f"{joint}.{letter}{axis}" for axis in AXES)
 
@@ -102,12 +105,12 @@ def local_translations(motion: Motion) -> Array:
     return translations
 
 
-def global_transforms(motion: Motion) -> tuple[Array, Array]:
+def global_transforms(motion: Motion) -> Transforms:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) of every joint in the world, lengths in the skeleton's unit."""
     return chained(skeleton_of(motion), local_rotations(motion), local_translations(motion))
 
 
-def chained(skeleton: Skeleton, rotations: Array, translations: Array) -> tuple[Array, Array]:
+def chained(skeleton: Skeleton, rotations: Array, translations: Array) -> Transforms:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) in the world, from those in each parent's frame, in place."""
     # level by level, so that all joints of one depth are computed at once, after their parents
     for level in skeleton.levels:
@@ -164,7 +167,7 @@ def side_by_side(rotations: Sequence[Array], frames: int) -> Array:
     return stacked
 
 
-def with_channels(motion: Motion, names: tuple[str, ...], values: Array, units: tuple[str, ...]) -> Motion:
+def with_channels(motion: Motion, names: Names, values: Array, units: Names) -> Motion:
     """The motion with channels (T, len(names)) replaced, or prepended if it has none of that name."""
     # new channels stand before all others
     new = tuple(name for name in names if name not in motion.channels)

@@ -32,15 +32,6 @@ from motet.motion.rotations import (
     twist,
 )
 
-LIVELY = 0.6
-"""Least energy of a loop, relative to the mean of the whole motion."""
-
-LONGEST_COMPARED = 1500
-"""Frames that are compared pairwise at most; of longer motions every second or third, then the frames in between."""
-
-SECONDS_APART = 0.1
-"""Seconds: velocities count by how far they diverge in this time."""
-
 FARTHEST_ENDS = 0.04
 """Largest difference of a loop's ends, as a share of the figure's height. Of 40 recorded walks, on the humanoid at 30
 fps, nine in ten repeat within 0.03 of the height, steady strides within 0.01 to 0.02; half of the running takes, which
@@ -75,7 +66,7 @@ def _level_translation(part: Motion, hips: int, above: Array, share: Array) -> A
     translation = local_translations(part)[:, hips]
     height = rotated(above, translation)[:, 1:2]
     rise = rotated(inverse(above), share * (height[-1] - height[0]) * UP)
-    return np.asarray(translation - rise)
+    return translation - rise
 
 
 def _closed_rotations(part: Motion, hips: int, hips_world: Array, above: Array, share: Array) -> dict[str, Array]:
@@ -139,7 +130,8 @@ def _repetition(motion: Motion, hips: int, shortest: float) -> tuple[int, int]:
         )
     # first among every few frames, then among all frames near the best pair
     poses = _poses(motion, hips)
-    step = -(-len(motion) // LONGEST_COMPARED)
+    # at most 1500 frames are compared pairwise: of longer motions every second or third
+    step = -(-len(motion) // 1500)
     start, stop = _coarse_repetition(poses, least, step)
     start, stop = _nearest_pair(poses, start, stop, least, step)
     difference = float(np.linalg.norm(poses[start] - poses[stop]))
@@ -160,7 +152,8 @@ def _coarse_repetition(poses: Array, least: int, step: int) -> tuple[int, int]:
     energy = _energy(poses)[::step]
     by_start = []
     for length in lengths:
-        is_lively = _means(energy, length) >= LIVELY
+        # a loop has at least 0.6 of the mean energy of the whole motion
+        is_lively = _means(energy, length) >= 0.6
         by_start.append(np.where(is_lively, distances.diagonal(length), np.inf))
     best = np.array([values.min() for values in by_start])
 
@@ -201,7 +194,7 @@ def _energy(poses: Array) -> Array:
 def _means(values: Array, length: int) -> Array:
     """The means (T - length,) of ``length`` values each of (T,)."""
     sums = np.cumsum(np.insert(values, 0, 0.0))
-    return np.asarray((sums[length:-1] - sums[: -length - 1]) / length)
+    return (sums[length:-1] - sums[: -length - 1]) / length
 
 
 def _distances(rows: Array, others: Array) -> Array:
@@ -220,6 +213,7 @@ def _poses(motion: Motion, hips: int) -> Array:
     to_facing = inverse(twist(rotations[:, hips], UP))[:, None]
     ground = places[:, [hips]] * (1 - UP)
     places = places[:, skeleton.below(hips)]
-    velocities = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * SECONDS_APART
+    # velocities count by how far they diverge in a tenth of a second
+    velocities = np.gradient(places, axis=0, edge_order=2 if len(motion) > 2 else 1) * motion.fps * 0.1
     points = np.concatenate([rotated(to_facing, places - ground), rotated(to_facing, velocities)], axis=1)
     return np.asarray(points.reshape(len(motion), -1) / (np.sqrt(places.shape[1]) * skeleton.height))

@@ -17,7 +17,7 @@ from motet.motion.rotations import (
     continuous_rotvec,
     without_turns,
 )
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -41,8 +41,8 @@ class Motion:
     """
 
     values: Array
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
+    channels: Names
+    units: Names
     fps: float
     skeleton: Skeleton | None = None
 
@@ -115,7 +115,7 @@ class Motion:
             raise MotionError(f"no frame between {start:g} and {stop:g} s at {self.fps:g} fps")
         return part
 
-    def select(self, channels: tuple[str, ...], units: tuple[str, ...] | None = None) -> "Motion":
+    def select(self, channels: Names, units: Names | None = None) -> "Motion":
         """The named channels in the order given, converted to ``units``; MotionError names what is missing."""
         if channels == self.channels and units in (None, self.units):
             return self
@@ -225,7 +225,7 @@ class Motion:
 
 
 @lru_cache(maxsize=64)
-def _check_channels(channels: tuple[str, ...], units: tuple[str, ...]) -> None:
+def _check_channels(channels: Names, units: Names) -> None:
     """MotionError for names that are not unique, and units that are unknown or not one for each."""
     if len(set(channels)) != len(channels):
         raise MotionError("channel names must be unique")
@@ -234,13 +234,13 @@ def _check_channels(channels: tuple[str, ...], units: tuple[str, ...]) -> None:
 
 
 @lru_cache(maxsize=64)
-def _places(channels: tuple[str, ...]) -> Mapping[str, int]:
+def _places(channels: Names) -> Mapping[str, int]:
     """The column of each channel."""
     return {name: column for column, name in enumerate(channels)}
 
 
 @lru_cache(maxsize=64)
-def _rotation_columns(channels: tuple[str, ...], units: tuple[str, ...], letter: str) -> Mapping[str, list[int]]:
+def _rotation_columns(channels: Names, units: Names, letter: str) -> Mapping[str, list[int]]:
     columns_of: dict[str, list[int]] = {}
     for column in sorted(range(len(channels)), key=lambda column: channels[column][-2:]):
         joint, _, kind = channels[column].rpartition(".")
@@ -297,7 +297,7 @@ def spline(values: Array, times: Array) -> Array:
     b = padded[start + 1]
     c = padded[start + 2]
     d = padded[start + 3]
-    return np.asarray(b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a))))
+    return b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)))
 
 
 def _extended(values: Array) -> Array:
@@ -318,7 +318,7 @@ def _between(values: Array, times: Array) -> tuple[Indices, Array]:
 
 def motions_of(source: Motion | Iterable[Motion]) -> list[Motion]:
     """A motion, or several, as a list; ArgumentError for anything else."""
-    motions: list[Motion] = []
+    motions = []
     for motion in source if is_many(source) and not isinstance(source, Motion) else [source]:
         if not isinstance(motion, Motion):
             remedy = ": motet.read() reads a file" if isinstance(motion, str | PathLike) else ""

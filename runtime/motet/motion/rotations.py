@@ -30,6 +30,11 @@ def frames_last(shape: tuple[int, ...]) -> Array:
     return np.empty(shape[::-1]).T
 
 
+def identities(*shape: int) -> Array:
+    """Rotations (..., 3, 3) by no angle."""
+    return np.tile(np.eye(3), (*shape, 1, 1))
+
+
 def angle_of(sine: Array, cosine: Array) -> Array:
     """Angles (...) in radians from sines and cosines (...): ``np.arctan2``, rounded the same for any memory layout.
 

@@ -10,12 +10,18 @@ from operator import index
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError, UnitError
-from motet.motion.rotations import Array, euler_to_rotmat
+from motet.files import Json
+from motet.motion.rotations import Array, Indices, euler_to_rotmat
 
 END_SUFFIX = "_end"
+
+Triple = tuple[float, float, float]
+"""x, y and z."""
+
+Names = tuple[str, ...]
+"""Names of joints or channels, or units of channels, in their order."""
 
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 """Name of a unit of length -> its metres."""
@@ -38,9 +44,9 @@ class Joint:
 
     name: str
     parent: int
-    offset: tuple[float, float, float]
+    offset: Triple
     order: str = "zyx"
-    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axis: Triple = (0.0, 0.0, 0.0)
 
     @cached_property
     def frame(self) -> Array:
@@ -80,7 +86,7 @@ class Skeleton:
         return f"Skeleton({len(self.joints)} joints, root {self.joints[0].name!r}, {unit})"
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
+    def names(self) -> Names:
         """The joints' names, in order."""
         return tuple(joint.name for joint in self.joints)
 
@@ -103,7 +109,7 @@ class Skeleton:
         return tuple(map(tuple, children))
 
     @cached_property
-    def levels(self) -> tuple[NDArray[np.intp], ...]:
+    def levels(self) -> tuple[Indices, ...]:
         """Indices of the joints by their number of ancestors, without the root."""
         depth = np.zeros(len(self.joints), dtype=np.intp)
         for i, joint in enumerate(self.joints[1:], start=1):
@@ -111,7 +117,7 @@ class Skeleton:
         return tuple(np.flatnonzero(depth == level) for level in range(1, depth.max() + 1))
 
     @cached_property
-    def parents(self) -> NDArray[np.intp]:
+    def parents(self) -> Indices:
         """For each joint the index of its parent, -1 for the root."""
         return np.array([joint.parent for joint in self.joints], dtype=np.intp)
 
@@ -133,10 +139,6 @@ class Skeleton:
         if name not in self.places:
             raise MotionError(f"the skeleton has no joint {name!r}; it has {', '.join(self.names)}")
         return self.places[name]
-
-    def subtree(self, name: str) -> tuple[int, ...]:
-        """Indices of a joint and all its descendants."""
-        return tuple(self.below(self.index(name)))
 
     def below(self, joint: int) -> list[int]:
         """Indices of a joint and all that hangs on it, in order."""
@@ -164,50 +166,48 @@ class Skeleton:
             joints.append(replace(joint, offset=tuple(offset)))
         return replace(self, joints=tuple(joints))
 
+    def is_like(self, other: "Skeleton", tolerance: float, first: int = 0) -> bool:
+        """Whether another skeleton has the same joints and unit, and from the ``first`` joint on offsets that differ by
+        no more than a share of its height."""
+        if len(self.joints) != len(other.joints) or self.with_offsets(other.offsets) != other:
+            return False
+        differences = np.abs(self.offsets - other.offsets)[first:]
+        return bool(differences.max(initial=0.0) <= tolerance * other.height)
+
     def unit_factor(self, metres_per_unit: float) -> float:
         """The factor from this skeleton's unit to the other unit."""
         if self.metres_per_unit is None:
             raise UnitError("the length unit of this skeleton is unknown: set it, as in motion.with_unit(0.01)")
         return self.metres_per_unit / metres_per_unit
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """A JSON object that :meth:`from_json` reads back without loss."""
-        joints = []
-        for joint in self.joints:
-            joints.append(
-                {
-                    "name": joint.name,
-                    "parent": joint.parent,
-                    "offset": list(joint.offset),
-                    "order": joint.order,
-                    "axis": list(joint.axis),
-                }
-            )
+        joints = self.outline()
+        for row, joint in zip(joints, self.joints, strict=True):
+            row |= {"order": joint.order, "axis": list(joint.axis)}
         return {"metres_per_unit": self.metres_per_unit, "joints": joints}
+
+    def outline(self) -> list[Json]:
+        """Of each joint its name, its parent's index, -1 for none, and its offset, for JSON."""
+        return [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in self.joints]
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> "Skeleton":
         """The inverse of :meth:`to_json`; MotionError if it is not a skeleton."""
         try:
-            joints = tuple(map(_read_joint, data["joints"]))
+            joints = []
+            for row in data["joints"]:
+                offset = _triple(row["offset"])
+                joints.append(
+                    Joint(str(row["name"]), index(row["parent"]), offset, str(row["order"]), _triple(row["axis"]))
+                )
             metres = data["metres_per_unit"]
-            return Skeleton(joints, None if metres is None else float(metres))
+            return Skeleton(tuple(joints), None if metres is None else float(metres))
         except (KeyError, TypeError, ValueError) as error:
             raise MotionError(f"not a skeleton: {error}") from error
 
 
-def _read_joint(data: Mapping[str, Any]) -> Joint:
-    """A joint as :meth:`Skeleton.to_json` writes it."""
-    return Joint(
-        str(data["name"]),
-        index(data["parent"]),
-        _triple(data["offset"]),
-        str(data["order"]),
-        _triple(data["axis"]),
-    )
-
-
-def _triple(values: Iterable[float]) -> tuple[float, float, float]:
+def _triple(values: Iterable[float]) -> Triple:
     x, y, z = map(float, values)
     return x, y, z
 
@@ -230,7 +230,7 @@ def partners_of(names: Sequence[str]) -> tuple[int, ...]:
     return tuple(partner for partner, _ in _partners(names))
 
 
-def sides_of(names: Sequence[str]) -> tuple[str, ...]:
+def sides_of(names: Sequence[str]) -> Names:
     """:data:`LEFT`, :data:`RIGHT` or :data:`MIDDLE` for each name; one without a partner is in the middle."""
     return tuple(side for _, side in _partners(names))
 

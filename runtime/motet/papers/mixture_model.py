@@ -33,10 +33,10 @@ class MixtureModel(GenerateModel):
         rest = {name: value for name, value in settings.items() if name != "max_seconds"}
         frames = max(1, round(settings["max_seconds"] * self.fps))
         samples: list[list[Sample]] = self.loop.run(self.graphs["step"], contexts, noise, frames, **rest)
-        return [list(map(self._denormalised, row)) for row in samples]
-
-    def _denormalised(self, sample: Sample) -> Sample:
-        return sample._replace(frames=self.contract.denormalised(sample.frames))
+        denormalised = []
+        for row in samples:
+            denormalised.append([sample._replace(frames=self.contract.denormalised(sample.frames)) for sample in row])
+        return denormalised
 
     def score(self, sentence: str, motion: Motion) -> float:
         """See :meth:`GenerateModel.score`."""

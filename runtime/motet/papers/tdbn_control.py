@@ -59,8 +59,7 @@ class TdbnModel(ControlModel):
 
     def encode(self, frames: ArrayLike) -> Floats:
         """Frames (B, D) in the contract's units to codes (B, H) float32."""
-        codes: Floats = self.encoder({"frames": np.asarray(frames, dtype=np.float32)})["codes"]
-        return codes
+        return self.encoder({"frames": np.asarray(frames, dtype=np.float32)})["codes"]
 
     def start(
         self,

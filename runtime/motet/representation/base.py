@@ -13,8 +13,8 @@ from motet.errors import MotionError
 from motet.motion.kinematics import channels_of, skeleton_of
 from motet.motion.mirroring import lateral_axis
 from motet.motion.motion import Motion, is_whole
-from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton, partners_of
+from motet.motion.rotations import Array, Indices
+from motet.motion.skeleton import Names, Skeleton, partners_of
 
 
 class Representation(ABC):
@@ -23,7 +23,7 @@ class Representation(ABC):
     required: channels that features always have.
     """
 
-    required: tuple[str, ...] = ()
+    required: Names = ()
 
     @abstractmethod
     def features(self, motion: Motion, like: Motion | None = None) -> Motion:
@@ -50,13 +50,12 @@ class Representation(ABC):
 class FrameMirror:
     """Column d of a mirrored frame is column ``columns[d]`` of the frame times ``signs[d]``; both (D,)."""
 
-    columns: NDArray[np.intp]
+    columns: Indices
     signs: NDArray[np.float32]
 
     def __call__(self, frames: NDArray[Any]) -> NDArray[Any]:
         """Mirror frames (..., D)."""
-        mirrored: NDArray[Any] = frames[..., self.columns] * self.signs
-        return mirrored
+        return frames[..., self.columns] * self.signs
 
 
 def phases(motion: Motion, fps: float) -> Iterator[Motion]:
@@ -76,7 +75,7 @@ def root_signs(channels: Sequence[str]) -> NDArray[np.float32]:
     return np.array([-1.0 if name in turned else 1.0 for name in channels], dtype=np.float32)
 
 
-def joint_channels(joints: Iterable[str], kinds: Sequence[str]) -> tuple[str, ...]:
+def joint_channels(joints: Iterable[str], kinds: Sequence[str]) -> Names:
     """The channels of these kinds of joints, one joint after the other."""
     return tuple(f"{joint}.{kind}" for joint, kind in product(joints, kinds))
 
@@ -86,7 +85,7 @@ def root_places(motion: Motion) -> Array:
     return motion.select(channels_of(skeleton_of(motion).names[0], "t"), ("m",) * 3).values
 
 
-def joints_with(channels: Sequence[str], kind: str) -> tuple[str, ...]:
+def joints_with(channels: Sequence[str], kind: str) -> Names:
     """The joints that have a channel of a kind."""
     return tuple(name.rpartition(".")[0] for name in channels if name.endswith(f".{kind}"))
 

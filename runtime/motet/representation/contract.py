@@ -3,16 +3,16 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from motet.errors import BundleError, MotionError
 from motet.figures.humanoid import Figure, to_humanoid
+from motet.files import Json
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 from motet.representation.base import FrameMirror, Representation, phases
 from motet.representation.retargeting import (
     foreign,
@@ -67,8 +67,8 @@ class MotionContract:
     """
 
     representation: str
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
+    channels: Names
+    units: Names
     fps: float
     mean: Array
     std: Array
@@ -141,7 +141,7 @@ class MotionContract:
         return (known and motion.skeleton == self.skeleton) or set(self.channels) <= set(motion.channels)
 
     @cached_property
-    def _joints(self) -> tuple[str, ...]:
+    def _joints(self) -> Names:
         """The joints that the channels speak of, but for the root where its block does."""
         block = named(self.representation).required
         names = (channel.rpartition(".")[0] for channel in self.channels if channel not in block)
@@ -160,19 +160,17 @@ class MotionContract:
         """Frames (..., D) in standard deviations from the mean: 0 in dead channels, and within Z_LIMIT."""
         # dead channels are divided by infinity
         scale = np.where(self.std > 0, self.std, np.inf)
-        z: Array = np.clip(
+        return np.clip(
             (np.asarray(frames, dtype=np.float64) - self.mean) / scale,
             -Z_LIMIT,
             Z_LIMIT,
         )
-        return z
 
     def denormalised(self, z: ArrayLike) -> Array:
         """The inverse: frames (..., D), dead channels at their mean."""
-        frames: Array = np.asarray(z, dtype=np.float64) * self.std + self.mean
-        return frames
+        return np.asarray(z, dtype=np.float64) * self.std + self.mean
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """A JSON object; :func:`motet.bundle.manifest.read_contract` is the inverse."""
         return {
             "representation": self.representation,
@@ -199,5 +197,4 @@ def sequences(representation: str, motion: Motion, fps: float, like: Motion | No
 def living(std: ArrayLike, units: Sequence[str]) -> Array:
     """Standard deviations (D,) of training data, 0 where they are under the floor of their unit."""
     floors = np.array([LIVING_STD[unit] for unit in units])
-    living_std: Array = np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)
-    return living_std
+    return np.where(np.asarray(std, dtype=np.float64) < floors, 0.0, std)

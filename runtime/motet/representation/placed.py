@@ -32,6 +32,9 @@ from motet.representation.root_sixd import (
 ROOT_PLACE = 3
 """Channels of the root's place, before all axes."""
 
+HIPS_AXES = slice(ROOT_PLACE, ROOT_PLACE + 6)
+"""Channels of the axes of the hips."""
+
 PLACED_CHANNELS = ROOT_PLACE + 6 * len(BONES)
 """E."""
 
@@ -59,7 +62,7 @@ def placed_by_way(frames: Array, fps: float) -> Array:
 
     # the hips are turned from the facing to the world; all other bones are seen from their parents
     placed_frames = np.concatenate([path, frames[..., len(ROOT_SIXD) :]], axis=-1, dtype=np.float64)
-    _turn(placed_frames[..., ROOT_PLACE : ROOT_PLACE + 6], facing)
+    _turn(placed_frames[..., HIPS_AXES], facing)
     return placed_frames
 
 
@@ -70,7 +73,7 @@ def pose_of(frames: Array) -> Array:
     :func:`motet.representation.root_sixd.facing`, but of one frame alone.
     """
     # of a turn about y after a tilt, this quotient is free of the tilt
-    hips = sixd_to_rotmat(frames[..., ROOT_PLACE : ROOT_PLACE + 6])
+    hips = sixd_to_rotmat(frames[..., HIPS_AXES])
     angle = np.arctan2(hips[..., 0, 2] - hips[..., 2, 0], hips[..., 0, 0] + hips[..., 2, 2])
     return np.stack([frames[..., 0], frames[..., 2], angle], axis=-1)
 
@@ -125,7 +128,7 @@ def straight(past: Array, after: Array, count: int) -> Array:
 
 def _parts(count: int) -> Array:
     """Which part of the way (count, 1) each of the frames between two has behind it."""
-    return np.asarray((np.arange(1, count + 1) / (count + 1))[:, None])
+    return (np.arange(1, count + 1) / (count + 1))[:, None]
 
 
 def _root_velocity(places: Array) -> Array:
@@ -160,7 +163,7 @@ def mirror() -> FrameMirror:
     for bone, partner in enumerate(partners_of(BONES)):
         bone_columns = kinds + len(SIXD_KINDS) * bone
         columns[bone_columns] = kinds + len(SIXD_KINDS) * partner
-        signs[bone_columns] = SIXD_SIGNS
+        signs[bone_columns] = list(SIXD_SIGNS.values())
     return FrameMirror(columns, signs)
 
 
@@ -172,7 +175,7 @@ def _rotations(frames: Array) -> Array:
 def _turned(frames: Array, angle: Array) -> Array:
     """The frames (..., T, E), changed in place, turned about the world's vertical axis by angles (..., T)."""
     _turn(frames[..., :ROOT_PLACE], angle)
-    _turn(frames[..., ROOT_PLACE : ROOT_PLACE + 6], angle)
+    _turn(frames[..., HIPS_AXES], angle)
     return frames
 
 

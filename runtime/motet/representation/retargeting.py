@@ -37,7 +37,7 @@ from motet.motion.rotations import (
     rotmat_to_rotvec,
     rotvec_to_rotmat,
 )
-from motet.motion.skeleton import Skeleton
+from motet.motion.skeleton import Names, Skeleton
 
 log = logging.getLogger(__name__)
 
@@ -61,7 +61,7 @@ def foreign(motion: Motion, skeleton: Skeleton, joints: Iterable[str]) -> str | 
 
 
 @lru_cache(maxsize=256)
-def _differences(skeleton: Skeleton, other: Skeleton) -> tuple[str | None, tuple[str, ...]]:
+def _differences(skeleton: Skeleton, other: Skeleton) -> tuple[str | None, Names]:
     """Why angles mean other poses in another skeleton: a bone points elsewhere; None if they do not. And names of the
     joints of both that turn about other axes."""
     turned = []
@@ -207,7 +207,7 @@ def _translations_between(back: Motion, ends: Motion, part: Array) -> Array:
     """Translations (T, J, 3) of a motion moved to those at the ends, by parts (T, 1) of the way between them."""
     translations = local_translations(back)
     offsets = local_translations(ends) - _ends_of(translations, ends)
-    return np.asarray(translations + offsets[:1] + part[..., None] * (offsets[-1:] - offsets[:1]))
+    return translations + offsets[:1] + part[..., None] * (offsets[-1:] - offsets[:1])
 
 
 def _turns_between(turns: Array, part: Array) -> Array:

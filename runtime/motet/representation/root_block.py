@@ -47,7 +47,7 @@ from motet.motion.rotations import (
     rotmats_to_euler,
     rotvec_to_rotmat,
 )
-from motet.motion.skeleton import END_SUFFIX
+from motet.motion.skeleton import END_SUFFIX, Names
 from motet.representation.base import (
     FrameMirror,
     Representation,
@@ -244,7 +244,7 @@ def plant_feet(motion: Motion) -> Motion:
     return with_channels(motion, ROOT_BLOCK[:2], block.values, ROOT_BLOCK_UNITS[:2])
 
 
-def _root_channels(motion: Motion) -> tuple[str, ...]:
+def _root_channels(motion: Motion) -> Names:
     root = skeleton_of(motion).names[0]
     return channels_of(root, "t") + channels_of(root, "r")
 
@@ -285,7 +285,10 @@ class RootAngles(Representation):
         return FrameMirror(columns, signs)
 
 
-VECTOR_KINDS = ("ex", "ey", "ez")
+VECTOR_SIGNS = {"ex": 1, "ey": -1, "ez": -1}
+"""Kinds of channels of exponential maps, and what a mirror image in the plane x = 0 makes of them."""
+
+VECTOR_KINDS = tuple(VECTOR_SIGNS)
 
 
 class RootVectors(Representation):
@@ -324,10 +327,10 @@ class RootVectors(Representation):
 
     def mirror(self, features: Motion) -> FrameMirror:
         """As :func:`motet.motion.mirroring.mirror` does it, for exponential maps in the parent joint's axes."""
-        return mirror_by_joints(features, dict(zip(VECTOR_KINDS, (1, -1, -1), strict=True)))
+        return mirror_by_joints(features, VECTOR_SIGNS)
 
 
-def joints_of(channels: Sequence[str]) -> tuple[str, ...]:
+def joints_of(channels: Sequence[str]) -> Names:
     """The joints whose exponential maps are among the channels."""
     return joints_with(channels, "ex")
 

@@ -33,11 +33,10 @@ ROOT_SIXD = ("root.forward", "root.left", "root.turn", "root.height")
 ROOT_SIXD_UNITS = ("m/s", "m/s", "rad/s", "m")
 """As in :mod:`motet.representation.root_block`, but for the facing and for radians."""
 
-SIXD_KINDS = ("xx", "xy", "xz", "yx", "yy", "yz")
-"""Where the x axis and where the y axis points."""
+SIXD_SIGNS = {"xx": 1.0, "xy": -1.0, "xz": -1.0, "yx": -1.0, "yy": 1.0, "yz": 1.0}
+"""Where the x axis and where the y axis points, and what a mirror image in the plane x = 0 makes of that."""
 
-SIXD_SIGNS = (1.0, -1.0, -1.0, -1.0, 1.0, 1.0)
-"""What a mirror image in the plane x = 0 makes of them."""
+SIXD_KINDS = tuple(SIXD_SIGNS)
 
 
 FACING_SPREAD = 4 / 30
@@ -67,7 +66,7 @@ class RootSixd(Representation):
 
     def mirror(self, features: Motion) -> FrameMirror:
         """The axes of each joint's partner, mirrored."""
-        return mirror_by_joints(features, dict(zip(SIXD_KINDS, SIXD_SIGNS, strict=True)))
+        return mirror_by_joints(features, SIXD_SIGNS)
 
 
 def to_root_sixd(motion: Motion) -> Motion:
@@ -114,15 +113,11 @@ def _way(features: Motion, after: Motion | None, pose: Array | None) -> tuple[Ar
         steps[:1] = 0
         pose = np.zeros(3)
     elif pose is None:
-        pose = _last_pose(after)
+        # where the root is over the ground and how it faces in the last frame
+        place = last_place(after)
+        pose = np.array([place[0], place[2], facing(after)[-1]])
     facings, x, z = way(steps, (pose[0], 0.0, pose[1]), pose[2])
     return facings, np.column_stack([x, features.select(ROOT_SIXD[3:]).values, z])
-
-
-def _last_pose(motion: Motion) -> Array:
-    """Where the root is over the ground and how it faces (x, z, facing) in a motion's last frame."""
-    place = last_place(motion)
-    return np.array([place[0], place[2], facing(motion)[-1]])
 
 
 def facing(motion: Motion) -> Array:
@@ -154,10 +149,16 @@ def sixd_to_rotmat(sixd: Array) -> Array:
     # x as it is, and what of y is square to it
     x = sixd[..., :3]
     y = sixd[..., 3:]
-    x = x / np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
-    y = y - (x * y).sum(axis=-1, keepdims=True) * x
-    y = y / np.maximum(np.linalg.norm(y, axis=-1, keepdims=True), 1e-9)
+    x = _of_length_1(x)
+    y = _of_length_1(y - (x * y).sum(axis=-1, keepdims=True) * x)
     return np.stack([x, y, np.cross(x, y)], axis=-1)
+
+
+def _of_length_1(vectors: Array) -> Array:
+    """Vectors (..., 3) of length 1, but for those that are next to nothing."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    scaled: Array = vectors / np.maximum(lengths, 1e-9)
+    return scaled
 
 
 def rotmat_to_sixd(matrices: Array) -> Array:

@@ -13,13 +13,13 @@ from motet.draw.page import Captions
 from motet.errors import TextWarning, TravelWarning, collected
 from motet.figures.feet.treadmill import is_in_place
 from motet.figures.humanoid import rig
+from motet.files import Json
 from motet.formats import ONTO, Character
 from motet.generate.base import PLAYED, Generated
 from motet.generate.model import CodesModel, Story
 from motet.models.describe import DescribeModel, Description
 from motet.motion.looping import looped
 from motet.motion.motion import Motion, rest_motion
-from motet.motion.skeleton import METRES
 from motet.predict.model import PredictModel
 from motet.serve.batches import Batcher
 from motet.serve.content import MEDIA, Order, as_json, content_of, figure_of, frames_of
@@ -43,7 +43,7 @@ class Answer:
 
     content: bytes
     media: str
-    understood: list[dict[str, Any]] | None = None
+    understood: list[Json] | None = None
 
 
 class Answers:
@@ -73,7 +73,7 @@ class Answers:
         for pool in (self._models, self._threads):
             pool.shutdown(cancel_futures=True)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> Json:
         """What a look at the server's health shows: the models, and how many requests wait for them."""
         models = (self._writer, self._describer, self._predictor)
         waiting = len(self._generated) + len(self._described) + len(self._predicted)
@@ -99,7 +99,7 @@ class Answers:
         texts, settings = await _in(self._threads, self._texts_and_settings, data, True)
         settings |= await self._after(data)
         pieces = await _in(self._models, partial(self._writer.stream, texts, **settings))
-        parts: list[str] = []
+        parts = []
         for text in texts:
             parts += self._parts(text, data)
         understood = await _in(self._models, lambda: [self._read_as(part) for part in parts])
@@ -157,7 +157,7 @@ class Answers:
         """What a text asks for one after another."""
         return [text] if data.settings.get("whole") else self._writer.parts(text)
 
-    def _read_as(self, text: str, shown: Shown | Generated | Passage | None = None) -> dict[str, Any]:
+    def _read_as(self, text: str, shown: Shown | Generated | Passage | None = None) -> Json:
         """How a sentence was understood: as what it is shown, or will likely be."""
         shown = shown or self._writer.likeliest(text)
         known = asdict(self._writer.understood(text))
@@ -189,11 +189,16 @@ class Answers:
         """What ``motet describe --json`` says of a file."""
         motion = await self._uploaded_motion(data)
         about = {"input": data.files["file"].name, "in_place": await _in(self._threads, is_in_place, motion)}
-        if data.settings.get("timeline"):
-            if data.some("beams", "draws"):
-                raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
-            parts = await _in(self._models, self._describer.timeline, motion)
-            return _json_answer([{**about, **part.to_json()} for part in parts])
+        if not data.settings.get("timeline"):
+            rows = await self._windows_described(motion, data)
+        elif data.some("beams", "draws"):
+            raise RequestError("timeline gives one sentence for each part: it goes with neither beams nor draws")
+        else:
+            rows = [part.to_json() for part in await _in(self._models, self._describer.timeline, motion)]
+        return Answer(as_json([{**about, **row} for row in rows]), MEDIA["json"])
+
+    async def _windows_described(self, motion: Motion, data: RequestData) -> list[Json]:
+        """The start, stop and sentences of each window of a motion."""
         windows = await _in(self._threads, self._describer.windows, motion)
         settings = data.some("beams", "draws", "seed")
         if settings.get("draws") == 0:  # none drawn: beam search
@@ -202,11 +207,11 @@ class Answers:
         rows = []
         for (start, part), row in zip(windows, descriptions, strict=True):
             hypotheses = [hypothesis.to_json() for hypothesis in row]
-            rows.append({**about, "start": start, "stop": start + part.duration, "hypotheses": hypotheses})
-        return _json_answer(rows)
+            rows.append({"start": start, "stop": start + part.duration, "hypotheses": hypotheses})
+        return rows
 
     def _describe(self, key: Key, files: list[list[Motion]]) -> list[list[list[Description]]]:
-        all_windows: list[Motion] = []
+        all_windows = []
         for windows in files:
             all_windows += windows
         descriptions = iter(self._describer.describe(all_windows, **cast(Any, dict(key))))
@@ -218,10 +223,7 @@ class Answers:
             raise RequestError(
                 "there is no file: send its bytes as the body, and its type as format, or a form's 'file'"
             )
-        unit = data.settings.get("unit_in")
-        if unit is not None and unit not in METRES:
-            raise RequestError(f"unit_in: expected one of {', '.join(METRES)}, not {unit!r}")
-        options = {**data.some("clip", "figure", "partial"), **({"unit": unit} if unit else {})}
+        options = {**data.some("clip", "figure", "partial"), "unit": data.settings.get("unit_in")}
         return await self._readers.motion(data.files["file"], self._bounds, options)
 
     # ---- predict
@@ -261,16 +263,12 @@ def rig_of(data: RequestData, form: str, limits: Limits) -> Character | None:
 
 
 def order_of(
-    data: RequestData, form: str, title: str, captions: Captions | None = None, details: dict[str, Any] | None = None
+    data: RequestData, form: str, title: str, captions: Captions | None = None, details: Json | None = None
 ) -> Order:
     """What a request orders."""
     settings = data.settings
     options = {"fps": settings.get("fps"), "in_place": settings.get("in_place", False), "onto": "onto" in data.files}
     return Order(form, title, **options, captions=captions, details=details or {})
-
-
-def _json_answer(rows: list[dict[str, Any]]) -> Answer:
-    return Answer(as_json(rows), MEDIA["json"])
 
 
 async def _in(pool: ThreadPoolExecutor, call: Callable[..., T], *arguments: Any) -> T:

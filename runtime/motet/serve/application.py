@@ -6,11 +6,11 @@ import socket
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from importlib.metadata import version
-from typing import Any
 
 from motet.bundle.bundle import Bundle
 from motet.bundle.graph import SessionOptions
 from motet.errors import BundleError, MotetError, OutputError
+from motet.files import Json
 from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
 from motet.models.describe import DescribeModel
@@ -93,9 +93,7 @@ def app(
     return application
 
 
-def _models(
-    bundles: Sequence[str], kinds: Mapping[str, type[BundleModel]], session: SessionOptions | None
-) -> dict[str, Any]:
+def _models(bundles: Sequence[str], kinds: Mapping[str, type[BundleModel]], session: SessionOptions | None) -> Json:
     """A model of each kind by its verb, which is also the default bundle's name."""
     names = {verb: verb for verb in kinds} | {Bundle.open(name).manifest.verb: name for name in bundles}
     if others := sorted(names.keys() - kinds.keys()):

@@ -8,8 +8,8 @@ import numpy as np
 
 from motet.draw.page import Captions
 from motet.draw.page import write as write_page
-from motet.figures.root_motion import in_place
-from motet.formats import Character, put_onto, write_all_on, write_on
+from motet.files import Json
+from motet.formats import Character, shaped, write_all_on, write_on
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotmat_to_quat
@@ -42,14 +42,12 @@ class Order:
     in_place: bool = False
     onto: bool = False
     captions: Captions | None = None
-    details: dict[str, Any] = field(default_factory=dict)
+    details: Json = field(default_factory=dict)
 
 
 def content_of(motion: Motion, order: Order, character: Character | None) -> bytes:
     """The content of an answer: a motion, on a character if there is one, as it is ordered; errors as of writers."""
-    motion = put_onto(motion, character) if character else motion
-    motion = motion if order.fps is None else motion.resample(order.fps)
-    motion = in_place(motion) if order.in_place else motion
+    motion = shaped(motion, character, order.fps, order.in_place)
     if order.form == "json":
         return as_json({**order.details, "seconds": motion.duration, **figure_of(motion), **frames_of(motion)})
     file = Upload(b"", f"motion.{order.form}")
@@ -62,7 +60,7 @@ def content_of(motion: Motion, order: Order, character: Character | None) -> byt
     return file.getvalue()
 
 
-def frames_of(motion: Motion) -> dict[str, Any]:
+def frames_of(motion: Motion) -> Json:
     """The frames of a motion for JSON: of each joint that moves from its parent its "translations" (T, 3) by name, in
     the skeleton's unit, and "rotations" (T, J, 4) of all joints, quaternions (x, y, z, w) in the parent's frame."""
     moving = dict.fromkeys(name[:-3] for name in motion.channels if name[-3:] in (".tx", ".ty", ".tz"))
@@ -74,11 +72,10 @@ def frames_of(motion: Motion) -> dict[str, Any]:
     }
 
 
-def figure_of(motion: Motion) -> dict[str, Any]:
+def figure_of(motion: Motion) -> Json:
     """The skeleton and the frame rate of a motion, for JSON."""
     skeleton = skeleton_of(motion)
-    joints = [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in skeleton.joints]
-    return {"fps": motion.fps, "metres_per_unit": skeleton.metres_per_unit, "joints": joints}
+    return {"fps": motion.fps, "metres_per_unit": skeleton.metres_per_unit, "joints": skeleton.outline()}
 
 
 def rounded(values: Array) -> list[Any]:

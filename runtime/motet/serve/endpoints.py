@@ -3,8 +3,8 @@
 import asyncio
 import json
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from typing import TypeVar
 
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, Request
@@ -13,6 +13,7 @@ from starlette.routing import Route
 
 from motet.draw.page import source
 from motet.errors import BundleError, MotetError, OutputError
+from motet.files import Json
 from motet.serve.answers import Answer, Answers
 from motet.serve.content import MEDIA
 from motet.serve.limits import Limits, refusal
@@ -29,8 +30,6 @@ log = logging.getLogger(__name__)
 UNDERSTOOD = "Motet-Understood"
 """The header of an answer with JSON: of each sentence its confidence, and what the model knows that is near."""
 
-MOST_SHOWN = 10
-"""Sentences of which it tells."""
 
 HEADER_BYTES = 3000
 """Of it: proxies allow 4 KB for all headers together, some clients 8 or 16."""
@@ -100,10 +99,10 @@ def _response(answer: Answer, name: str) -> Response:
     return Response(answer.content, headers=headers, media_type=answer.media)
 
 
-def in_a_header(understood: Sequence[Mapping[str, Any]]) -> str:
+def in_a_header(understood: Sequence[Json]) -> str:
     """JSON of what was understood of sentences, short enough for the headers of any client: of the first of them, and
     how many more there are. The answer as JSON has all."""
-    count = min(len(understood), MOST_SHOWN)
+    count = min(len(understood), 10)
     while True:
         more = [] if count == len(understood) else [{"more": len(understood) - count}]
         text = json.dumps([*understood[:count], *more])

@@ -3,7 +3,6 @@
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
@@ -13,6 +12,7 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from motet.errors import quoted
+from motet.files import Json
 from motet.live.protocol import LOCAL
 
 
@@ -154,7 +154,7 @@ class Gate:
         return f"the request is too large: expected at most {self.limits.body_bytes} bytes"
 
 
-def declared(scope: dict[str, Any] | Scope) -> int:
+def declared(scope: Json | Scope) -> int:
     """The length that a request states of its body; 0 where it states none."""
     lengths = [value for name, value in scope["headers"] if name == b"content-length"]
     return int(lengths[0]) if lengths and lengths[0].isdigit() else 0

@@ -15,9 +15,6 @@ from motet.live.protocol import LOCAL
 from motet.live.server import Connection, LiveClients, connection_options, log
 from motet.steering.model import SteerModel
 
-OPENING_SECONDS = 10.0
-"""Seconds in which a connection is opened."""
-
 
 class _Serving:
     """What a connection asks of the server that it belongs to."""
@@ -63,7 +60,7 @@ class LiveDoor:
 
     async def _served(self, connection: Upgraded) -> None:
         try:
-            async with asyncio.timeout(OPENING_SECONDS):
+            async with asyncio.timeout(10.0):
                 await connection.handshake(server_header=None)
             if connection.protocol.state is State.OPEN:
                 connection.start_keepalive()

@@ -24,7 +24,7 @@ from motet.generate.model import CodesModel
 from motet.motion import heading
 from motet.motion.kinematics import chained, local_rotations, local_translations, motion_of
 from motet.motion.motion import Motion, spline
-from motet.motion.rotations import Array, quat_to_rotmat, rotmat_to_quat
+from motet.motion.rotations import Array, identities, quat_to_rotmat, rotmat_to_quat
 from motet.motion.skeleton import Joint, Skeleton
 from motet.predict.fill import LOOP_SECONDS, FillModel
 from motet.representation.placed import placed, unplaced
@@ -339,7 +339,7 @@ def _humanoid(figure: Figure, keys: Keys, fps: float) -> Motion:
     are at rest, and a root that is not stays where it was."""
     skeleton = figure.posture[0]
     at = figure.posture[0].offsets[0]
-    turns = np.tile(np.eye(3), (len(keys), len(skeleton.joints), 1, 1))
+    turns = identities(len(keys), len(skeleton.joints))
     places = np.tile(skeleton.offsets, (len(keys), 1, 1))
     for number, key in enumerate(keys.values()):
         for joint, turn in key.turns.items():

@@ -1,14 +1,14 @@
 """The description of a server for programs (OpenAPI 3.1), and for people as a page."""
 
 from html import escape
-from typing import Any
 
 from motet.draw.page import source
+from motet.files import Json
 from motet.serve.content import MEDIA
 from motet.serve.request import MOST_TEXTS, Parameter
 from motet.serve.routes import DOORS, FILE_PARAMETERS, Door
 
-JSON_TYPES: dict[str, dict[str, Any]] = {
+JSON_TYPES: dict[str, Json] = {
     "text": {"type": "string"},
     "number": {"type": "number"},
     "whole": {"type": "integer"},
@@ -24,17 +24,17 @@ REFUSALS = {
 }
 
 
-def schema(parameter: Parameter) -> dict[str, Any]:
+def schema(parameter: Parameter) -> Json:
     """The JSON schema of a setting."""
     entry = {**JSON_TYPES[parameter.kind], "description": parameter.help}
     return {**entry, "enum": list(parameter.choices)} if parameter.choices else entry
 
 
-def described(version: str) -> dict[str, Any]:
+def described(version: str) -> Json:
     """The OpenAPI document."""
     error = {"type": "object", "properties": {"error": {"type": "string"}, "type": {"type": "string"}}}
     health = {"summary": "Whether it runs, its version, and what it does.", "responses": {"200": {"description": "OK"}}}
-    paths: dict[str, dict[str, Any]] = {}
+    paths = {}
     for door in DOORS:
         paths[door.path] = {method.lower(): _operation(door, method) for method in door.methods}
     return {
@@ -45,10 +45,12 @@ def described(version: str) -> dict[str, Any]:
     }
 
 
-def _operation(door: Door, method: str) -> dict[str, Any]:
-    media = list(dict.fromkeys(MEDIA.values())) if door.formats else [_media(door)]
+def _operation(door: Door, method: str) -> Json:
+    media = ["application/x-ndjson" if door.name == "stream" else "application/json"]
+    if door.formats:
+        media = list(dict.fromkeys(MEDIA.values()))
     fault = {"application/json": {"schema": {"$ref": "#/components/schemas/Error"}}}
-    operation: dict[str, Any] = {
+    operation: Json = {
         "operationId": door.name if method == "POST" else f"{door.name}_get",
         "summary": door.help,
         "parameters": [
@@ -68,11 +70,7 @@ def _operation(door: Door, method: str) -> dict[str, Any]:
     return operation
 
 
-def _media(door: Door) -> str:
-    return "application/x-ndjson" if door.name == "stream" else "application/json"
-
-
-def _bodies(door: Door) -> dict[str, Any]:
+def _bodies(door: Door) -> Json:
     settings = {name: schema(parameter) for name, parameter in door.parameters.items()}
     binary = {"type": "string", "contentMediaType": "application/octet-stream"}
     files = {name: {**binary, "description": FILE_PARAMETERS[name]} for name in door.files}

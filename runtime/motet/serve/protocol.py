@@ -22,19 +22,14 @@ try:
 except ImportError:  # no limits of files there
     resource = None  # type: ignore[assignment]
 
-HEAD_BYTES = 1 << 16
-"""Of a request's line and headers."""
-
-RESERVED_FILES = 100
-"""Files that this process needs beside its connections."""
-
 
 def most_connections(limits: Limits) -> int:
     """How many connections there may be: fewer where the system allows this process fewer files."""
     if resource is None:
         return limits.connections
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return max(1, min(limits.connections, files - RESERVED_FILES))
+    # this process needs a hundred files beside its connections
+    return max(1, min(limits.connections, files - 100))
 
 
 class BoundedProtocol(H11Protocol):
@@ -171,7 +166,7 @@ def quieter(*names: str) -> Iterator[None]:
 
 OPTIONS: dict[str, Any] = {
     "http": BoundedProtocol,
-    "h11_max_incomplete_event_size": HEAD_BYTES,
+    "h11_max_incomplete_event_size": (1 << 16),
     "ws": "none",
     "backlog": 128,  # connections that are accepted at once, before any of them can give way
 }

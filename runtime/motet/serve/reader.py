@@ -14,25 +14,20 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 
 from motet.errors import FormatError, MotetError
+from motet.files import Json
 from motet.formats import read_character
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Skeleton
 from motet.serve.content import Order, content_of
 from motet.serve.uploads import Bounds, Upload, read_upload
 
-Head = dict[str, Any]
+Head = Json
 Answer = tuple[Head, bytes]
-
-LINE_BYTES = 2**26
-"""Of a message's JSON: the names of channels, a skeleton, captions."""
-
-USED_BYTES = 2**28
-"""Memory that a process may have taken and still read another file."""
 
 
 class MessageError(Exception):
@@ -50,7 +45,8 @@ def send(stream: IO[bytes], head: Head, *parts: bytes | memoryview) -> None:
 
 def receive(stream: IO[bytes], most: int) -> tuple[Head, list[bytes]]:
     """A message and its parts; MessageError where it is cut off, or its parts have more than ``most`` bytes."""
-    line = stream.readline(LINE_BYTES)
+    # a message's JSON has the names of channels, a skeleton, captions
+    line = stream.readline(2**26)
     if not line.endswith(b"\n"):
         raise MessageError
     head: Head = json.loads(line)
@@ -135,7 +131,7 @@ def is_used() -> bool:
         import resource
 
         pages = int(Path("/proc/self/statm").read_text().split()[1])
-        return pages * resource.getpagesize() > USED_BYTES
+        return pages * resource.getpagesize() > 2**28
     return True
 
 

@@ -38,7 +38,7 @@ class _Reader:
     def __init__(self, memory: int) -> None:
         command = [sys.executable, "-W", "ignore", *READER_PROGRAM, str(memory)]
         try:
-            self._process = subprocess.Popen(
+            self.process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
             )
         except OSError as error:
@@ -46,34 +46,30 @@ class _Reader:
 
     def ask(self, head: Head, parts: list[bytes | memoryview], most: int) -> tuple[Head, list[bytes]]:
         """What it answers; MessageError where it has ended."""
-        assert self._process.stdin
-        assert self._process.stdout
+        assert self.process.stdin
+        assert self.process.stdout
         try:
-            send(self._process.stdin, head, *parts)
-            return receive(self._process.stdout, most)
+            send(self.process.stdin, head, *parts)
+            return receive(self.process.stdout, most)
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise MessageError from error
-
-    def is_alive(self) -> bool:
-        """Whether it can be asked."""
-        return self._process.poll() is None
 
     def kill(self) -> None:
         """End it and what it has started, whatever they do."""
         with suppress(OSError):
             if hasattr(os, "killpg"):
-                os.killpg(self._process.pid, signal.SIGKILL)
+                os.killpg(self.process.pid, signal.SIGKILL)
             else:
-                self._process.kill()
+                self.process.kill()
 
     def close(self) -> None:
         """End it, and wait for that."""
         self.kill()
-        for pipe in (self._process.stdin, self._process.stdout):
+        for pipe in (self.process.stdin, self.process.stdout):
             assert pipe
             with suppress(OSError):
                 pipe.close()
-        self._process.wait()
+        self.process.wait()
 
 
 class _Work:
@@ -173,7 +169,7 @@ class Readers:
         with suppress(IndexError):
             while True:
                 reader = self._idle.pop()
-                if reader.is_alive():
+                if reader.process.poll() is None:
                     return reader
                 reader.close()
         return _Reader(self._memory)

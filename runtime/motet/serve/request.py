@@ -12,6 +12,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from motet.errors import quoted
+from motet.files import Json
+from motet.live.protocol import from_json as json_value
 from motet.serve.limits import Limits
 from motet.serve.uploads import RequestError, Upload
 from motet.settings import is_number
@@ -88,13 +90,11 @@ async def read_request(
     The body is a JSON object, a form, or the bytes of the file called "file", whose type is in "format".
     """
     settings = from_texts(request.query_params.multi_items(), parameters)
-    uploads = dict[str, Upload]()
+    uploads: dict[str, Upload] = {}
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "multipart/form-data" or (kind == "application/x-www-form-urlencoded" and "file" not in files):
-        async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:
-            parts = form.multi_items()
-            uploads = {name: await _upload(name, part, files) for name, part in parts if isinstance(part, UploadFile)}
-            settings |= from_texts([(name, part) for name, part in parts if isinstance(part, str)], parameters)
+        texts, uploads = await _form(request, files, limits)
+        settings |= from_texts(texts, parameters)
     elif body := await request.body():
         if kind == "application/json" or "file" not in files:
             settings |= from_json(body, parameters, limits)
@@ -105,7 +105,22 @@ async def read_request(
     return RequestData(settings, uploads)
 
 
-def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> dict[str, Any]:
+async def _form(
+    request: Request, files: Sequence[str], limits: Limits
+) -> tuple[list[tuple[str, str]], dict[str, Upload]]:
+    """The texts of a form, by name, and its files."""
+    texts = []
+    uploads: dict[str, Upload] = {}
+    async with request.form(max_files=len(files), max_fields=200, max_part_size=limits.text_bytes) as form:
+        for name, part in form.multi_items():
+            if isinstance(part, str):
+                texts.append((name, part))
+            else:
+                uploads[name] = await _upload(name, part, files)
+    return texts, uploads
+
+
+def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parameter]) -> Json:
     """Settings from names and texts, without those that are left empty; RequestError like :func:`from_json`."""
     texts_of: dict[str, list[str]] = {}
     for name, text in pairs:
@@ -114,17 +129,13 @@ def from_texts(pairs: Iterable[tuple[str, str]], parameters: Mapping[str, Parame
     return {name: _known(name, parameters).from_text(name, texts) for name, texts in texts_of.items()}
 
 
-def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) -> dict[str, Any]:
+def from_json(body: bytes, parameters: Mapping[str, Parameter], limits: Limits) -> Json:
     """Settings from a JSON object, without those that are null; RequestError for an unknown or mistyped one."""
-
-    def refuse(constant: str) -> None:
-        raise ValueError(f"{constant} is no number")
-
     if len(body) > limits.text_bytes:
         raise HTTPException(413, f"the JSON is too large: expected at most {limits.text_bytes} bytes")
     try:
-        document = json.loads(body, parse_constant=refuse)
-    except (ValueError, RecursionError) as fault:
+        document = json_value(body)
+    except ValueError as fault:
         raise RequestError(f"the body must be JSON: {fault}") from fault
     if not isinstance(document, dict):
         raise RequestError(f"the body must be a JSON object, not {quoted(json.dumps(document))}")

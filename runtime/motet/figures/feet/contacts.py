@@ -46,8 +46,6 @@ REWEIGHTINGS = 10
 TREMBLE = 0.015
 """Seconds, the standard deviation of the window that removes the noise of recorded feet."""
 
-GENERATED_TREMBLE = 0.06
-"""The same for feet of models that output only joint angles, which tremble more."""
 
 GRAVITY = 9.81
 """Metres per second squared."""
@@ -76,7 +74,7 @@ class ContactSettings:
 SOLES = ContactSettings()
 """For the points of soles."""
 
-TREMBLING = ContactSettings(speeds=(0.7, 3.0), calm=GENERATED_TREMBLE)
+TREMBLING = ContactSettings(speeds=(0.7, 3.0), calm=0.06)
 """For soles that tremble and slide, as of models that output only joint angles: contact is measured over a longer time,
 and may slide faster."""
 
@@ -285,4 +283,4 @@ def _mean_vote(votes: Array, weights: Array, window: Array, trust: float, guess:
         *np.moveaxis((weights[..., None] * votes).sum(axis=1), 1, 0),
     ]
     total, x, z = (np.convolve(column, window)[reach : reach + len(votes)] for column in columns)
-    return np.asarray((np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None])
+    return (np.stack([x, z], axis=1) + trust * guess) / (total + trust)[:, None]

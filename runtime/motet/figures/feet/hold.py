@@ -45,7 +45,7 @@ from motet.motion.kinematics import (
     with_channels,
 )
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array, Indices, Mask, inverse, product, quat_to_rotmat, rotated
+from motet.motion.rotations import Array, Indices, Mask, identities, inverse, product, quat_to_rotmat, rotated
 from motet.motion.scalar_or_batch import Quaternion, Vector, parts
 
 
@@ -166,7 +166,7 @@ def _measured(motion: Motion, rotations: Array, places: Array, ground: float | N
         soles = sole_points(rotations, places)
         soles[..., 1] -= ground_under(soles) if ground is None else ground
         return (
-            _legs(HUMANOID.places, np.tile(np.eye(3), (places.shape[1], 1, 1))),
+            _legs(HUMANOID.places, identities(places.shape[1])),
             1.0,
             soles,
         )
@@ -273,7 +273,7 @@ def _between(times: list[Indices], values: list[Array], frames: int, blend: floa
     after = np.clip(np.searchsorted(key_times, frame, side="right"), 1, len(key_times) - 1)
     before = after - 1
     part = rise((frame - key_times[before]) / (key_times[after] - key_times[before]), 0, 1)[:, None]
-    return np.asarray(key_values[before] + part * (key_values[after] - key_values[before]))
+    return key_values[before] + part * (key_values[after] - key_values[before])
 
 
 def _keys(times: list[Indices], values: list[Array], blend: float) -> tuple[Array, Array]:
@@ -301,4 +301,4 @@ def lift(depth: Array, soft: float) -> Array:
     reach = max(1, round(soft))
     # a mean over a window of maxima is at least as high as the depth in its middle
     deepest = np.max(windows(np.maximum(depth, 0), reach), axis=1)
-    return np.asarray(windows(deepest, reach) @ bell(reach))
+    return windows(deepest, reach) @ bell(reach)

@@ -77,6 +77,7 @@ class TreadmillSettings:
 
 
 STANDARD = TreadmillSettings()
+"""Those of all figures."""
 
 
 def travelling(motion: Motion) -> Motion:
@@ -91,21 +92,21 @@ def travelling(motion: Motion) -> Motion:
     return with_travel(motion)
 
 
-def is_in_place(motion: Motion, settings: TreadmillSettings = STANDARD) -> bool:
+def is_in_place(motion: Motion) -> bool:
     """Whether the feet of a human figure stride while its root stays; False for a figure that is not human, and for a
     motion without a root translation."""
     skeleton = motion.skeleton
     if skeleton is None or not any(name.endswith(".tx") for name in motion.channels):
         return False
     # cheap tests first: most recordings go too far to be in place
-    motion = motion.resample(min(motion.fps, settings.fps))
+    motion = motion.resample(min(motion.fps, STANDARD.fps))
     try:
-        if len(motion) < max(3, settings.least * motion.fps) or not _may_be(motion, skeleton, settings):
+        if len(motion) < max(3, STANDARD.least * motion.fps) or not _may_be(motion, skeleton):
             return False
         on_humanoid = _on_humanoid(motion)[0]
     except MotionError:
         return False
-    return _stays(on_humanoid, settings) and _strides(on_humanoid, settings)
+    return _stays(on_humanoid) and _strides(on_humanoid)
 
 
 def with_travel(motion: Motion) -> Motion:
@@ -131,19 +132,19 @@ def with_travel(motion: Motion) -> Motion:
     )
 
 
-def _may_be(motion: Motion, skeleton: Skeleton, settings: TreadmillSettings) -> bool:
+def _may_be(motion: Motion, skeleton: Skeleton) -> bool:
     """Whether a first look, before the figure is measured, leaves it open: most recordings end here."""
     # the root goes too far, as far as an adult's size tells
     unit = skeleton.height / ADULT_HEIGHT
     extents = np.ptp(local_translations(motion), axis=0)
     moving = extents[extents.max(axis=1) > 0]
-    if len(moving) and np.hypot(*moving[0, [0, 2]]) > 1.5 * settings.room * unit:  # with y up
+    if len(moving) and np.hypot(*moving[0, [0, 2]]) > 1.5 * STANDARD.room * unit:  # with y up
         return False
     # or the feet do not move at all
     if not has_feet(skeleton):
         return True
     reach = np.ptp(positions(motion)[:, feet_of(skeleton)], axis=0)
-    return bool(np.linalg.norm(reach, axis=1).max() > settings.stride * unit)
+    return bool(np.linalg.norm(reach, axis=1).max() > STANDARD.stride * unit)
 
 
 def _on_humanoid(motion: Motion) -> tuple[Motion, Array]:
@@ -154,38 +155,38 @@ def _on_humanoid(motion: Motion) -> tuple[Motion, Array]:
     return humanoid.motion, humanoid.figure.turn * (humanoid.figure.fitted.leg / leg_length())
 
 
-def _stays(motion: Motion, settings: TreadmillSettings) -> bool:
+def _stays(motion: Motion) -> bool:
     """Whether the root of the humanoid stays."""
     root = local_translations(motion)[:, 0]
-    return bool(np.hypot(*np.ptp(root[:, [0, 2]], axis=0)) <= settings.room)
+    return bool(np.hypot(*np.ptp(root[:, [0, 2]], axis=0)) <= STANDARD.room)
 
 
-def _strides(motion: Motion, settings: TreadmillSettings) -> bool:
+def _strides(motion: Motion) -> bool:
     """Whether the feet of the humanoid, which stands, stride further than its root goes."""
     points = sole_points(*global_transforms(motion))
     root = local_translations(motion)[:, 0]
 
     # the feet are fast, and the root goes less far than they do
-    span = settings.span * motion.fps
-    foot_velocity = _averaged(_slid(motion, points, settings), span)
+    span = STANDARD.span * motion.fps
+    foot_velocity = _averaged(_slid(motion, points), span)
     foot_speed = np.linalg.norm(foot_velocity, axis=1)
     root_velocity = _averaged(np.diff(root[:, [0, 2]], axis=0) * motion.fps, span)
     root_way = np.linalg.norm(root_velocity, axis=1).sum()
-    if foot_speed.mean() < settings.speed or root_way > settings.share * foot_speed.sum():
+    if foot_speed.mean() < STANDARD.speed or root_way > STANDARD.share * foot_speed.sum():
         return False
 
     # by turns one foot is ahead of the other, and the body stands
     direction = foot_velocity / np.maximum(foot_speed, 1e-9)[:, None]
     left, right = _feet_ahead(points, root, direction)
     height = float(root[:, 1].mean() - points[..., 1].mean())
-    return _swing_by_turns(left, right, settings) and height >= settings.hips
+    return _swing_by_turns(left, right) and height >= STANDARD.hips
 
 
-def _swing_by_turns(left: Array, right: Array, settings: TreadmillSettings) -> bool:
+def _swing_by_turns(left: Array, right: Array) -> bool:
     """Whether feet that are ``left`` and ``right`` (T,) metres ahead of the root stride widely, each while the other
     goes back."""
     # the feet are apart, and one goes forward while the other goes back
-    is_wide = (left - right).std() >= settings.stride
+    is_wide = (left - right).std() >= STANDARD.stride
     is_opposite = (left - left.mean()) @ (right - right.mean()) < 0
     return bool(is_wide and is_opposite)
 
@@ -197,10 +198,10 @@ def _feet_ahead(points: Array, root: Array, direction: Array) -> Array:
     return np.asarray(np.einsum("tfa,ta->ft", by_foot.mean(axis=2)[..., [0, 2]], direction))
 
 
-def _slid(motion: Motion, points: Array, settings: TreadmillSettings) -> Array:
+def _slid(motion: Motion, points: Array) -> Array:
     """The velocity (T - 1, 2) in m/s that would keep points (T, P, 3) of the humanoid's soles from sliding."""
     # over the ground, without the trembling of recorded feet
-    plane = smoothed(points[..., [0, 2]], settings.calm, motion.fps)
+    plane = smoothed(points[..., [0, 2]], STANDARD.calm, motion.fps)
     return velocity_by_feet(plane, points[..., 1] - ground_under(points), motion.fps)
 
 

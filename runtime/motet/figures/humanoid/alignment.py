@@ -16,11 +16,12 @@ from itertools import permutations
 
 import numpy as np
 
-from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, limb_of, sided
+from motet.figures.humanoid.bones import ARM, LEFT_RIGHT, LEG, SIDES, limb_of, sided
 from motet.figures.humanoid.joint_map import LIMB_BONES, Body, humanoid_direction
 from motet.motion.rotations import (
     Array,
     frames_last,
+    identities,
     product,
     rotvec_to_rotmat,
     swing,
@@ -136,7 +137,7 @@ def alignments_of_pose(body: Body, rotations: Array, pose: Array, axes: Array) -
     wanted[joint_map.carrier(body.skeleton)] = turns["hips"]
     wanted |= dict.fromkeys(joint_map.spine, turns.get("spine", axes))
     wanted |= dict.fromkeys(joint_map.neck, turns.get("neck", axes))
-    aligned = np.tile(np.eye(3), (len(pose), 1, 1))
+    aligned = identities(len(pose))
     for joint, turn in wanted.items():
         aligned[joint] = rotations[joint].T @ turn
     return aligned
@@ -182,7 +183,7 @@ def axes_agree(body: Body, rotations: Array, positions: Array) -> bool:
     """
     joint_map = body.joint_map
     # for each joint a direction of the humanoid's bone, and the same of the figure's in all frames
-    directions: dict[int, tuple[Array, Array]] = {}
+    directions = {}
     for bone, ends in body.aims.items():
         if ends:
             directions[body.joints[bone]] = (
@@ -229,10 +230,10 @@ class Calibration:
         self.rotations = rotations
         self.positions = positions
         self.along_axes = along_axes
-        self.aligned = np.tile(np.eye(3), (rotations.shape[1], 1, 1))
+        self.aligned = identities(rotations.shape[1])
         # each stage builds on the joints settled before: trunk, then legs from the hips, and arms from the chest
         self._trunk()
-        for side, sign in zip(LEFT_RIGHT, (1.0, -1.0), strict=True):
+        for side, sign in SIDES:
             self._leg(limb_of(side, LEG))
             self._arm(limb_of(side, ARM), sign)
 
@@ -285,10 +286,10 @@ class Calibration:
         """Vectors (T, 3) up from the i-th joint of the back; from the joint below to the last."""
         positions = self.positions
         if i == len(back) - 1:
-            return np.asarray(positions[:, back[i]] - positions[:, back[max(i - 1, chest - 1)]])
+            return positions[:, back[i]] - positions[:, back[max(i - 1, chest - 1)]]
         start = self.body.middle(positions, "UpperLeg") if i == 0 else positions[:, back[i]]
         end = self.body.middle(positions, "UpperArm") if i < chest else positions[:, back[-1]]
-        return np.asarray(end - start)
+        return end - start
 
     def _leg(self, bones: Sequence[str]) -> None:
         """Knees are hinges that bend backwards; feet and toes have the hinge's axis."""

@@ -15,23 +15,24 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 
 from motet.errors import MotionError
+from motet.files import Json
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotated
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
 
 LEFT_RIGHT = ("left", "right")
+
+SIDES = (("left", 1.0), ("right", -1.0))
+"""Both sides, and the sign of x there."""
 
 SPINE = ("spine", "chest", "upperChest")
 NECK = ("neck", "head")
 LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
-
-Triple = tuple[float, float, float]
 
 Places = Mapping[str, tuple[str, Triple, str]]
 """Joint -> parent, "" for none, offset and Euler order."""
@@ -42,7 +43,12 @@ def sided(side: str, part: str) -> str:
     return side + part
 
 
-def limb_of(side: str, parts: Sequence[str]) -> tuple[str, ...]:
+def joint_of(side: str, part: str) -> int:
+    """The index of a joint of the humanoid on one side: ``joint_of("left", "UpperArm")``."""
+    return HUMANOID.index(sided(side, part))
+
+
+def limb_of(side: str, parts: Sequence[str]) -> Names:
     """The names of a limb's joints on one side, such as those of LEG."""
     return tuple(sided(side, part) for part in parts)
 
@@ -72,9 +78,9 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
     return tuple(joints)
 
 
-def _table(*path: str) -> dict[str, Any]:
+def _table(*path: str) -> Json:
     """A JSON object of this folder."""
-    table: dict[str, Any] = json.loads(files("motet.figures.humanoid").joinpath(*path).read_text("utf-8"))
+    table: Json = json.loads(files("motet.figures.humanoid").joinpath(*path).read_text("utf-8"))
     return table
 
 
@@ -102,7 +108,7 @@ SOLE: Mapping[str, tuple[Triple, ...]] = {part: tuple(map(tuple, row)) for part,
 
 def leg_length() -> float:
     """Length of the humanoid's thigh and shin together, in metres: the measure by which figures are scaled."""
-    return float(sum(np.linalg.norm(HUMANOID.offsets[HUMANOID.index(sided("left", part))]) for part in LEG[1:3]))
+    return float(sum(np.linalg.norm(HUMANOID.offsets[joint_of("left", part)]) for part in LEG[1:3]))
 
 
 def sole_points(rotations: Array, positions: Array) -> Array:
@@ -110,7 +116,7 @@ def sole_points(rotations: Array, positions: Array) -> Array:
     points = []
     for side in LEFT_RIGHT:
         for part, places in SOLE.items():
-            joint = HUMANOID.index(sided(side, part))
+            joint = joint_of(side, part)
             points += [positions[:, joint] + rotated(rotations[:, joint], np.array(place)) for place in places]
     return np.stack(points, axis=1)
 
@@ -124,16 +130,15 @@ def ground_under(soles: Array) -> float:
 FINGERS: Places = _TABLES["fingers"]
 """VRM's fingers of the left hand, each after its parent, "Hand" or another finger's bone."""
 
-MMM_HEIGHT = 1.7
-"""Metres of the body of MMM files, which do not state it."""
 
 MMM_SKELETON = Skeleton(
-    _joints(**_table("mmm.json"), sides=("L", "R"), scale=MMM_HEIGHT),
+    _joints(**_table("mmm.json"), sides=("L", "R"), scale=1.7),
     metres_per_unit=1.0,
 )
 """The figure of MMM files (KIT), which have no skeleton, and one channel for each angle: the Master Motor Map's
-reference body. Its segments, in mmm.json, are Winter's fractions of the body's height; it rests with arms down, and a
-joint turns about its three axes one after the other. Here y is up and the figure faces z."""
+reference body, here 1.7 m high, as the files do not state it. Its segments, in mmm.json, are Winter's fractions of
+the body's height; it rests with arms down, and a joint turns about its three axes one after the other. Here y is up
+and the figure faces z."""
 
 
 def is_mmm(motion: Motion) -> bool:
@@ -198,9 +203,9 @@ Tree = dict[str, tuple[str, Array]]
 """Joint -> its parent, "" for none, and its position (3,) in metres, parents first."""
 
 
-def _rig_tree(content: dict[str, Any]) -> Tree:
+def _rig_tree(content: Json) -> Tree:
     """The joints of a rig with the humanoid's proportions, from its convention's table."""
-    tree: Tree = {}
+    tree = {}
     parent = ""
     if "root" in content["rig"]:
         parent = content["rig"]["root"]
@@ -228,7 +233,7 @@ def _rig_trunk(names: dict[str, list[str]]) -> list[tuple[str, Array]]:
     return list(zip(joints, [T_POSE[0], *back, *neck], strict=True))
 
 
-def _rig_names(content: dict[str, Any]) -> dict[str, str]:
+def _rig_names(content: Json) -> dict[str, str]:
     """For bones of the humanoid, and for tips, the names of a rig's joints."""
     known = content["joints"]
     names = {

@@ -35,12 +35,12 @@ from motet.figures.humanoid.bones import (
     LEG,
     NECK,
     SPINE,
-    Triple,
     limb_of,
     sided,
 )
+from motet.files import Json
 from motet.motion.rotations import Array, unit
-from motet.motion.skeleton import END_SUFFIX, Skeleton, repeated
+from motet.motion.skeleton import END_SUFFIX, Names, Skeleton, Triple, repeated
 
 LIMB_PARTS = (*LEG[:3], *ARM[1:3])
 NEEDED = ("hips", "spine", *limb_of("left", LIMB_PARTS), *limb_of("right", LIMB_PARTS))
@@ -124,7 +124,7 @@ class JointMap:
         """The joints of the neck and the head's, where there is one."""
         return self.neck + tuple(joint for bone, joint in self.joints.items() if bone == "head")
 
-    def names(self, skeleton: Skeleton) -> dict[str, tuple[str, ...]]:
+    def names(self, skeleton: Skeleton) -> dict[str, Names]:
         """For each bone ("spine" and "neck" for all of the back and of the neck) the names of its joints."""
         joints = {bone: (joint,) for bone, joint in self.joints.items()}
         names = {}
@@ -187,11 +187,11 @@ class Body:
         """The middle (..., 3) between a joint of the left and its partner."""
         left = self._position(positions, "left", part)
         right = self._position(positions, "right", part)
-        return np.asarray((left + right) / 2)
+        return (left + right) / 2
 
     def to_left(self, positions: Array, part: str) -> Array:
         """Vectors (..., 3) from a joint of the right to its partner on the left."""
-        return np.asarray(self._position(positions, "left", part) - self._position(positions, "right", part))
+        return self._position(positions, "left", part) - self._position(positions, "right", part)
 
     def trunk_up(self, positions: Array) -> Array:
         """Directions (..., 3) from the middle of the legs' joints to that of the arms'."""
@@ -207,7 +207,7 @@ class Body:
 
     def _position(self, positions: Array, side: str, part: str) -> Array:
         """Positions (..., 3) of the joint of a bone."""
-        return np.asarray(positions[..., self.joints[sided(side, part)], :])
+        return positions[..., self.joints[sided(side, part)], :]
 
 
 def humanoid_direction(bone: str) -> Array:
@@ -277,14 +277,14 @@ def read_map(path: str | Path, skeleton: Skeleton) -> JointMap:
     the fault: an unknown bone or joint, a joint named twice, a required bone that is missing.
     """
     path = Path(path)
-    places = _joints_of_entries(path, skeleton)
-    spine = places.pop("spine", ())
-    neck = places.pop("neck", ())
-    longer = [bone for bone, joints in places.items() if len(joints) != 1]
-    if longer:
-        raise FormatError(path, f"{longer[0]}: expected one joint; only spine and neck take a list")
-    joints = {bone: joint for bone, (joint,) in places.items()}
     try:
+        places = _joints_of_entries(path, skeleton)
+        spine = places.pop("spine", ())
+        neck = places.pop("neck", ())
+        longer = [bone for bone, joints in places.items() if len(joints) != 1]
+        if longer:
+            raise MotionError(f"{longer[0]}: expected one joint; only spine and neck take a list")
+        joints = {bone: joint for bone, (joint,) in places.items()}
         return check_map(skeleton, JointMap(joints, spine, neck, path.name, 1.0))
     except MotionError as error:
         raise FormatError(path, str(error)) from error
@@ -294,21 +294,18 @@ def _joints_of_entries(path: Path, skeleton: Skeleton) -> dict[str, tuple[int, .
     """For each bone of a user's map its joints, each of them one bone's."""
     # the spine and the neck may have any number of joints
     known = [bone for bone in BONES if bone not in (*SPINE[1:], *NECK[:1])] + ["neck"]
-    places: dict[str, tuple[int, ...]] = {}
+    places = {}
     for bone, names in _entries(path).items():
         if bone not in known:
-            raise FormatError(
-                path,
-                f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}",
-            )
+            raise MotionError(f"{bone!r} is not a bone of the humanoid: expected {', '.join(known)}")
         try:
             places[bone] = tuple(skeleton.index(name) for name in names)
         except MotionError as error:
-            raise FormatError(path, f"{bone}: {error}") from error
+            raise MotionError(f"{bone}: {error}") from error
     # each joint is one bone's
     twice = repeated(skeleton.names[joint] for joint in chain.from_iterable(places.values()))
     if twice:
-        raise FormatError(path, f"a joint can be only one bone; named twice: {', '.join(twice)}")
+        raise MotionError(f"a joint can be only one bone; named twice: {', '.join(twice)}")
     return places
 
 
@@ -317,19 +314,19 @@ def _entries(path: Path) -> dict[str, list[str]]:
     try:
         content: Any = json.loads(path.read_text("utf-8"), object_pairs_hook=_unique_keys)
     except OSError as error:
-        raise FormatError(path, f"cannot be read: {error.strerror}") from error
+        raise MotionError(f"cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:
-        raise FormatError(path, f"not a joint map in JSON: {error}") from error
+        raise MotionError(f"not a joint map in JSON: {error}") from error
     if not isinstance(content, dict):
-        raise FormatError(path, "not a joint map: expected an object of bones and joints")
+        raise MotionError("not a joint map: expected an object of bones and joints")
     entries = {bone: [names] if isinstance(names, str) else names for bone, names in content.items()}
     for bone, names in entries.items():
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise FormatError(path, f"{bone}: expected the name of a joint or a list of names")
+            raise MotionError(f"{bone}: expected the name of a joint or a list of names")
     return entries
 
 
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _unique_keys(pairs: list[tuple[str, Any]]) -> Json:
     """A JSON object; ValueError where a key appears twice, which json takes silently."""
     twice = repeated(key for key, _ in pairs)
     if twice:
@@ -345,7 +342,7 @@ class Convention:
     title: str
     """The name of the convention."""
 
-    names: dict[str, tuple[str, ...]]
+    names: dict[str, Names]
     """For each bone the plain names that its joint can have."""
 
     spelled: frozenset[str]
@@ -360,7 +357,7 @@ class Convention:
     optional: frozenset[str]
     """Bones that only some files have."""
 
-    prefixes: tuple[str, ...]
+    prefixes: Names
     """Regular expressions of prefixes that every name can have."""
 
     rest: dict[str, Triple] | None
@@ -389,7 +386,7 @@ def conventions() -> tuple[Convention, ...]:
     return tuple(all_conventions)
 
 
-def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
+def _convention(content: Json, sides: Sequence[str]) -> Convention:
     names, spelled, optional = _bones(content, sides)
     return Convention(
         content["title"],
@@ -414,9 +411,7 @@ def _of_both_sides(names: Sequence[str], sides: Sequence[str]) -> frozenset[str]
     return frozenset(plain)
 
 
-def _bones(
-    content: dict[str, Any], sides: Sequence[str]
-) -> tuple[dict[str, tuple[str, ...]], frozenset[str], frozenset[str]]:
+def _bones(content: Json, sides: Sequence[str]) -> tuple[dict[str, Names], frozenset[str], frozenset[str]]:
     """For each bone the plain names, all names as they are written, and the bones that only some files have."""
     names = {}
     spelled = set()
@@ -434,7 +429,7 @@ def _bones(
 
 def _both_sides(of_left: dict[str, list[float]], signs: tuple[int, int, int]) -> dict[str, Triple]:
     """Vectors of bones of both sides: those of the right are those of the left with signs, which mirror them."""
-    vectors: dict[str, Triple] = {}
+    vectors = {}
     for bone, (x, y, z) in of_left.items():
         if bone in UNSIDED:
             vectors[bone] = (x, y, z)
@@ -499,7 +494,7 @@ def map_by_names(skeleton: Skeleton) -> JointMap | None:
         raise HalfKnownError(str(error)) from error
 
 
-def _written(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+def _written(names: Names) -> list[Names]:
     """Names without words that nearly all begin with: with numbers at their ends, without them, without two."""
     bare = without_numbers(names)
     kinds = dict.fromkeys((names, bare, without_numbers(bare)))
@@ -515,7 +510,7 @@ def _nearly_all(count: int, names: Sequence[str]) -> bool:
     return count > 0.8 * len(names)
 
 
-def without_numbers(names: tuple[str, ...]) -> tuple[str, ...]:
+def without_numbers(names: Names) -> Names:
     """Names without the numbers that programs add at their ends: of nearly all names ("LeftArm_07", "hand.L.001"), or
     the one digit that nearly all end in ("Hips1", "Spine11"), or of names that no other is like without them."""
     # numbers after a separator, that nearly all names have
@@ -531,7 +526,7 @@ def without_numbers(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(short if counts[short] == 1 else name for short, name in zip(bare, names, strict=True))
 
 
-def _without_first_words(names: tuple[str, ...]) -> tuple[str, ...]:
+def _without_first_words(names: Names) -> Names:
     """Names without the words, or numbers, with which nearly all begin."""
     while True:
         first = [re.match(r"(?:[0-9]+[ _:.|-]*|[^\W\d_][^\W_]*[ _:.|-]+)(?=.)", name) for name in names]
@@ -550,7 +545,7 @@ def _absent_in_chain(convention: Convention, chain: str, names: Set[str]) -> int
     return 0 if chain in convention.optional or not known else 1 + absent
 
 
-def _match(convention: Convention, skeleton: Skeleton, written: tuple[str, ...]) -> _Match:
+def _match(convention: Convention, skeleton: Skeleton, written: Names) -> _Match:
     """The map that a convention makes of a skeleton's names, as they are written."""
     bare = _without_prefixes(convention, written)
     names = [_plain(name) for name in bare]

@@ -133,7 +133,7 @@ class _Tree:
 
     def _apart(self, forks: list[_Fork]) -> list[_Fork]:
         """The forks that are not on the limbs of one before them."""
-        limbs: list[_Fork] = []
+        limbs = []
         taken: set[int] = set()
         for fork in forks:
             if taken.isdisjoint(self.skeleton.ancestors(fork.joint)):

@@ -39,8 +39,8 @@ from motet.figures.humanoid.joint_map import (
 from motet.figures.humanoid.joint_tree import map_of
 from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import UP, Array, rotated, swing, unit
-from motet.motion.skeleton import Skeleton
+from motet.motion.rotations import UP, Array, identities, rotated, swing, unit
+from motet.motion.skeleton import Names, Skeleton
 
 LENGTH_UNITS = {
     "metres": 1.0,
@@ -75,7 +75,7 @@ class Fitted:
     confidence: float
     """From 0 to 1, how certain A is."""
 
-    notes: tuple[str, ...]
+    notes: Names
     """Sentences about the assumptions made."""
 
     pelvis: bool = True
@@ -153,14 +153,14 @@ def _fit_at_rest(body: Body, leg: float, frame: Array) -> Fitted:
     """A figure whose rest pose is a standing body with axes (3, 3) left, up and forward."""
     rest = body.skeleton.rest_positions
     joint_map = body.joint_map
-    notes: tuple[str, ...] = ()
+    notes: Names = ()
     if joint_map.rest is not None:
         points = {bone: unit(np.array(point)) for bone, point in joint_map.points.items()}
         if _agreement(body, rest, frame, points) > np.cos(np.radians(4)):
             notes = ("the rest pose is one that the convention knows, which was made up for",)
         else:
             body = Body(body.skeleton, replace(joint_map, rest=None))
-    aligned = alignments_of_pose(body, np.tile(np.eye(3), (len(rest), 1, 1)), rest, frame)
+    aligned = alignments_of_pose(body, identities(len(rest)), rest, frame)
     up = frame[:, 1]
     return Fitted(body, aligned, leg, _heights(body, leg, rest @ up), up, 1.0, notes)
 

@@ -22,9 +22,11 @@ from motet.figures.humanoid.bones import (
     LEFT_RIGHT,
     NECK,
     PARENTS,
+    SIDES,
     SPINE,
     ground_under,
     is_mmm,
+    joint_of,
     leg_length,
     sided,
     sole_points,
@@ -42,6 +44,7 @@ from motet.figures.humanoid.measure import (
 )
 from motet.figures.humanoid.soles import Mesh, on_own_soles
 from motet.motion.kinematics import (
+    Transforms,
     by_name,
     chained,
     global_transforms,
@@ -58,6 +61,7 @@ from motet.motion.rotations import (
     angle_of,
     axis_to_rotmat,
     frames_last,
+    identities,
     inverse,
     product,
     rotated,
@@ -67,14 +71,14 @@ from motet.motion.rotations import (
     twist,
     unit,
 )
-from motet.motion.skeleton import END_SUFFIX, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Names, Skeleton
 
 log = logging.getLogger(__name__)
 
 SURE_OF_JOINTS = 0.75
 """Least confidence without a warning: skeletons whose names do not even show sides have less."""
 
-HIPS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
+HIPS = [joint_of(side, "UpperLeg") for side in LEFT_RIGHT]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +132,7 @@ class Figure:
         """The skeleton with its unit, where that is known, and local rotations (J, 3, 3) of joints that are no bones:
         at rest, or as in the first frame, except fingers, which bend as in a relaxed hand."""
         skeleton = skeleton_of(self.first)
-        still = np.tile(np.eye(3), (len(skeleton.joints), 1, 1))
+        still = identities(len(skeleton.joints))
         if self.fitted.up is None:  # measured in frames, not at rest
             still = local_rotations(self.first)[0]
             offsets = local_translations(self.first)[0]
@@ -146,7 +150,7 @@ class Humanoid:
     motion: Motion
     """The motion on :data:`motet.motion.HUMANOID`, at the file's frame rate, root translation in metres."""
 
-    joints: dict[str, tuple[str, ...]]
+    joints: dict[str, Names]
     """For each bone the names of the joints that it was taken from."""
 
     convention: str
@@ -164,7 +168,7 @@ class Humanoid:
     height: float | None
     """About how tall the figure stands, in metres, None where its unit is not known."""
 
-    notes: tuple[str, ...]
+    notes: Names
     """Sentences about the assumptions made."""
 
     figure: Figure
@@ -212,7 +216,7 @@ def to_humanoid(motion: Motion, joint_map: JointMap | None = None) -> Humanoid:
     return _findings(retargeted, figure, length_unit.metres, tuple(note for note in notes if note))
 
 
-def _findings(motion: Motion, figure: Figure, metres: float | None, notes: tuple[str, ...]) -> Humanoid:
+def _findings(motion: Motion, figure: Figure, metres: float | None, notes: Names) -> Humanoid:
     """A motion on the humanoid with what is found about its figure. metres: of one unit of its lengths, if known."""
     fitted = figure.fitted
     joint_map = fitted.joint_map
@@ -357,7 +361,7 @@ def from_humanoid(
 def _onto_soles(
     fitted: Fitted,
     skin: Mapping[int, Array] | None,
-    source: tuple[Array, Array],
+    source: Transforms,
     turned: Array,
     path: Array,
     fps: float,
@@ -370,7 +374,7 @@ def _onto_soles(
     return turned, _rise_of_joints(fitted, source, turned, path)
 
 
-def _facing_as_figure(motion: Motion, fitted: Fitted) -> tuple[Array, Array]:
+def _facing_as_figure(motion: Motion, fitted: Fitted) -> Transforms:
     """Rotations (T, J, 3, 3) and positions (T, J, 3) of a motion of the humanoid, turned so that its z becomes the
     direction that a figure faces at rest."""
     rotations, places = global_transforms(motion)
@@ -381,7 +385,7 @@ def _facing_as_figure(motion: Motion, fitted: Fitted) -> tuple[Array, Array]:
     return product(front, rotations), rotated(front, places)
 
 
-def _rise_of_joints(fitted: Fitted, source: tuple[Array, Array], turned: Array, path: Array) -> float:
+def _rise_of_joints(fitted: Fitted, source: Transforms, turned: Array, path: Array) -> float:
     """How far a figure without a mesh is raised above its root's path (T, 3), for feet as high as the humanoid's.
 
     source: rotations and positions of the humanoid's joints. turned: rotations (T, J, 3, 3) of the figure's.
@@ -465,12 +469,12 @@ def relaxed(skeleton: Skeleton, still: Array, joints: Mapping[str, int]) -> Arra
     # the hands at rest, in the world
     rotations, places = chained(skeleton, still[None].copy(), skeleton.offsets[None].copy())
     bent = still.copy()
-    for side, sign in zip(LEFT_RIGHT, (-1.0, 1.0), strict=True):
+    for side, sign in SIDES:
         hand = joints.get(sided(side, "Hand"))
         if hand is None:
             continue
         fingers = _fingers(skeleton, hand)
-        directions = _hand_directions(fingers, places[0], hand, sign)
+        directions = _hand_directions(fingers, places[0], hand, -sign)
         if directions is None:
             continue
         for finger, chain in fingers.items():

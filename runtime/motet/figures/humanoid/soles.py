@@ -20,38 +20,8 @@ from motet.figures.humanoid.bones import (
     sole_points,
 )
 from motet.figures.humanoid.joint_map import Body
-from motet.motion.kinematics import places_of
+from motet.motion.kinematics import Transforms, places_of
 from motet.motion.rotations import UP, Array, Mask, product, rotated, rotvec_to_rotmat, unit
-
-STILL_SPEED = 0.3
-"""Metres a second below which heel and ball of a foot that stands both move."""
-
-FLAT_TILT = np.radians(20)
-"""Tilt up to which a foot that stands is meant to be flat."""
-
-STANDING_SHARE = 0.1
-"""Share of the frames of a motion in which a foot stands, from which on these tell where the ground is."""
-
-NEAR_GROUND = 0.1
-"""Metres from the ground within which a motion is meant to stand on it, and is laid on it."""
-
-DEPTH = 0.005
-"""Metres below the ground, on a figure of the humanoid's size, that are left as they are."""
-
-STEEP = (np.radians(75), np.radians(95))
-"""Tilt up to which a foot stands or tips, and from which on it belongs to somebody who lies or turns over."""
-
-WORTH = 0.015
-"""Metres below the ground, on a figure of the humanoid's size, that are well worth tipping a foot less."""
-
-RAISED = 0.1
-"""Seconds: how long before and after it a body is raised for a moment."""
-
-CALM = 0.04
-"""Seconds: the standard deviation of the window by which the turns of feet are smoothed."""
-
-BISECTIONS = 14
-"""Halvings of the way to the level: to a hundredth of a degree."""
 
 
 @dataclass(frozen=True)
@@ -133,15 +103,18 @@ class Foot:
         # the least share that gets there, by bisection in all frames at once
         least = np.zeros(len(self.tilt))
         most = np.ones(len(self.tilt))
-        for _ in range(BISECTIONS):
+        # to a hundredth of a degree
+        for _ in range(14):
             middle = (least + most) / 2
             above = self.lowest(middle) >= reachable
             most = np.where(above, middle, most)
             least = np.where(above, least, middle)
         # feet of a body that lies or turns over are left as they are
-        stands_or_tips = 1 - rise(self.tilt, *STEEP)
+        # up to 75 degrees a foot stands or tips; from 95 on it is of somebody who lies or turns over
+        stands_or_tips = 1 - rise(self.tilt, np.radians(75), np.radians(95))
         share = most * rise(reachable - as_it_is, 0.0, worth) * stands_or_tips
-        return np.clip(smoothed(share[:, None, None], CALM, fps)[:, 0, 0], 0, 1)
+        # by a window of 0.04 s standard deviation
+        return np.clip(smoothed(share[:, None, None], 0.04, fps)[:, 0, 0], 0, 1)
 
     def turn(self, turned: Array, share: Array) -> None:
         """Turn the foot's joints in ``turned`` by shares (T,) of the way to the level."""
@@ -165,7 +138,7 @@ def _to_flat(source: Array, bone: str) -> tuple[Array, Array]:
 
 def on_own_soles(
     mesh: Mesh,
-    source: tuple[Array, Array],
+    source: Transforms,
     turned: Array,
     path: Array,
     scale: float,
@@ -186,12 +159,15 @@ def on_own_soles(
     # feet that would dig in are tipped less
     turned = turned.copy()
     for foot in feet:
-        foot.turn(turned, foot.needed_share(-raised, WORTH * scale, fps))
+        # 1.5 cm below the ground, on a figure of the humanoid's size, are well worth tipping a foot less
+        foot.turn(turned, foot.needed_share(-raised, 0.015 * scale, fps))
 
     # where soles, hands or head would still be below the ground, the body is raised for that moment
     places = places_of(mesh.body.skeleton, turned) + path[:, None]
-    depth = -DEPTH * scale - raised - mesh.lowest(turned, places)
-    return turned, raised + _envelope(np.maximum(depth, 0.0), RAISED * fps)
+    # half a centimetre below the ground, on a figure of the humanoid's size, is left as it is
+    depth = -0.005 * scale - raised - mesh.lowest(turned, places)
+    # a tenth of a second before and after the moment
+    return turned, raised + _envelope(np.maximum(depth, 0.0), 0.1 * fps)
 
 
 def _rise_to_the_ground(feet: Sequence[Foot], soles: Array, scale: float, fps: float) -> float:
@@ -204,15 +180,18 @@ def _rise_to_the_ground(feet: Sequence[Foot], soles: Array, scale: float, fps: f
     # moments in which a foot stands flat
     heights, stands = _standing_feet(soles, fps)
     flat = np.stack([foot.lowest(np.ones(frames)) for foot in feet], axis=1)
-    stands &= np.stack([foot.tilt <= FLAT_TILT for foot in feet], axis=1) & np.isfinite(flat)
-    if stands.any(axis=1).mean() >= STANDING_SHARE:
+    # up to this tilt a foot that stands is meant to be flat
+    stands &= np.stack([foot.tilt <= np.radians(20) for foot in feet], axis=1) & np.isfinite(flat)
+    # a foot that stands in a tenth of the frames tells where the ground is
+    if stands.any(axis=1).mean() >= 0.1:
         ground = float(np.median(heights[stands]))
         raised = -float(np.median(flat[stands]))
     else:
         ground = ground_under(soles)
         lowest = np.min([foot.lowest(np.zeros(frames)) for foot in feet], axis=0)
         raised = -float(np.percentile(lowest, 5))
-    return raised + (scale * ground if abs(ground) > NEAR_GROUND else 0.0)
+    # a motion within 0.1 m of the ground is meant to stand on it, and is laid on it
+    return raised + (scale * ground if abs(ground) > 0.1 else 0.0)
 
 
 def _standing_feet(soles: Array, fps: float) -> tuple[Array, Mask]:
@@ -225,11 +204,12 @@ def _standing_feet(soles: Array, fps: float) -> tuple[Array, Mask]:
     if len(soles) < 2:
         return heights, lower
     speeds = np.linalg.norm(np.gradient(points[:, :, :2], axis=0), axis=-1).max(axis=2) * fps
-    return heights, (speeds < STILL_SPEED) & lower
+    # metres a second below which heel and ball of a foot that stands both move
+    return heights, (speeds < 0.3) & lower
 
 
 def _envelope(values: Array, reach: float) -> Array:
     """A smooth curve (T,) that is nowhere below values (T,), wider than they by ``reach`` frames on either side."""
     frames = max(1, round(reach))
     highest = windows(np.pad(values, frames, mode="edge"), frames).max(axis=1)
-    return np.asarray(np.convolve(highest, bell(frames), mode="valid"))
+    return np.convolve(highest, bell(frames), mode="valid")

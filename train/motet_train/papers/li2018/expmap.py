@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.errors import FormatError
-from motet.formats.text import numbers
+from motet.formats.text import naming, numbers
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.archive import Archive
@@ -222,7 +222,8 @@ def parse(text: str, path: str | Path, columns: int) -> Array:
         parts = line.split(",")
         if len(parts) != columns:
             raise FormatError(path, f"{len(parts)} numbers instead of {columns}", number)
-        rows.append(numbers(parts, Path(path), number))
+        with naming(path):
+            rows.append(numbers(parts, number))
     return np.array(rows)
 
 
