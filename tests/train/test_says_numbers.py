@@ -46,7 +46,7 @@ def test_jumps_and_dips_are_counted() -> None:
 
 def test_the_table_has_eight_of_each_kind() -> None:
     for kind in numbers.BARS:
-        rows = [row for row in numbers.table() if kind in row]
+        rows = [row for row in numbers.NUMBERS if kind in row]
         assert len(rows) == 8
         assert {row.get("act") for row in rows} <= ({*numbers.COUNTS_BY_NAME} if kind == "times" else {None})
     with pytest.raises(StopIteration):

@@ -11,7 +11,7 @@ from motet.generate.model import CodesModel
 from motet.motion.motion import Motion
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import save
-from motet_train.evaluate.text_adherence.prompts import outside, prompts
+from motet_train.evaluate.text_adherence.prompts import OUTSIDE, PROMPTS
 from motet_train.evaluate.text_adherence.table import said_to_be_outside, says_drawings
 from motet_train.evaluate.text_adherence.track import track_of
 
@@ -32,10 +32,10 @@ def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_p
     drawings = says_drawings(walks.generate)
     figure = drawings["says"]()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
-    done = [prompt.text for prompt in prompts() if prompt.passes(track_of(walks.walk))]
+    done = [prompt.text for prompt in PROMPTS if prompt.passes(track_of(walks.walk))]
     assert titles[0] == walks.asked[0] == "a person walks straight forward"
     assert set(titles) <= set(done)
-    eights = [prompts()[start : start + 8] for start in range(0, len(prompts()), 8)]
+    eights = [PROMPTS[start : start + 8] for start in range(0, len(PROMPTS), 8)]
     assert titles == [
         next(p.text for p in part if p.text in done) for part in eights if set(done) & {p.text for p in part}
     ]
@@ -51,7 +51,7 @@ def test_what_no_recording_shows_is_said_to_be_outside() -> None:
     assert isinstance(model, CodesModel)
     keyed = {act.says[0] for act in motet.keyed.ours().values()}
     others = []
-    for sentence in outside():
+    for sentence in OUTSIDE:
         if not any(model.likeliest(part).action in keyed for part in model.parts(sentence)):
             others.append(sentence)
     assert len(others) == 20

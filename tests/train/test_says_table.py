@@ -18,7 +18,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, Entry, Store
 from motet_train.evaluate.positions import jerk, length
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.prompts import LookUp, Prompt, Trial, prompts, read_trials, trained_on
+from motet_train.evaluate.text_adherence.prompts import PROMPTS, LookUp, Prompt, Trial, read_trials, trained_on
 from motet_train.evaluate.text_adherence.table import depth, poses, says_table, says_text, slide, spread
 from motet_train.evaluate.text_adherence.track import RATE, Track
 
@@ -60,13 +60,13 @@ class Half:
 
 
 def only(*texts: str) -> tuple[Prompt, ...]:
-    return tuple(prompt for prompt in prompts() if prompt.text in texts)
+    return tuple(prompt for prompt in PROMPTS if prompt.text in texts)
 
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Some prompts instead of all."""
-    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LYING, LEFT, ZOMBIE))
+    monkeypatch.setattr(table, "PROMPTS", only(STILL, LYING, LEFT, ZOMBIE))
 
 
 @pytest.mark.usefixtures("few")
@@ -101,7 +101,7 @@ def test_without_trials_there_are_no_other_columns() -> None:
 
 
 def test_the_text_has_a_column_for_each_generator(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LEFT))
+    monkeypatch.setattr(table, "PROMPTS", only(STILL, LEFT))
     report = says_table(Half().generate, TRIALS, seeds=2)
     lines = says_text({"runs/a": report, "runs/b": report}).splitlines()
     assert lines[0].split() == ["%", "a", "b", "lookup", "real", "others"]
@@ -209,7 +209,7 @@ def test_trials_of_a_folder(corpus: Path) -> None:
 
 def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = "a person runs straight forward"
-    monkeypatch.setattr(table, "prompts", lambda: only(run))
+    monkeypatch.setattr(table, "PROMPTS", only(run))
     result = CliRunner().invoke(main, ["evaluate", "language-to-motion", "--says", "--data", str(corpus), "--json"])
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)

@@ -2,7 +2,6 @@
 not."""
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,11 +16,8 @@ from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import track_of
 
-
-@cache
-def table() -> Mapping[str, Any]:
-    """bare.toml: "bare", commands with the rules that a motion must keep; "odd", stems of words for other acts."""
-    return read_toml(__file__, "bare.toml")
+TABLE = read_toml(__file__, "bare.toml")
+""" "bare": commands with the rules that a motion must keep; "odd": stems of words for other acts."""
 
 
 def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
@@ -32,7 +28,7 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
     """
     right: dict[str, float] = {}
     unwarned: dict[str, float] = {}
-    for row in table()["bare"]:
+    for row in TABLE["bare"]:
         outcomes = [_outcome(model, row, seed) for seed in seeds]
         right[row["text"]] = float(np.mean([does for does, _ in outcomes]))
         unwarned[row["text"]] = float(np.mean([not does and not warned for does, warned in outcomes]))
@@ -47,7 +43,7 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
 
 def _mean(shares: Mapping[str, float], kept: bool) -> float:
     """The mean over the half of the commands that is kept back, or over the other."""
-    return float(np.mean([shares[row["text"]] for row in table()["bare"] if row.get("kept", False) == kept]))
+    return float(np.mean([shares[row["text"]] for row in TABLE["bare"] if row.get("kept", False) == kept]))
 
 
 def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[bool, bool]:
@@ -65,4 +61,4 @@ def odd_words(generated: Generated, row: Mapping[str, Any]) -> set[str]:
         shown += [passage.action for passage in generated.passages]
     stems = set(map(stem, NEW_MODEL_RULES.words(" ".join(shown))))
     allowed = {*map(stem, NEW_MODEL_RULES.words(row["text"])), *row.get("also", ())}
-    return stems & set(table()["odd"]) - allowed
+    return stems & set(TABLE["odd"]) - allowed

@@ -1,7 +1,6 @@
 """Sentences that ask for several actions in a row: whether they are split correctly, and each part is shown in turn."""
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from itertools import combinations, pairwise
 from typing import Any
 
@@ -13,11 +12,8 @@ from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
-
-@cache
-def table() -> Mapping[str, Any]:
-    """composed.toml: "composed", texts with the rules of each of their parts; "whole", texts that have no parts."""
-    return read_toml(__file__, "composed.toml")
+TABLE = read_toml(__file__, "composed.toml")
+""" "composed": texts with the rules of each of their parts; "whole": texts that have no parts."""
 
 
 def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
@@ -26,13 +22,13 @@ def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
     split = []
     all_parts: list[list[bool]] = []
     orders = {}
-    for row in table()["composed"]:
+    for row in TABLE["composed"]:
         split.append(len(model.parts(row["text"])) == len(row["parts"]))
         motions = [_shown(model, row, seed) for seed in seeds]
         orders[row["text"]] = float(np.mean([all(parts) for parts in motions]))
         all_parts += motions
     # texts that must not be split
-    whole = [len(model.parts(text)) == 1 for text in table()["whole"]]
+    whole = [len(model.parts(text)) == 1 for text in TABLE["whole"]]
     return {
         "composed": {
             "split": float(np.mean(split)),

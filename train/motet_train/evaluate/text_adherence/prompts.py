@@ -76,20 +76,13 @@ def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
     return True
 
 
-@cache
-def _table() -> Mapping[str, Any]:
-    return read_toml(__file__, "prompts.toml")
+_TABLE = read_toml(__file__, "prompts.toml")
 
+PROMPTS = tuple(Prompt(**row) for row in _TABLE["prompt"])
+"""All prompts, in the order of the file."""
 
-@cache
-def prompts() -> tuple[Prompt, ...]:
-    """All prompts, in the order of the file."""
-    return tuple(Prompt(**row) for row in _table()["prompt"])
-
-
-def outside() -> tuple[str, ...]:
-    """Everyday sentences about actions that no recorded trial shows."""
-    return tuple(_table()["outside"])
+OUTSIDE: Sequence[str] = _TABLE["outside"]
+"""Everyday sentences about actions that no recorded trial shows."""
 
 
 @cache
