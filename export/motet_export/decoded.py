@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.fields import Json
 from motet.bundle.golden import TOLERANCE, difference, vectors
 from motet.bundle.graph import Arrays
 from motet.decode.beam import noise_of
@@ -92,7 +93,7 @@ def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[b
     return vectors(model, feeds, inputs, settings, frames), entry
 
 
-def _tolerance(model: BundleModel, feeds: Mapping[str, Arrays], inputs: Arrays, settings: Mapping[str, Any]) -> float:
+def _tolerance(model: BundleModel, feeds: Mapping[str, Arrays], inputs: Arrays, settings: Json) -> float:
     """Ten times the effect of the inputs' last bits on the outputs, between TOLERANCE and ten times that."""
     rng = np.random.default_rng(6)
     largest = 0.0

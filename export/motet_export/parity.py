@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.fields import Json
 from motet.bundle.golden import difference
-from motet.bundle.graph import Arrays, Graph, GraphSpec
+from motet.bundle.graph import Arrays, Floats, Graph, GraphSpec
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import advance
 from motet.errors import BundleError
@@ -81,7 +82,7 @@ def check_meaning(onnx: BundleModel, torch: BundleModel) -> None:
             raise ExportError(f"parity: the bundle's settings.{kind.FEATURE} is not the run's")
 
 
-def _difference(part: str, declared: Mapping[str, Any], trained: Mapping[str, Any]) -> str:
+def _difference(part: str, declared: Json, trained: Json) -> str:
     """The name of a part of two manifests, with the first key whose values differ where it is an object."""
     in_bundle = declared.get(part)
     in_run = trained.get(part)
@@ -91,7 +92,7 @@ def _difference(part: str, declared: Mapping[str, Any], trained: Mapping[str, An
     return next(f"{part}.{key}" for key in keys if in_bundle.get(key) != in_run.get(key))
 
 
-def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> dict[str, Any]:
+def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> Json:
     """Rung 1: equal contracts, and one call at batch sizes 1, 1,000 and three random ones, of inputs drawn."""
     if onnx.spec != torch.spec:
         raise ExportError(f"{name}: the contracts differ: {onnx.spec} and {torch.spec}")
@@ -105,7 +106,7 @@ def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None =
     return _bounded(f"{name}.one_step", max(errors), 1e-5, batches=batches)
 
 
-def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str, Any]:
+def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> Json:
     """Rung 2: calls with inputs that are far from all data. "rounding" is how far torch comes from itself when their
     last bits change, and zeros by a millionth; a graph that amplifies this, as divisions by small numbers and the
     logarithm of a still figure's movement do, is held to ten times its own."""
@@ -124,7 +125,7 @@ def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str,
 
 def check_carried(
     onnx: Graph, torch: Graph, draw: Examples | None = None, horizon: int | None = None, batch: int = 16
-) -> dict[str, Any]:
+) -> Json:
     """Rung 3: 200 steps, the state carried by each on its own, under the same inputs.
 
     draw: gives the first state, and the other inputs anew for every step. horizon: after so many steps all begins
@@ -174,13 +175,13 @@ def nudged(state: Arrays, rng: np.random.Generator, of_zero: float = 0.0) -> dic
     return moved
 
 
-def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:
+def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> Json:
     """Rung 4: whole decoded runs with the same seeds; each callable gives what ONNX and what torch decoded."""
     errors = {name: error(*run()) for name, run in runs.items()}
     return _bounded("runs", max(errors.values()), CARRIED_TOLERANCE, **errors)
 
 
-def _bounded(name: str, largest: float, bound: float, **details: Any) -> dict[str, Any]:
+def _bounded(name: str, largest: float, bound: float, **details: Any) -> Json:
     if not largest <= bound:
         raise ExportError(f"parity {name}: the error is {largest:.2e}, the bound {bound:.0e} ({details})")
     return {"error": largest, "bound": bound, **details}
@@ -281,14 +282,14 @@ def _below(manifest: Manifest) -> dict[str, int]:
     return below
 
 
-def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> NDArray[np.float32]:
+def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> Floats:
     """Random walks (rows, frames, C) float32 from near the mean of the training data, in the contract's units."""
     steps = 0.1 * rng.normal(size=(rows, frames, len(contract.mean)))
     walk: Array = contract.mean + contract.std * steps.cumsum(axis=1)
     return walk.astype(np.float32)
 
 
-def strained(frames: NDArray[np.float32], contract: MotionContract, rng: np.random.Generator) -> NDArray[np.float32]:
+def strained(frames: Floats, contract: MotionContract, rng: np.random.Generator) -> Floats:
     """Frames (..., C) of which single numbers, but one at least, are at ``FAR_DEVIATIONS`` standard deviations from the
     mean."""
     # which numbers, at least one of them
@@ -313,9 +314,7 @@ def extremes(values: NDArray[Any]) -> NDArray[Any]:
     return rows
 
 
-def sides(
-    contract: MotionContract, rng: np.random.Generator, frames: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def sides(contract: MotionContract, rng: np.random.Generator, frames: int) -> tuple[Floats, Floats]:
     """Placed frames (frames, E) before a gap, and as many after it: both ends of a random walk in ``root_sixd``."""
     walk = walks(contract, rng, 1, 2 * frames)[0].astype(np.float64)
     past, after = np.split(placed_by_way(walk, contract.fps).astype(np.float32), 2)

@@ -1,12 +1,14 @@
 """The optimiser Muon (Jordan et al. 2024) in float32, and its combination with AdamW."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import chain
 from typing import Any
 
 import torch
 from torch import Tensor
+
+from motet.bundle.fields import Json
 
 NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)
 """Coefficients of Jordan's polynomial a x + b x^3 + c x^5; five iterations bring values from 0.001 to 1 close to 1."""
@@ -20,7 +22,7 @@ class Muon:
     Muon's steps are orthogonal matrices: every direction of a matrix, also a rare one, is learned at the same rate.
     """
 
-    def __init__(self, groups: Iterable[Mapping[str, Any]], lr: float) -> None:
+    def __init__(self, groups: Iterable[Json], lr: float) -> None:
         matrices: list[dict[str, Any]] = []
         others: list[dict[str, Any]] = []
         for group in groups:
@@ -47,11 +49,11 @@ class Muon:
         for part in self.parts:
             part.zero_grad(set_to_none=set_to_none)
 
-    def state_dict(self) -> dict[str, Any]:
+    def state_dict(self) -> Json:
         """The states of both."""
         return {"parts": [part.state_dict() for part in self.parts]}
 
-    def load_state_dict(self, state_dict: Mapping[str, Any], /) -> None:
+    def load_state_dict(self, state_dict: Json, /) -> None:
         """Restore a state from :meth:`state_dict`."""
         for part, state in zip(self.parts, state_dict["parts"], strict=True):
             part.load_state_dict(state)

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import click
 
+from motet.bundle.fields import Json
 from motet.generate.base import GenerateModel
 from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
@@ -90,7 +91,7 @@ class Suite:
     """The measurements of a kind of models. what: its name in messages. data: the data required, "" if optional."""
 
     what: str
-    measure: Callable[[Mapping[str, Any], Inputs], Results]
+    measure: Callable[[Json, Inputs], Results]
     data: str = "the store that they were trained on"
     draws: bool = True
 
@@ -147,7 +148,7 @@ def _language(models: Mapping[str, LanguageModel], inputs: Inputs) -> Results:
     return Results(results.figures, results.text, lambda: _language_drawings(models, corpora))
 
 
-def _language_report(name: str, models: Mapping[str, Any], corpora: Mapping[str, SplitStore]) -> Report:
+def _language_report(name: str, models: Json, corpora: Mapping[str, SplitStore]) -> Report:
     model = models[name]
     corpus = corpora[name]
     # a describe model of the same split closes the chain

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.errors import MotetError, MotionError
 from motet.figures.trimming import repeated
 from motet.files import new_folder
@@ -28,7 +28,6 @@ from motet_train.data.corpus import Record, Skipped
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import Preparation
 
-Floats = NDArray[np.float32]
 Item = Record | Skipped
 
 FRAMES_FILE = "frames.npy"

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from motet.bundle.fields import Json
 from motet.draw.svg import shapes
 from motet.errors import OutputError
 from motet.files import write_whole
@@ -132,7 +133,7 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
     return figure
 
 
-def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Mapping[str, Mapping[str, Any]]) -> None:
+def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Mapping[str, Json]) -> None:
     """Plot errors (N,) against the true time."""
     for name, error in systems.items():
         milliseconds = (np.arange(len(error)) + 1) / fps * 1000

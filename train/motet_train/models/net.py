@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from motet.bundle.fields import Json
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.motion.rotations import Array
 from motet.representation.contract import Z_LIMIT
@@ -47,7 +48,7 @@ class Net(nn.Module, ABC):
         self.register_buffer("scale", torch.ones(channels))
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> Self:
+    def from_config(cls, config: Json) -> Self:
         """An untrained net of a configuration from a manifest."""
         return cls(configured(cls.CONFIG, config))
 
@@ -101,7 +102,7 @@ def tuples(value: Any) -> Any:
     return tuple(map(tuples, value)) if isinstance(value, list) else value
 
 
-def configured(kind: Any, data: Mapping[str, Any]) -> Any:
+def configured(kind: Any, data: Json) -> Any:
     """The dataclass ``kind``, and the dataclasses in its fields, from JSON."""
     hints = get_type_hints(kind)
     parts = {name: hints[name] for name in data if is_dataclass(hints.get(name))}

@@ -15,7 +15,7 @@ from motet_train.evaluate.language.attributes import common_side, common_turning
 from motet_train.evaluate.language.describe import RANKS, bleu, ranked, ranks, retrieved
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
-from motet_train.evaluate.tables import Report, gathered, read_goals
+from motet_train.evaluate.tables import Figures, Report, gathered, read_goals
 
 LANGUAGE_GOALS = read_goals("language")
 
@@ -94,7 +94,7 @@ def knows(model: GenerateModel, sentence: str, every_word: bool = False) -> bool
         return False
 
 
-def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> dict[str, float]:
+def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> Figures:
     """A row of table 3: BLEU of the descriptions of the first to the fifth motion, "1" to "5".
 
     Each sentence with a generated motion counts once; its references are all sentences of its record.
@@ -106,7 +106,7 @@ def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> di
     return ranks(list(zip(*texts, strict=True)), corpus.references(answers.records))
 
 
-def bounds_chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> dict[str, float]:
+def bounds_chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> Figures:
     """The same for recorded motions.
 
     retrieval: the training motion with the most similar sentence, the floor. data: the motion that the sentence
@@ -250,7 +250,7 @@ def kinds(corpus: SplitStore) -> dict[str, list[Travel]]:
     return travels
 
 
-def thresholds(travels: Mapping[str, Sequence[Travel]]) -> dict[str, float]:
+def thresholds(travels: Mapping[str, Sequence[Travel]]) -> Figures:
     """The thresholds between :func:`kinds`, except those between kinds without training motions.
 
     slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, half-way between the median speeds of
@@ -286,7 +286,7 @@ def measurable(limits: Thresholds) -> dict[str, KindPrompt]:
     return {key: prompt for key, prompt in ASKED.items() if set(prompt.needs) <= set(limits)}
 
 
-def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> dict[str, float]:
+def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> Figures:
     """The ceiling of a model: for each measurable entry of ASKED the share of the training motions of that kind that
     pass its test; NaN without such motions."""
     shares = {}
@@ -296,7 +296,7 @@ def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> d
     return shares
 
 
-def prompted(model: GenerateModel, limits: Thresholds, seeds: int = 10) -> dict[str, float]:
+def prompted(model: GenerateModel, limits: Thresholds, seeds: int = 10) -> Figures:
     """For each measurable entry of ASKED the share of seeds whose most likely motion passes its test.
 
     A sentence without a word that the model knows counts as failed.

@@ -2,17 +2,17 @@
 not."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.errors import TextWarning, collected
 from motet.generate.base import Generated, GenerateModel
 from motet.generate.model import Story
 from motet.text.clauses import stem
 from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.table import read_toml
-from motet_train.evaluate.tables import Report
+from motet_train.evaluate.tables import Figures, Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import track_of
 
@@ -26,8 +26,8 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
 
     "bare_right" and "bare_unwarned" have them by command.
     """
-    right: dict[str, float] = {}
-    unwarned: dict[str, float] = {}
+    right: Figures = {}
+    unwarned: Figures = {}
     for row in TABLE["bare"]:
         outcomes = [_outcome(model, row, seed) for seed in seeds]
         right[row["text"]] = float(np.mean([does for does, _ in outcomes]))
@@ -46,7 +46,7 @@ def _mean(shares: Mapping[str, float], kept: bool) -> float:
     return float(np.mean([shares[row["text"]] for row in TABLE["bare"] if row.get("kept", False) == kept]))
 
 
-def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[bool, bool]:
+def _outcome(model: GenerateModel, row: Json, seed: int) -> tuple[bool, bool]:
     """Whether the motion of a command does what it says, and whether there was a warning."""
     with collected(TextWarning) as warnings:
         (generated,) = model.generate(row["text"], seed=seed)
@@ -54,7 +54,7 @@ def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[b
     return does, bool(warnings)
 
 
-def odd_words(generated: Generated, row: Mapping[str, Any]) -> set[str]:
+def odd_words(generated: Generated, row: Json) -> set[str]:
     """The stems of words for other acts in the sentences of the actions that a motion shows."""
     shown = [generated.action]
     if isinstance(generated, Story):

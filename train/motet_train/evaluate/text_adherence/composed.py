@@ -1,11 +1,12 @@
 """Sentences that ask for several actions in a row: whether they are split correctly, and each part is shown in turn."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.generate.model import CodesModel, Story
 from motet_train.data.table import read_toml
 from motet_train.evaluate.tables import Report
@@ -40,7 +41,7 @@ def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
     }
 
 
-def _shown(model: CodesModel, row: Mapping[str, Any], seed: int) -> list[bool]:
+def _shown(model: CodesModel, row: Json, seed: int) -> list[bool]:
     """Whether each part of a composed text is shown in its passage. A motion with another number of passages is cut at
     tenths of its duration where most parts are shown."""
     (generated,) = model.generate(row["text"], seed=seed)

@@ -1,10 +1,10 @@
 """Sentences with numbers: whether a motion turns, goes, steps, repeats and lasts as much as the sentence says."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.generate.base import GenerateModel
 from motet_train.data.table import read_toml
 from motet_train.evaluate.language.split_store import unknown_words_allowed
@@ -18,7 +18,7 @@ BARS = {"degrees": (0.1, 0.0), "metres": (0.1, 0.0), "steps": (0.0, 1.0), "times
 """Kind of number -> tolerances: a share of the number, and an amount."""
 
 
-NUMBERS: Sequence[Mapping[str, Any]] = read_toml(__file__, "numbers.toml")["number"]
+NUMBERS: Sequence[Json] = read_toml(__file__, "numbers.toml")["number"]
 """The rows of the table of sentences with numbers."""
 
 
@@ -49,7 +49,7 @@ def _tracks(model: GenerateModel, text: str, seeds: Sequence[int]) -> list[Track
         return [track_of(model.generate(text, seed=seed)[0].motion) for seed in seeds]
 
 
-def met(track: Track, row: Mapping[str, Any]) -> bool:
+def met(track: Track, row: Json) -> bool:
     """Whether a motion has the number of a row of the table, within the tolerances."""
     kind = next(kind for kind in BARS if kind in row)
     value = measured(track, kind, row.get("act", ""))
@@ -92,7 +92,8 @@ def jumps(track: Track) -> int:
 
 def jumping_jacks(track: Track) -> int:
     """How often both hands go above the shoulders and come down again."""
-    return len(spells((track.heights("Hand") > track.heights("UpperArm")).all(axis=0)))
+    up = (track.heights("Hand") > track.heights("UpperArm")).all(axis=0)
+    return len(spells(np.asarray(up)))
 
 
 def kicks(track: Track) -> int:

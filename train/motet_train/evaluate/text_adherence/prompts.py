@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
 
+from motet.bundle.fields import Json
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.motion.motion import Motion
@@ -41,7 +41,7 @@ class Prompt:
 
     text: str
     group: str
-    rules: Sequence[Mapping[str, Any]]
+    rules: Sequence[Json]
     shown: Sequence[str]
     aside: Sequence[str]
     walk: bool = False
@@ -64,7 +64,7 @@ class Prompt:
         return False
 
 
-def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
+def holds(track: Track, rules: Sequence[Json]) -> bool:
     """Whether a motion passes all of some rules."""
     if track.seconds < SHORTEST_SHOWN:
         return False

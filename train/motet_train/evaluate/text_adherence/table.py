@@ -21,7 +21,7 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import BALLS, jerk, length, skate
-from motet_train.evaluate.tables import Report, aligned, read_goals, report_table, short_names
+from motet_train.evaluate.tables import Figures, Report, aligned, read_goals, report_table, short_names
 from motet_train.evaluate.text_adherence.prompts import PROMPTS, SHORTEST_SHOWN, LookUp, Prompt, Trial, actions
 from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
@@ -32,8 +32,6 @@ CHOICES = 32
 
 Vectors = Mapping[str, Floats]
 """The text of a prompt -> vectors (N, E) of motions from :func:`embedded`."""
-
-Figures = dict[str, float]
 
 Generator = Callable[[str, int], Motion]
 """Makes a motion of a human figure from a sentence and a seed; TextError for a sentence that it does not accept."""
@@ -323,7 +321,7 @@ def rivals(candidates: Sequence[Prompt]) -> list[list[int]]:
     return [np.flatnonzero(row).tolist() for row in apart]
 
 
-def r_precision(similarity: Array, rival_similarity: Array) -> dict[str, float]:
+def r_precision(similarity: Array, rival_similarity: Array) -> Figures:
     """R-precision by the similarity of motions to their own prompt (N,) and to each of its rivals (N, K).
 
     Guo et al. draw 31 rivals for each motion. This is the mean over all draws, so nothing depends on a seed: if b of K
@@ -359,7 +357,7 @@ def frechet(first: Floats, second: Floats) -> float:
     return float(((m - n) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * cross_trace)
 
 
-def _precisions(vectors: Vectors, candidates: Sequence[Prompt], texts: Floats) -> dict[str, float]:
+def _precisions(vectors: Vectors, candidates: Sequence[Prompt], texts: Floats) -> Figures:
     """The means over the prompts that have vectors."""
     rows = []
     for column, (prompt, others) in enumerate(zip(candidates, rivals(candidates), strict=True)):

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.figures.humanoid import HUMANOID, on_humanoid, sided
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion, resampled
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices
 from motet_train.data.errors import DataError
 from motet_train.evaluate.positions import Flags, length, running_mean, spells
 
@@ -36,7 +35,7 @@ class Track:
         """Its duration."""
         return len(self) / RATE
 
-    def frames(self, which: slice | NDArray[np.intp]) -> "Track":
+    def frames(self, which: slice | Indices) -> "Track":
         """Some of the frames, above the same ground."""
         part = Track(self.points[which])
         part.__dict__["ground"] = self.ground

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from motet.bundle.fields import Json
 from motet.motion.rotations import Array
 from motet.predict.model import PredictModel
 from motet_train.data.errors import DataError
@@ -99,7 +100,7 @@ class Results:
         return figures
 
 
-def _nested(parts: Mapping[tuple[str, str], Array]) -> dict[str, Any]:
+def _nested(parts: Mapping[tuple[str, str], Array]) -> Json:
     nested: dict[str, Any] = {}
     for (kind, action), error in parts.items():
         nested.setdefault(kind, {})[action] = by_frame(error)
@@ -280,7 +281,7 @@ def harness_table(models: Models, groups: Groups) -> str:
     return aligned(rows)
 
 
-def _range(trainings: Sequence[Mapping[str, Any]], key: str) -> str:
+def _range(trainings: Sequence[Json], key: str) -> str:
     """The least and the largest value of an entry, or the only one."""
     values = {training[key] for training in trainings if key in training}
     return "-".join(map(str, sorted({min(values), max(values)}))) if values else ""
@@ -298,7 +299,7 @@ def cost_table(models: Models, groups: Groups) -> str:
     return aligned(rows, left=(0, 3))
 
 
-def _machine(training: Mapping[str, Any]) -> str:
+def _machine(training: Json) -> str:
     threads = training.get("threads")
     machine: str = training.get("machine", "")
     return machine if threads is None else f"{machine}, threads: {threads}"

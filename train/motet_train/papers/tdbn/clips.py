@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.formats import READABLE, read_motion
 from motet.motion.kinematics import skeleton_of, without_heading
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices
 from motet.motion.skeleton import LEFT, MIDDLE, Skeleton, sides_of
 from motet.representation.base import phases
 from motet.representation.retargeting import in_joints_of
@@ -131,7 +130,7 @@ class BodyParts:
     """
 
     names: tuple[str, ...]
-    of_channel: NDArray[np.intp]
+    of_channel: Indices
     legs: tuple[int, ...]
 
 

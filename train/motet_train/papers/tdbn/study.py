@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.motion.motion import lines
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices, Mask
 from motet.papers.tdbn_control import TdbnModel, TdbnSession
 from motet.representation.contract import LIVING_STD
 from motet_train.evaluate.positions import arrival
@@ -40,7 +40,7 @@ class Reference:
     """
 
     motions: Mapping[str, Sequence[Array]]
-    legs: NDArray[np.intp]
+    legs: Indices
 
     @property
     def clips(self) -> list[Array]:
@@ -115,8 +115,8 @@ class Recording:
 class Leg:
     """Indices of a leg's channels, and of its codes."""
 
-    channels: NDArray[np.intp]
-    codes: NDArray[np.intp]
+    channels: Indices
+    codes: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +213,7 @@ class ControlStudy:
         """Seconds (B,) until frames (T, B, D) are on a gait's loop and stay there."""
         return arrival(self.reference.distance(frames, self.loop_points(role)) < ARRIVED, self.fps)
 
-    def nearer_to_run(self, frames: Array) -> NDArray[np.bool_]:
+    def nearer_to_run(self, frames: Array) -> Mask:
         """Whether each of frames (..., D) is nearer to the running loop than to the walking one."""
         to_walk = self.reference.distance(frames, self.loop_points("walk"))
         to_run = self.reference.distance(frames, self.loop_points("run"))

@@ -18,9 +18,11 @@ from typing import Any, Self, get_type_hints
 import torch
 from torch import Tensor, nn
 
+from motet.bundle.fields import Json
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
-from motet_train.models.net import Net, Part, configured, normalised
+from motet_train.evaluate.tables import Figures
+from motet_train.models.net import Graphs, Net, Part, configured, normalised
 from motet_train.papers.tdbn.rbm import (
     CRBM,
     NOTHING_BORROWED,
@@ -80,7 +82,7 @@ class ControlNet(Net):
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
 
     @property
-    def defaults(self) -> dict[str, float]:
+    def defaults(self) -> Figures:
         """The default options of a session."""
         return {"temperature": self.config.temperature}
 
@@ -100,12 +102,12 @@ class ControlNet(Net):
         """Codes (B, H) between their means (variety 0) and binary samples (variety 1), by noise (B, N)."""
         return mean + variety * ((noise < mean).to(mean.dtype) - mean)
 
-    def to_config(self) -> dict[str, Any]:
+    def to_config(self) -> Json:
         """The arguments of :meth:`from_config`; apart from tuples, ready for JSON."""
         return {**asdict(self.config), **self.sizes}
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> Self:
+    def from_config(cls, config: Json) -> Self:
         """An untrained net of the sizes that :meth:`to_config` wrote."""
         names = get_type_hints(cls.CONFIG).keys()
         settings = {key: value for key, value in config.items() if key in names}
@@ -171,7 +173,7 @@ class ControlNet(Net):
         frame = self.decode(next_codes)
         return next_codes, frame, torch.cat([history[:, 1:], next_codes[:, None]], dim=1)
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder and the step, each with its contract."""
         codes = len(self.crbm.visible_bias)
         channels = len(self.mean)
@@ -386,7 +388,7 @@ class AngleCRBM(ControlNet):
         return mean + variety * torch.sqrt(-2 * torch.log(1 - first)) * torch.cos(2 * math.pi * second)
 
     @property
-    def defaults(self) -> dict[str, float]:
+    def defaults(self) -> Figures:
         """The default options of a session, with the Gibbs iterations."""
         return {**super().defaults, "iterations": self.config.iterations}
 
