@@ -39,11 +39,8 @@ CARRIED_TOLERANCE = 1e-4
 CARRIED_STEPS = 200
 """Steps whose state is carried."""
 
-FAR_SHARE = 0.01
-"""Of the numbers in frames that are drawn: those that are far from all data."""
-
 FAR_DEVIATIONS = (10.0, 1000.0)
-"""Standard deviations from the mean, between which these lie: nets clip at 50."""
+"""Standard deviations from the mean, between which numbers far from all data lie: nets clip at 50."""
 
 FRAME_INPUTS = ("frames", "frame", "history")
 """Inputs that are frames, or codes of frames: they are drawn like the training data's."""
@@ -140,7 +137,7 @@ def check_carried(
         if n % (horizon or 1) == 0:
             inputs = draw(rng, batch)
         if n % (horizon or CARRIED_STEPS) == 0:
-            states = [_states(inputs, torch.spec)] * 3
+            states = [{name: inputs[name] for name in torch.spec.feedback}] * 3
 
         # three runs: ONNX Runtime's, torch's, and torch's with other last bits
         others = {name: value for name, value in inputs.items() if name not in torch.spec.feedback}
@@ -156,11 +153,6 @@ def check_carried(
     return _bounded(
         "step.carried", largest, bound, rounding=rounding, steps=CARRIED_STEPS, horizon=horizon, batch=batch
     )
-
-
-def _states(inputs: Arrays, spec: GraphSpec) -> dict[str, NDArray[Any]]:
-    """The inputs of a graph that are fed back."""
-    return {name: inputs[name] for name in spec.feedback}
 
 
 def nudged(state: Arrays, rng: np.random.Generator, of_zero: float = 0.0) -> dict[str, NDArray[Any]]:
@@ -292,8 +284,8 @@ def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames:
 def strained(frames: Floats, contract: MotionContract, rng: np.random.Generator) -> Floats:
     """Frames (..., C) of which single numbers, but one at least, are at ``FAR_DEVIATIONS`` standard deviations from the
     mean."""
-    # which numbers, at least one of them
-    far = rng.random(frames.shape) < FAR_SHARE
+    # which numbers: one in a hundred, at least one of them
+    far = rng.random(frames.shape) < 0.01
     far.flat[rng.integers(far.size)] = True
 
     # to either side, and as often near as very far

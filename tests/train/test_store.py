@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 from kit_zip import JOINTS, write_kit_zip
 from language_data import walker
+from stores import prepare
 
 from motet.cli import main
 from motet.errors import OutputError
@@ -24,7 +25,7 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record, Skipped, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation
-from motet_train.data.store import Entry, Store, prepare, split
+from motet_train.data.store import Entry, Store, split
 
 PLAIN = Preparation("root_angles", humanoid=False, trim=False, cut=False)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from motet.bundle.graph import Floats
-from motet.motion.rotations import Array, Mask
+from motet.motion.rotations import Array
 from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_train.data.errors import DataError
 
@@ -35,8 +35,7 @@ def word_table(path: Path, words: Sequence[str], size: int) -> WordTable:
     """The table of a file of vectors (:func:`read_word_vectors`) for a vocabulary, with ``size`` numbers per word."""
     read = read_word_vectors(path, words, FIRST)
     common = nearest(read, words[len(SPECIALS) :])
-    vectors, _ = principal(read, (*words, *common), size)
-    return WordTable(common, vectors)
+    return WordTable(common, principal(read, (*words, *common), size))
 
 
 def nearest(vectors: Mapping[str, Array], words: Sequence[str]) -> dict[str, str]:
@@ -124,10 +123,10 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
         raise DataError(f"the word vectors {path} cannot be read: {error}") from error
 
 
-def principal(vectors: Mapping[str, Array], words: Sequence[str], size: int) -> tuple[Array, Mask]:
+def principal(vectors: Mapping[str, Array], words: Sequence[str], size: int) -> Array:
     """Principal components of vectors as rows (words, size), scaled to an overall standard deviation of 1.
 
-    Also returns which words have a vector; rows of others, and components beyond the number of axes, are 0.
+    Rows of words without a vector, and components beyond the number of axes, are 0.
     """
     known = np.array([word in vectors for word in words])
     # principal axes of the words with a vector
@@ -137,4 +136,4 @@ def principal(vectors: Mapping[str, Array], words: Sequence[str], size: int) -> 
     parts = rows @ axes[:size].T
     components = np.zeros((len(words), size))
     components[known, : parts.shape[1]] = parts / (parts.std() or 1.0)
-    return components, known
+    return components

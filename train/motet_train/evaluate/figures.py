@@ -66,7 +66,7 @@ def bones_of(skeleton: Skeleton) -> Bones:
     return [(joint.parent, i) for i, joint in enumerate(skeleton.joints) if joint.parent >= 0]
 
 
-def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any], width: float = 0.9) -> None:
+def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any]) -> None:
     """Draw poses (K, J, 2) in body heights from left to right, :data:`SPACING` apart.
 
     colours: one for each pose, or one for each of its bones.
@@ -74,7 +74,7 @@ def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any
     shifts = SPACING * np.arange(len(points))
     placed = points + shifts[:, None, None] * [1, 0]
     for pose, colour in zip(placed[:, np.array(bones)], colours, strict=True):
-        axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=width))
+        axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=0.9))
     axes.autoscale_view()
     axes.set_aspect("equal")
     axes.axis("off")

@@ -44,9 +44,6 @@ DRAWING_SETTINGS: dict[str, Any] = {
 ALIKE_PAIRS = 0.2018
 """Share of the pairs of steps within long recordings that count as alike."""
 
-MEASURED_RECORDINGS = 1000
-"""Long recordings in which the distances of steps are measured, at most."""
-
 
 @dataclass(frozen=True)
 class CodeVisits:
@@ -143,9 +140,9 @@ def alike_distance(memory: Memory) -> float:
                 lengthy.append(memory.keys[action][recording.places])
     if not lengthy:
         return memory.settings.alike_distance
-    # distances of all pairs of steps in some of them
+    # distances of all pairs of steps in a thousand of them at most
     distances = []
-    for keys in lengthy[:: -(-len(lengthy) // MEASURED_RECORDINGS)]:
+    for keys in lengthy[:: -(-len(lengthy) // 1000)]:
         distances.append(squared_distances(keys)[np.triu_indices(len(keys), 1)])
     alike = float(np.quantile(np.concatenate(distances), ALIKE_PAIRS))
     return max(float(f"{alike:.3g}"), MemorySettings.RANGES["alike_distance"][1].low)

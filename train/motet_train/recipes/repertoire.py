@@ -28,9 +28,6 @@ from motet.steering.model import SteerModel
 from motet.steering.repertoire import SEAM, STEPS_OF_UNIT, at_tempo, joined
 from motet_train.data.errors import DataError
 
-BASE_SECONDS = 12.0
-"""Seconds of the standing figure over which acts are keyed."""
-
 KEPT_COLUMNS = ("name", "also", "side", "limb")
 """What the document keeps of the table."""
 
@@ -48,7 +45,7 @@ class Maker:
     def __init__(self, generate: CodesModel, control: SteerModel) -> None:
         self.generate = generate
         self.control = control
-        self.standing: Motion = control.run(f"stop {BASE_SECONDS:g}s")
+        self.standing: Motion = control.run("stop 12s")  # over which acts are keyed
         self._shown: dict[str, Array] = {}
 
     def numbers(self, act: Json) -> Array:

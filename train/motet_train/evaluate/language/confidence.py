@@ -24,10 +24,6 @@ TIMELINES = 60
 CHAIN = 3
 """Motions of a timeline."""
 
-SHORTEST_PART = 2.0
-LONGEST_PART = 12.0
-"""Seconds that a motion of a timeline lasts."""
-
 
 def confidence(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> Figures:
     """The shares of the best descriptions of some records (``of``) that are right, and confident.
@@ -156,8 +152,8 @@ def timeline_figures(model: DescribeModel, corpus: SplitStore, records: Sequence
 
 
 def fits_timeline(motion: Motion) -> bool:
-    """Whether a motion is long and short enough for a timeline."""
-    return SHORTEST_PART <= motion.duration <= LONGEST_PART
+    """Whether a motion is long and short enough for a timeline: 2 to 12 s."""
+    return 2.0 <= motion.duration <= 12.0
 
 
 def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence[tuple[str, int]]]:

@@ -178,39 +178,29 @@ Thresholds = Mapping[str, float]
 
 
 class KindPrompt(NamedTuple):
-    """A sentence, the test of its motions, and the thresholds that the test needs."""
+    """A sentence, and the quantity of its motions that is at least one threshold, and below another if it has one."""
 
     sentence: str
-    passes: Callable[[Travel, Thresholds], bool]
-    needs: tuple[str, ...]
+    quantity: Callable[[Travel], float]
+    least: str
+    below: str | None = None
+
+    def measurable(self, limits: Thresholds) -> bool:
+        """Whether its thresholds exist."""
+        return self.least in limits and (self.below is None or self.below in limits)
+
+    def passes(self, travel: Travel, limits: Thresholds) -> bool:
+        """Whether a motion is of the kind."""
+        most = np.inf if self.below is None else limits[self.below]
+        return limits[self.least] <= self.quantity(travel) < most
 
 
 ASKED: Mapping[str, KindPrompt] = {
-    "walks": KindPrompt(
-        "a person walks",
-        lambda travel, limits: limits["slow"] <= travel.speed < limits["run"],
-        ("slow", "run"),
-    ),
-    "runs": KindPrompt(
-        "a person runs",
-        lambda travel, limits: travel.speed >= limits["run"],
-        ("run",),
-    ),
-    "left": KindPrompt(
-        "a person walks and turns left",
-        lambda travel, limits: travel.turn >= limits["turn"],
-        ("turn",),
-    ),
-    "right": KindPrompt(
-        "a person walks and turns right",
-        lambda travel, limits: travel.turn <= -limits["turn"],
-        ("turn",),
-    ),
-    "jumps": KindPrompt(
-        "a person jumps",
-        lambda travel, limits: travel.rise >= limits["rise"],
-        ("rise",),
-    ),
+    "walks": KindPrompt("a person walks", lambda travel: travel.speed, "slow", "run"),
+    "runs": KindPrompt("a person runs", lambda travel: travel.speed, "run"),
+    "left": KindPrompt("a person walks and turns left", lambda travel: travel.turn, "turn"),
+    "right": KindPrompt("a person walks and turns right", lambda travel: -travel.turn, "turn"),
+    "jumps": KindPrompt("a person jumps", lambda travel: travel.rise, "rise"),
 }
 
 
@@ -283,7 +273,7 @@ def _half_way(lower: list[float], upper: list[float]) -> float:
 
 def measurable(limits: Thresholds) -> dict[str, KindPrompt]:
     """The entries of ASKED whose thresholds exist."""
-    return {key: prompt for key, prompt in ASKED.items() if set(prompt.needs) <= set(limits)}
+    return {key: prompt for key, prompt in ASKED.items() if prompt.measurable(limits)}
 
 
 def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> Figures:

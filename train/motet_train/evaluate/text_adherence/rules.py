@@ -16,10 +16,6 @@ VELOCITY_COLUMNS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "rig
 CLEAR = 0.1
 """Metres above which a foot is clearly off the ground; in a run both feet are only for a moment."""
 
-SHORTEST_FLIGHT = 0.12
-LONGEST_FLIGHT = 0.9
-"""Seconds of a jump: shorter flights are running steps, in longer ones the figure stands on something."""
-
 HAND_BONES = pair("Hand")
 
 
@@ -123,7 +119,8 @@ def jumps(track: Track, rise: float, count: int = 1, metres: float = 0.0, most_m
     for start, stop in spells(track.soles.min(axis=1) > CLEAR):
         seconds = (stop - start) / RATE
         lands = start > 0 and stop < len(track)
-        if not lands or not SHORTEST_FLIGHT <= seconds <= LONGEST_FLIGHT:
+        # shorter flights are running steps, in longer ones the figure stands on something
+        if not lands or not 0.12 <= seconds <= 0.9:
             continue
         high = hips[start:stop].max() - standing_hips >= rise
         distance = np.linalg.norm(track.path[stop] - track.path[start - 1])

@@ -407,17 +407,17 @@ def _per_cent(share: float) -> str:
     return "" if np.isnan(share) else f"{100 * share:.0f}"
 
 
-def says_drawings(generator: Generator, every: int = 8) -> Drawings:
+def says_drawings(generator: Generator) -> Drawings:
     """Every eighth prompt whose motion of seed 0 passes, or else the next one that passes before the eighth after it;
     the title has the number of prompts that were passed over."""
-    return {"says": lambda: _strips_of_passed(generator, every)}
+    return {"says": lambda: _strips_of_passed(generator)}
 
 
-def _strips_of_passed(generator: Generator, every: int) -> Figure:
+def _strips_of_passed(generator: Generator) -> Figure:
     motions: dict[str, Motion] = {}
     failed = 0
-    for start in range(0, len(PROMPTS), every):
-        for prompt in PROMPTS[start : start + every]:
+    for start in range(0, len(PROMPTS), 8):
+        for prompt in PROMPTS[start : start + 8]:
             motion = generator(prompt.text, 0)
             if prompt.passes(track_of(motion)):
                 motions[prompt.text] = motion

@@ -25,9 +25,7 @@ from motet_train.evaluate.tables import Figures
 from motet_train.models.net import Graphs, Net, Part, configured, normalised
 from motet_train.papers.tdbn.rbm import (
     CRBM,
-    NOTHING_BORROWED,
     RBM,
-    Borrowed,
     CRBMLayer,
     Learning,
     Past,
@@ -132,13 +130,12 @@ class ControlNet(Net):
         generator: torch.Generator,
         past: Past,
         clamped: bool = True,
-        borrowed: Borrowed = NOTHING_BORROWED,
     ) -> CRBMLayer:
         """The training of the CRBM on sequences in the present codes."""
         codes = [list(map(self.encode, group)) for group in lessons.sequences]
         units = [list(map(self._units, group)) for group in lessons.controls]
         data = transitions(codes, units, self.config.taps, lessons.onsets, past.unrolled)
-        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past, borrowed)
+        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
 
     def _units(self, control: Tensor) -> Tensor:
         """Control values (..., L) as control units (..., C)."""
@@ -209,11 +206,11 @@ class TDBNConfig:
     for each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for
     the second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard
     deviation of a visible unit relative to its channel's: with a smaller one, codes are more precise. past_noise,
-    unrolled: noise and unrolled of :class:`Past`. borrowed_past, borrowed_control: past and control of
-    :class:`Borrowed`. onset: how many times as often the first window of a motion that ends is drawn as its last.
-    temperature: of the codes and of generation; learning anneals from 1 to it. initial: standard deviation of the
-    first weights. restarts: RBMs that learn side by side. tries: most CRBMs trained on each of them until a net reaches
-    its goals. rounds: how often all of this begins anew until then.
+    unrolled, borrowed_past, borrowed_control: noise, unrolled, borrowed and rival of :class:`Past`. onset: how many
+    times as often the first window of a motion that ends is drawn as its last. temperature: of the codes and of
+    generation; learning anneals from 1 to it. initial: standard deviation of the first weights. restarts: RBMs that
+    learn side by side. tries: most CRBMs trained on each of them until a net reaches its goals. rounds: how often
+    all of this begins anew until then.
     """
 
     fps: float = 40.0
@@ -321,9 +318,14 @@ class TDBN(ControlNet):
             self.rbm.take(rbms, number)
             self.begin_crbm(generator)
 
-        past = Past(config.past_noise, unrolled=config.unrolled)
-        borrowed = Borrowed(config.borrowed_past, config.hidden_per_part, config.borrowed_control)
-        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped, borrowed)
+        past = Past(
+            config.past_noise,
+            unrolled=config.unrolled,
+            borrowed=config.borrowed_past,
+            block=config.hidden_per_part,
+            rival=config.borrowed_control,
+        )
+        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped)
         return Stage(config.crbm.epochs, begin, layer, whole=True)
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
