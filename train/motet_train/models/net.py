@@ -88,6 +88,11 @@ class Part(nn.Module):
         self.forward = function
 
 
+def encoder_and_step(net: Any, encoder: GraphSpec, step: GraphSpec) -> Graphs:
+    """The graphs of a net's ``encode`` and ``step`` with their contracts."""
+    return {"encoder": (Part(net, net.encode), encoder), "step": (Part(net, net.step), step)}
+
+
 def _rename(net: Net, state: dict[str, Any], prefix: str, *details: Any) -> None:
     """Give the weights of an older run the names of today, before they are loaded."""
     for key in list(state):

@@ -92,8 +92,7 @@ def jumps(track: Track) -> int:
 
 def jumping_jacks(track: Track) -> int:
     """How often both hands go above the shoulders and come down again."""
-    up = (track.heights("Hand") > track.heights("UpperArm")).all(axis=0)
-    return len(spells(np.asarray(up)))
+    return len(spells(track.hands_up))
 
 
 def kicks(track: Track) -> int:

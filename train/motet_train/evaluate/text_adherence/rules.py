@@ -163,8 +163,7 @@ def jumping_jacks(track: Track, count: int) -> bool:
     """At least ``count`` times the feet are half a metre apart sideways while both hands are above the shoulders."""
     left, right = track.bodies("Foot")
     wide = np.abs(left[:, 0] - right[:, 0]) >= 0.5
-    up = (track.heights("Hand") > track.heights("UpperArm")).all(axis=0)
-    return len(spells(wide & up)) >= count
+    return len(spells(wide & track.hands_up)) >= count
 
 
 def lifts_feet(track: Track, height: float) -> bool:

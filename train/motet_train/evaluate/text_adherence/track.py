@@ -76,6 +76,11 @@ class Track:
         lowest: Array = np.min(heights, axis=0).T
         return lowest
 
+    @property
+    def hands_up(self) -> Flags:
+        """When (T,) both hands are above the shoulders."""
+        return np.asarray((self.heights("Hand") > self.heights("UpperArm")).all(axis=0))
+
     @cached_property
     def path(self) -> Array:
         """The place (T, 2) of the hips over the ground."""

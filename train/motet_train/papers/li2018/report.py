@@ -44,8 +44,11 @@ Models = Mapping[str, PredictModel]
 Groups = Mapping[str, Sequence[str]]
 """Title of a group of runs that differ only in their seed -> their names."""
 
-Errors = Mapping[str, Mapping[tuple[str, str], Array]]
-"""System -> FEW, MANY or ANGLE_ERRORS, and an action or MEAN -> error (25,)."""
+Parts = Mapping[tuple[str, str], Array]
+"""FEW, MANY or ANGLE_ERRORS, and an action or MEAN -> error (25,)."""
+
+Errors = Mapping[str, Parts]
+"""System -> its errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +103,7 @@ class Results:
         return figures
 
 
-def _nested(parts: Mapping[tuple[str, str], Array]) -> Json:
+def _nested(parts: Parts) -> Json:
     nested: dict[str, Any] = {}
     for (kind, action), error in parts.items():
         nested.setdefault(kind, {})[action] = by_frame(error)
@@ -115,7 +118,7 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
     # windows of the test files
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
-    measured: dict[str, Mapping[tuple[str, str], Array]] = {}
+    measured: dict[str, Parts] = {}
     with tqdm(systems.items(), unit=" systems", disable=None, leave=False) as bar:
         for name, system in bar:
             few = predictions(system, test, scaling, 8, corpus.layout)

@@ -22,7 +22,7 @@ from motet.bundle.fields import Json
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.evaluate.tables import Figures
-from motet_train.models.net import Graphs, Net, Part, configured, normalised
+from motet_train.models.net import Graphs, Net, configured, encoder_and_step, normalised
 from motet_train.papers.tdbn.rbm import (
     CRBM,
     RBM,
@@ -191,7 +191,7 @@ class ControlNet(Net):
         )
         step = GraphSpec(tuple(inputs), outputs, {"history": "next_history"})
         encoder = GraphSpec((_spec("frames", channels),), (_spec("codes", codes),))
-        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+        return encoder_and_step(self, encoder, step)
 
 
 def _spec(name: str, *sizes: int) -> TensorSpec:
