@@ -25,7 +25,7 @@ class Told:
 def test_parts_count_only_in_the_order_in_which_they_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     forward, still = [{"is": "goes", "way": "forward", "least": 0.5}], [{"is": "still"}]
     rows = [{"text": "walk, stand", "parts": [forward, still]}, {"text": "stand, walk", "parts": [still, forward]}]
-    monkeypatch.setattr(composed, "TABLE", {"composed": rows, "whole": ["walk, on", "stand"]})
+    monkeypatch.setattr(composed, "COMPOSED_TEXTS", {"composed": rows, "whole": ["walk, on", "stand"]})
     walked = walking(seconds=3)
     stood = standing(3) + (walked[-1] - standing(3)[0])[None]
     monkeypatch.setattr(composed, "track_of", lambda _: Track(np.concatenate([walked, stood])))
@@ -37,7 +37,7 @@ def test_parts_count_only_in_the_order_in_which_they_are_asked(monkeypatch: pyte
 
 
 def test_the_table_names_rules_that_exist() -> None:
-    table = composed.TABLE
+    table = composed.COMPOSED_TEXTS
     assert len(table["composed"]) == 20
     assert all(len(row["parts"]) > 1 for row in table["composed"])
     assert {rule["is"] for row in table["composed"] for part in row["parts"] for rule in part} <= set(RULE_BY_NAME)

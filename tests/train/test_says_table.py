@@ -25,7 +25,15 @@ from motet_train.data.store import INDEX, Entry, Store
 from motet_train.evaluate.figures import save
 from motet_train.evaluate.positions import jerk, length
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.prompts import OUTSIDE, PROMPTS, LookUp, Prompt, Trial, read_trials, trained_on
+from motet_train.evaluate.text_adherence.prompts import (
+    EVERYDAY_PROMPTS,
+    OUTSIDE,
+    LookUp,
+    Prompt,
+    Trial,
+    read_trials,
+    trained_on,
+)
 from motet_train.evaluate.text_adherence.table import (
     depth,
     poses,
@@ -78,13 +86,13 @@ class Half:
 
 
 def only(*texts: str) -> tuple[Prompt, ...]:
-    return tuple(prompt for prompt in PROMPTS if prompt.text in texts)
+    return tuple(prompt for prompt in EVERYDAY_PROMPTS if prompt.text in texts)
 
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Some prompts instead of all."""
-    monkeypatch.setattr(table, "PROMPTS", only(STILL, LYING, LEFT, ZOMBIE))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(STILL, LYING, LEFT, ZOMBIE))
 
 
 @pytest.mark.usefixtures("few")
@@ -119,7 +127,7 @@ def test_without_trials_there_are_no_other_columns() -> None:
 
 
 def test_the_text_has_a_column_for_each_generator(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "PROMPTS", only(STILL, LEFT))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(STILL, LEFT))
     report = says_table(Half().generate, TRIALS, seeds=2)
     lines = says_text({"runs/a": report, "runs/b": report}).splitlines()
     assert lines[0].split() == ["%", "a", "b", "lookup", "real", "others"]
@@ -227,7 +235,7 @@ def test_trials_of_a_folder(corpus: Path) -> None:
 
 def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = "a person runs straight forward"
-    monkeypatch.setattr(table, "PROMPTS", only(run))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(run))
     result = CliRunner().invoke(main, ["evaluate", "language-to-motion", "--says", "--data", str(corpus), "--json"])
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)
@@ -266,10 +274,10 @@ def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_p
     drawings = says_drawings(walks.generate)
     figure = drawings["says"]()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
-    done = [prompt.text for prompt in PROMPTS if prompt.passes(track_of(walks.walk))]
+    done = [prompt.text for prompt in EVERYDAY_PROMPTS if prompt.passes(track_of(walks.walk))]
     assert titles[0] == walks.asked[0] == "a person walks straight forward"
     assert set(titles) <= set(done)
-    eights = [PROMPTS[start : start + 8] for start in range(0, len(PROMPTS), 8)]
+    eights = [EVERYDAY_PROMPTS[start : start + 8] for start in range(0, len(EVERYDAY_PROMPTS), 8)]
     assert titles == [
         next(p.text for p in part if p.text in done) for part in eights if set(done) & {p.text for p in part}
     ]

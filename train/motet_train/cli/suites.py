@@ -39,7 +39,7 @@ from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
 from motet_train.evaluate.text_adherence.bare import bare_report
 from motet_train.evaluate.text_adherence.composed import composed_report
 from motet_train.evaluate.text_adherence.numbers import numbers_report
-from motet_train.evaluate.text_adherence.prompts import OUTSIDE, PROMPTS, Trial, read_trials, trained_on
+from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, OUTSIDE, Trial, read_trials, trained_on
 from motet_train.evaluate.text_adherence.table import best_of, said_to_be_outside, says_drawings, says_table, says_text
 from motet_train.papers.li2018.expmap import is_expmap
 from motet_train.papers.li2018.figures import drawings as protocol_drawings
@@ -236,7 +236,7 @@ def _says_report(model: GenerateModel, trials: Sequence[Trial], search: SearchMo
         report |= bare_report(model, seeds=range(3))
     report["said_outside"] = {
         "outside": said_to_be_outside(model, OUTSIDE),
-        "prompts": said_to_be_outside(model, [prompt.text for prompt in PROMPTS]),
+        "prompts": said_to_be_outside(model, [prompt.text for prompt in EVERYDAY_PROMPTS]),
     }
     return report
 

@@ -16,7 +16,7 @@ from motet_train.evaluate.tables import Figures, Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import track_of
 
-TABLE = read_toml(__file__, "bare.toml")
+BARE_COMMANDS = read_toml(__file__, "bare.toml")
 """ "bare": commands with the rules that a motion must keep; "odd": stems of words for other acts."""
 
 
@@ -28,7 +28,7 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
     """
     right: Figures = {}
     unwarned: Figures = {}
-    for row in TABLE["bare"]:
+    for row in BARE_COMMANDS["bare"]:
         outcomes = [_outcome(model, row, seed) for seed in seeds]
         right[row["text"]] = float(np.mean([does for does, _ in outcomes]))
         unwarned[row["text"]] = float(np.mean([not does and not warned for does, warned in outcomes]))
@@ -43,7 +43,7 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
 
 def _mean(shares: Mapping[str, float], kept: bool) -> float:
     """The mean over the half of the commands that is kept back, or over the other."""
-    return float(np.mean([shares[row["text"]] for row in TABLE["bare"] if row.get("kept", False) == kept]))
+    return float(np.mean([shares[row["text"]] for row in BARE_COMMANDS["bare"] if row.get("kept", False) == kept]))
 
 
 def _outcome(model: GenerateModel, row: Json, seed: int) -> tuple[bool, bool]:
@@ -61,4 +61,4 @@ def odd_words(generated: Generated, row: Json) -> set[str]:
         shown += [passage.action for passage in generated.passages]
     stems = set(map(stem, NEW_MODEL_RULES.words(" ".join(shown))))
     allowed = {*map(stem, NEW_MODEL_RULES.words(row["text"])), *row.get("also", ())}
-    return stems & set(TABLE["odd"]) - allowed
+    return stems & set(BARE_COMMANDS["odd"]) - allowed

@@ -13,7 +13,7 @@ from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
-TABLE = read_toml(__file__, "composed.toml")
+COMPOSED_TEXTS = read_toml(__file__, "composed.toml")
 """ "composed": texts with the rules of each of their parts; "whole": texts that have no parts."""
 
 
@@ -23,13 +23,13 @@ def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
     split = []
     all_parts: list[list[bool]] = []
     orders = {}
-    for row in TABLE["composed"]:
+    for row in COMPOSED_TEXTS["composed"]:
         split.append(len(model.parts(row["text"])) == len(row["parts"]))
         motions = [_shown(model, row, seed) for seed in seeds]
         orders[row["text"]] = float(np.mean([all(parts) for parts in motions]))
         all_parts += motions
     # texts that must not be split
-    whole = [len(model.parts(text)) == 1 for text in TABLE["whole"]]
+    whole = [len(model.parts(text)) == 1 for text in COMPOSED_TEXTS["whole"]]
     return {
         "composed": {
             "split": float(np.mean(split)),

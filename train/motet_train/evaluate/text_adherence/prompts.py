@@ -78,7 +78,7 @@ def holds(track: Track, rules: Sequence[Json]) -> bool:
 
 _TABLE = read_toml(__file__, "prompts.toml")
 
-PROMPTS = tuple(Prompt(**row) for row in _TABLE["prompt"])
+EVERYDAY_PROMPTS = tuple(Prompt(**row) for row in _TABLE["prompt"])
 """All prompts, in the order of the file."""
 
 OUTSIDE: Sequence[str] = _TABLE["outside"]

@@ -22,7 +22,7 @@ from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import BALLS, jerk, length, skate
 from motet_train.evaluate.tables import Figures, Report, aligned, read_goals, report_table, short_names
-from motet_train.evaluate.text_adherence.prompts import PROMPTS, SHORTEST_SHOWN, LookUp, Prompt, Trial, actions
+from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, SHORTEST_SHOWN, LookUp, Prompt, Trial, actions
 from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
 SAYS_GOALS = read_goals("says")
@@ -65,18 +65,18 @@ def says_table(
     # every source for every prompt, and what recorded trials show
     rows, vectors = _measured(sources, search)
     if train_trials:
-        rows["_real"] = {prompt.text: _real(prompt, trials) for prompt in PROMPTS}
-    known = list(_trials_shown(PROMPTS, train_trials))
+        rows["_real"] = {prompt.text: _real(prompt, trials) for prompt in EVERYDAY_PROMPTS}
+    known = list(_trials_shown(EVERYDAY_PROMPTS, train_trials))
     report: Report = {}
     for kind, figures in rows.items():
         report |= _groups(kind, figures, known)
 
     # what only trials and a space tell
     if train_trials:
-        report["prompt_others"] = {prompt.text: _passed_by_others(prompt, trials) for prompt in PROMPTS}
+        report["prompt_others"] = {prompt.text: _passed_by_others(prompt, trials) for prompt in EVERYDAY_PROMPTS}
         report["quality"] |= _ratios(rows[""], rows["_real"])
     if search is not None:
-        report |= space_report(search, PROMPTS, vectors, trials)
+        report |= space_report(search, EVERYDAY_PROMPTS, vectors, trials)
     return report
 
 
@@ -96,7 +96,7 @@ def _measured(
     vectors in the space of a search model."""
     rows: dict[str, dict[str, Figures]] = {kind: {} for kind in sources}
     vectors: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
-    for prompt in tqdm(PROMPTS, unit=" prompts", disable=None, leave=False):
+    for prompt in tqdm(EVERYDAY_PROMPTS, unit=" prompts", disable=None, leave=False):
         # prompt by prompt, so that motions need not be kept
         for kind, (source, count) in sources.items():
             motions = _motions(source, prompt, count)
@@ -189,7 +189,7 @@ def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
     """The means over groups of prompts, the mean quality, and the turns and shares of each prompt."""
     # the prompts of each group
     groups: dict[str, list[str]] = {"all": [], "locomotion": [], "rest": []}
-    for prompt in PROMPTS:
+    for prompt in EVERYDAY_PROMPTS:
         groups["all"].append(prompt.text)
         groups[prompt.group].append(prompt.text)
     if known:
@@ -197,7 +197,7 @@ def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
 
     # means over these, and figures of single prompts
     shares = {text: row["share"] for text, row in rows.items()}
-    turns = {prompt.text: rows[prompt.text]["turn"] for prompt in PROMPTS if prompt.turns}
+    turns = {prompt.text: rows[prompt.text]["turn"] for prompt in EVERYDAY_PROMPTS if prompt.turns}
     says = {}
     for name, texts in groups.items():
         says[name] = _mean([shares[text] for text in texts])
@@ -393,7 +393,7 @@ def says_text(reports: Mapping[str, Report]) -> str:
             columns[key] = first[f"prompt_{key}"]
 
     rows = [["%", *columns]]
-    for prompt in PROMPTS:
+    for prompt in EVERYDAY_PROMPTS:
         rows.append([prompt.text, *(_per_cent(shares[prompt.text]) for shares in columns.values())])
 
     # all other figures
@@ -416,8 +416,8 @@ def says_drawings(generator: Generator) -> Drawings:
 def _strips_of_passed(generator: Generator) -> Figure:
     motions: dict[str, Motion] = {}
     failed = 0
-    for start in range(0, len(PROMPTS), 8):
-        for prompt in PROMPTS[start : start + 8]:
+    for start in range(0, len(EVERYDAY_PROMPTS), 8):
+        for prompt in EVERYDAY_PROMPTS[start : start + 8]:
             motion = generator(prompt.text, 0)
             if prompt.passes(track_of(motion)):
                 motions[prompt.text] = motion

@@ -440,10 +440,14 @@ class CRBMLayer(Layer):
             self.ascents["free_past_weight"].outer(past, free - end_free, epoch)
         hidden = torch.cat([control, free], 1)
         end_hidden = torch.cat([end_control, end_free], 1)
+        self._climb(visible, hidden, end, end_hidden, epoch)
+        return visible - end
+
+    def _climb(self, visible: Tensor, hidden: Tensor, end: Tensor, end_hidden: Tensor, epoch: Epoch) -> None:
+        """Step the weights between the visible units and the second hidden layer, and the biases of both."""
         self.ascents["hidden_weight"].contrast((hidden, visible), (end_hidden, end), epoch)
         self.ascents["hidden_bias"].mean(hidden - end_hidden, epoch)
         self.ascents["visible_bias"].mean(visible - end, epoch)
-        return visible - end
 
     def _as_in_use(self, past: Tensor, control: Tensor, temperature: float) -> tuple[Tensor, Tensor]:
         """A past as it is when the net runs, noisy or made by the net, and the control of the frame after it."""
