@@ -19,6 +19,9 @@ from motet_train.data.errors import DataError
 
 TRUNK_PART = "trunk"
 
+Sequences = Mapping[str, Sequence[Array]]
+"""Label -> sequences (T, D) of frames."""
+
 
 @dataclass(frozen=True, eq=False)
 class Clips:

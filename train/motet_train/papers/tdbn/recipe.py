@@ -18,7 +18,7 @@ from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
 from motet_train import distributed
 from motet_train.data.errors import DataError
-from motet_train.papers.tdbn.clips import Clips, body_parts, is_periodic
+from motet_train.papers.tdbn.clips import Clips, Sequences, body_parts, is_periodic
 from motet_train.papers.tdbn.rbm import Layer, Stage
 from motet_train.papers.tdbn.report import missed_goals, study_of
 from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, ControlNet, Lessons, TDBNConfig
@@ -54,7 +54,7 @@ def train_control(clips: Clips, job: Job) -> Run:
     return train_lessons(net, job, manifest, _lessons(motions, config.onset), missed, results)
 
 
-def _check_lengths(motions: Mapping[str, Sequence[Array]], least: int) -> None:
+def _check_lengths(motions: Sequences, least: int) -> None:
     for label, group in motions.items():
         shortest = min(map(len, group))
         if shortest < least:
@@ -62,7 +62,7 @@ def _check_lengths(motions: Mapping[str, Sequence[Array]], least: int) -> None:
             raise DataError(f"{have}; it needs {least}")
 
 
-def _starts(motions: Mapping[str, Sequence[Array]], taps: int) -> dict[str, list[list[float]]]:
+def _starts(motions: Sequences, taps: int) -> Json:
     """The first frames of each label, from which sessions begin."""
     return {label: np.round(group[0][:taps], 6).tolist() for label, group in motions.items()}
 
@@ -74,7 +74,7 @@ def _contract(clips: Clips, fps: float, frames: Array) -> MotionContract:
     return MotionContract("angles", clips.channels, units, fps, frames.mean(axis=0), std, clips.skeleton)
 
 
-def _lessons(motions: Mapping[str, Sequence[Array]], onset: float) -> Lessons:
+def _lessons(motions: Sequences, onset: float) -> Lessons:
     """The sequences of each label under its control, with an onset for the motions that end."""
     controls = []
     onsets = []

@@ -4,7 +4,7 @@ Frames are compared in z units: each channel relative to its standard deviation 
 that are constant there. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -18,7 +18,7 @@ from motet.motion.rotations import Array, Indices, Mask
 from motet.papers.tdbn_control import TdbnModel, TdbnSession
 from motet.representation.contract import LIVING_STD
 from motet_train.evaluate.positions import arrival
-from motet_train.papers.tdbn.clips import period
+from motet_train.papers.tdbn.clips import Sequences, period
 
 Codes = NDArray[np.floating[Any]]
 
@@ -39,7 +39,7 @@ class Reference:
     motions: label -> sequences (T, D) at the model's frame rate. legs: indices of the leg channels.
     """
 
-    motions: Mapping[str, Sequence[Array]]
+    motions: Sequences
     legs: Indices
 
     @property
