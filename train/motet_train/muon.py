@@ -10,6 +10,9 @@ from torch import Tensor
 
 from motet.bundle.fields import Json
 
+Groups = list[dict[str, Any]]
+"""Parameter groups as in torch's optimisers: settings by name, and "params"."""
+
 NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)
 """Coefficients of Jordan's polynomial a x + b x^3 + c x^5; five iterations bring values from 0.001 to 1 close to 1."""
 
@@ -23,8 +26,8 @@ class Muon:
     """
 
     def __init__(self, groups: Iterable[Json], lr: float) -> None:
-        matrices: list[dict[str, Any]] = []
-        others: list[dict[str, Any]] = []
+        matrices: Groups = []
+        others: Groups = []
         for group in groups:
             part = matrices if "muon" in group else others
             part.append(dict(group))
@@ -35,7 +38,7 @@ class Muon:
             self.parts.append(torch.optim.AdamW(others, lr=lr, betas=(0.9, 0.98)))
 
     @property
-    def param_groups(self) -> list[dict[str, Any]]:
+    def param_groups(self) -> Groups:
         """The parameter groups of both, as in torch's optimisers."""
         return list(chain.from_iterable(part.param_groups for part in self.parts))
 
@@ -66,7 +69,7 @@ class Orthogonal(torch.optim.Optimizer):
     on those with it.
     """
 
-    def __init__(self, groups: list[dict[str, Any]], lr: float) -> None:
+    def __init__(self, groups: Groups, lr: float) -> None:
         super().__init__(groups, {"lr": lr, "weight_decay": 0.0})
 
     @torch.no_grad()
