@@ -14,9 +14,6 @@ from motet_train.data.errors import DataError
 FIRST = 50_000
 """Number of words of a file that may become common words; files begin with the most frequent."""
 
-NEIGHBOUR_COSINE = 0.55
-"""Least cosine of neighbours; four in ten common English words are as near to a word of our sentences."""
-
 
 @dataclass(frozen=True, eq=False)
 class WordTable:
@@ -40,7 +37,7 @@ def word_table(path: Path, words: Sequence[str], size: int) -> WordTable:
 
 def nearest(vectors: Mapping[str, Array], words: Sequence[str]) -> dict[str, str]:
     """The further words that have vectors, each with the nearest of ``words`` by cosine, if that is
-    :data:`NEIGHBOUR_COSINE`."""
+    0.55: four in ten common English words are as near to a word of our sentences."""
     known = [word for word in words if word in vectors and len(word) > 1]
     others = [word for word in vectors if word not in set(words)]
     if not others or not known:
@@ -52,7 +49,7 @@ def nearest(vectors: Mapping[str, Array], words: Sequence[str]) -> dict[str, str
     neighbours = {}
     for word, row in zip(others, cosines, strict=True):
         best = int(row.argmax())
-        if row[best] >= NEIGHBOUR_COSINE:
+        if row[best] >= 0.55:
             neighbours[word] = known[best]
     return neighbours
 
