@@ -17,7 +17,7 @@ from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import track_of
 
 BARE_COMMANDS = read_toml(__file__, "bare.toml")
-""" "bare": commands with the rules that a motion must keep; "odd": stems of words for other acts."""
+"""Commands with the rules that a motion must keep, "bare", and stems of words for other acts, "odd"."""
 
 
 def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:

@@ -14,7 +14,7 @@ from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
 COMPOSED_TEXTS = read_toml(__file__, "composed.toml")
-""" "composed": texts with the rules of each of their parts; "whole": texts that have no parts."""
+"""Texts with the rules of each of their parts, "composed", and texts that have no parts, "whole"."""
 
 
 def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
