@@ -99,14 +99,14 @@ CEILINGS = {
     "motet.serve": 16_800,
     "motet.steering": 57_400,
     "motet.text": 5_400,
-    "motet_export": 12_400,
-    "motet_train": 9_500,
-    "motet_train.cli": 8_600,
-    "motet_train.data": 18_900,
-    "motet_train.evaluate": 54_000,
+    "motet_export": 11_600,
+    "motet_train": 9_300,
+    "motet_train.cli": 8_500,
+    "motet_train.data": 18_700,
+    "motet_train.evaluate": 53_300,
     "motet_train.models": 22_900,
-    "motet_train.papers": 41_600,
-    "motet_train.recipes": 16_300,
+    "motet_train.papers": 41_200,
+    "motet_train.recipes": 16_000,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

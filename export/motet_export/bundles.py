@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from motet.bundle.bundle import Bundle, write_bundle
+from motet.bundle.fields import Json
 from motet.bundle.graph import GraphSpec, OnnxGraph, SessionOptions
 from motet.bundle.manifest import Manifest
 from motet.bundle.members import array_bytes
@@ -32,7 +33,7 @@ from motet_train.runs import Run
 log = logging.getLogger("motet.export")
 
 
-def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False) -> dict[str, Any]:
+def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False) -> Json:
     """Export a training run as the bundle ``out`` (a .zip or a new folder) and return the parity report.
 
     Nothing is written if a graph does not export or a rung of the parity ladder fails (ExportError). int8: then store
@@ -89,7 +90,7 @@ def label(manifest: Manifest, role: str, spec: GraphSpec) -> dict[str, str]:
     }
 
 
-def halve_bundle(bundle: Bundle, out: str | Path) -> dict[str, Any]:
+def halve_bundle(bundle: Bundle, out: str | Path) -> Json:
     """Write a copy of a bundle with weights rounded to 16 bits, and return the differences of whole runs.
 
     For bundles whose run is gone. The golden vectors are those of the new graphs; nothing else changes. "half" in the
@@ -130,7 +131,7 @@ def _write(
     out: str | Path,
     model: BundleModel,
     graphs: Mapping[str, bytes],
-    about: Mapping[str, Any],
+    about: Json,
     draws: Mapping[str, Examples],
 ) -> None:
     """Write the bundle of a model, with golden vectors and tables."""
@@ -160,7 +161,7 @@ def _graph_files(model: BundleModel, graphs: Mapping[str, bytes]) -> tuple[dict[
     return files, entries
 
 
-def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> dict[str, Any]:
+def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -> Json:
     """The parity report of an existing bundle against its run; ExportError at the first rung that fails.
 
     options: of the ONNX Runtime sessions.

@@ -2,11 +2,11 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import click
 
 from motet.bundle.bundle import Bundle
+from motet.bundle.fields import Json
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import session_options
 from motet.files import new_folder
@@ -71,7 +71,7 @@ def _runs(folder: Path, out: Path) -> dict[Path, Run]:
     return runs
 
 
-def _show(weights: str, changes: dict[str, float]) -> None:
+def _show(weights: str, changes: Json) -> None:
     for name, value in changes.items():
         click.echo(f"{weights} {name:<20} {value:.3g}")
 
@@ -87,7 +87,7 @@ def parity(run: Path, bundle: str, session: SessionOptions, as_json: bool) -> No
     click.echo(json.dumps(report) if as_json else _lines(report))
 
 
-def _lines(report: dict[str, Any]) -> str:
+def _lines(report: Json) -> str:
     lines = []
     for name, rung in report.items():
         if isinstance(rung, dict) and "bound" in rung:

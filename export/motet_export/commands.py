@@ -3,12 +3,12 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.bundle import Bundle
+from motet.bundle.fields import Json
 from motet.bundle.graph import Arrays
 from motet.bundle.manifest import Manifest
 from motet.errors import BundleError
@@ -37,7 +37,7 @@ def with_commands(bundle: Bundle, table: Path) -> CodesModel:
         raise ExportError(f"{table} does not fit bundle {bundle.path}: {error!r}") from error
 
 
-def _built(model: CodesModel, entries: Sequence[Mapping[str, Any]]) -> CodesModel:
+def _built(model: CodesModel, entries: Sequence[Json]) -> CodesModel:
     # the memory without the commands that it has
     memory = model.tables["memory"]
     known = len(model.manifest.source["actions"])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.fields import Json
 from motet.bundle.golden import TOLERANCE, difference, vectors
 from motet.bundle.graph import Arrays
 from motet.decode.beam import noise_of
@@ -32,12 +33,6 @@ from motet_export.parity import FRAME_INPUTS, Examples, nudged, sides, walks
 Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], Decoded]]
 """Name of a run -> decodes it with a model."""
-
-GOLDEN_ROWS = 4
-"""Rows for a graph that takes frames: zeros, ones, negatives and one as it is drawn."""
-
-FEW_ROWS = 2
-"""Rows for another graph."""
 
 Golden = tuple[Arrays, dict[str, Any]]
 """The inputs of a whole run and its settings."""
@@ -81,10 +76,10 @@ def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[b
     """The file of golden vectors of a bundle, and its entry in the manifest."""
     rng = np.random.default_rng(5)
     feeds = {}
-    # inputs of single calls, and of a whole run
+    # inputs of single calls, of frames zeros, ones, negatives and one as it is drawn; and of a whole run
     for role, graph in model.graphs.items():
         framed = any(graph.spec.takes(name) for name in FRAME_INPUTS)
-        feeds[role] = draws[role](rng, GOLDEN_ROWS if framed else FEW_ROWS)
+        feeds[role] = draws[role](rng, 4 if framed else 2)
     inputs, settings = golden_run(model, rng)
     frames = walks(model.contract, rng, 1, 12)[0].astype(np.float64)
     tolerance = float(f"{_tolerance(model, feeds, inputs, settings):.1g}")
@@ -92,7 +87,7 @@ def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[b
     return vectors(model, feeds, inputs, settings, frames), entry
 
 
-def _tolerance(model: BundleModel, feeds: Mapping[str, Arrays], inputs: Arrays, settings: Mapping[str, Any]) -> float:
+def _tolerance(model: BundleModel, feeds: Mapping[str, Arrays], inputs: Arrays, settings: Json) -> float:
     """Ten times the effect of the inputs' last bits on the outputs, between TOLERANCE and ten times that."""
     rng = np.random.default_rng(6)
     largest = 0.0

@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motet.bundle.fields import Json
 from motet.bundle.golden import difference
-from motet.bundle.graph import Arrays, Graph, GraphSpec
+from motet.bundle.graph import Arrays, Floats, Graph, GraphSpec
 from motet.bundle.manifest import Manifest
 from motet.decode.loop import advance
 from motet.errors import BundleError
@@ -38,11 +39,8 @@ CARRIED_TOLERANCE = 1e-4
 CARRIED_STEPS = 200
 """Steps whose state is carried."""
 
-FAR_SHARE = 0.01
-"""Of the numbers in frames that are drawn: those that are far from all data."""
-
 FAR_DEVIATIONS = (10.0, 1000.0)
-"""Standard deviations from the mean, between which these lie: nets clip at 50."""
+"""Standard deviations from the mean, between which numbers far from all data lie: nets clip at 50."""
 
 FRAME_INPUTS = ("frames", "frame", "history")
 """Inputs that are frames, or codes of frames: they are drawn like the training data's."""
@@ -81,7 +79,7 @@ def check_meaning(onnx: BundleModel, torch: BundleModel) -> None:
             raise ExportError(f"parity: the bundle's settings.{kind.FEATURE} is not the run's")
 
 
-def _difference(part: str, declared: Mapping[str, Any], trained: Mapping[str, Any]) -> str:
+def _difference(part: str, declared: Json, trained: Json) -> str:
     """The name of a part of two manifests, with the first key whose values differ where it is an object."""
     in_bundle = declared.get(part)
     in_run = trained.get(part)
@@ -91,7 +89,7 @@ def _difference(part: str, declared: Mapping[str, Any], trained: Mapping[str, An
     return next(f"{part}.{key}" for key in keys if in_bundle.get(key) != in_run.get(key))
 
 
-def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> dict[str, Any]:
+def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None = None) -> Json:
     """Rung 1: equal contracts, and one call at batch sizes 1, 1,000 and three random ones, of inputs drawn."""
     if onnx.spec != torch.spec:
         raise ExportError(f"{name}: the contracts differ: {onnx.spec} and {torch.spec}")
@@ -105,7 +103,7 @@ def check_one_step(name: str, onnx: Graph, torch: Graph, draw: Examples | None =
     return _bounded(f"{name}.one_step", max(errors), 1e-5, batches=batches)
 
 
-def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str, Any]:
+def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> Json:
     """Rung 2: calls with inputs that are far from all data. "rounding" is how far torch comes from itself when their
     last bits change, and zeros by a millionth; a graph that amplifies this, as divisions by small numbers and the
     logarithm of a still figure's movement do, is held to ten times its own."""
@@ -124,7 +122,7 @@ def check_far(name: str, onnx: Graph, torch: Graph, draw: Examples) -> dict[str,
 
 def check_carried(
     onnx: Graph, torch: Graph, draw: Examples | None = None, horizon: int | None = None, batch: int = 16
-) -> dict[str, Any]:
+) -> Json:
     """Rung 3: 200 steps, the state carried by each on its own, under the same inputs.
 
     draw: gives the first state, and the other inputs anew for every step. horizon: after so many steps all begins
@@ -139,7 +137,7 @@ def check_carried(
         if n % (horizon or 1) == 0:
             inputs = draw(rng, batch)
         if n % (horizon or CARRIED_STEPS) == 0:
-            states = [_states(inputs, torch.spec)] * 3
+            states = [{name: inputs[name] for name in torch.spec.feedback}] * 3
 
         # three runs: ONNX Runtime's, torch's, and torch's with other last bits
         others = {name: value for name, value in inputs.items() if name not in torch.spec.feedback}
@@ -157,11 +155,6 @@ def check_carried(
     )
 
 
-def _states(inputs: Arrays, spec: GraphSpec) -> dict[str, NDArray[Any]]:
-    """The inputs of a graph that are fed back."""
-    return {name: inputs[name] for name in spec.feedback}
-
-
 def nudged(state: Arrays, rng: np.random.Generator, of_zero: float = 0.0) -> dict[str, NDArray[Any]]:
     """A state whose numbers have moved to one of their two neighbours in float32, and zeros by ``of_zero``."""
     ends = np.array([-np.inf, np.inf], dtype=np.float32)
@@ -174,13 +167,13 @@ def nudged(state: Arrays, rng: np.random.Generator, of_zero: float = 0.0) -> dic
     return moved
 
 
-def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> dict[str, Any]:
+def check_runs(runs: Mapping[str, Callable[[], tuple[Arrays, Arrays]]]) -> Json:
     """Rung 4: whole decoded runs with the same seeds; each callable gives what ONNX and what torch decoded."""
     errors = {name: error(*run()) for name, run in runs.items()}
     return _bounded("runs", max(errors.values()), CARRIED_TOLERANCE, **errors)
 
 
-def _bounded(name: str, largest: float, bound: float, **details: Any) -> dict[str, Any]:
+def _bounded(name: str, largest: float, bound: float, **details: Any) -> Json:
     if not largest <= bound:
         raise ExportError(f"parity {name}: the error is {largest:.2e}, the bound {bound:.0e} ({details})")
     return {"error": largest, "bound": bound, **details}
@@ -281,18 +274,18 @@ def _below(manifest: Manifest) -> dict[str, int]:
     return below
 
 
-def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> NDArray[np.float32]:
+def walks(contract: MotionContract, rng: np.random.Generator, rows: int, frames: int) -> Floats:
     """Random walks (rows, frames, C) float32 from near the mean of the training data, in the contract's units."""
     steps = 0.1 * rng.normal(size=(rows, frames, len(contract.mean)))
     walk: Array = contract.mean + contract.std * steps.cumsum(axis=1)
     return walk.astype(np.float32)
 
 
-def strained(frames: NDArray[np.float32], contract: MotionContract, rng: np.random.Generator) -> NDArray[np.float32]:
+def strained(frames: Floats, contract: MotionContract, rng: np.random.Generator) -> Floats:
     """Frames (..., C) of which single numbers, but one at least, are at ``FAR_DEVIATIONS`` standard deviations from the
     mean."""
-    # which numbers, at least one of them
-    far = rng.random(frames.shape) < FAR_SHARE
+    # which numbers: one in a hundred, at least one of them
+    far = rng.random(frames.shape) < 0.01
     far.flat[rng.integers(far.size)] = True
 
     # to either side, and as often near as very far
@@ -313,9 +306,7 @@ def extremes(values: NDArray[Any]) -> NDArray[Any]:
     return rows
 
 
-def sides(
-    contract: MotionContract, rng: np.random.Generator, frames: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def sides(contract: MotionContract, rng: np.random.Generator, frames: int) -> tuple[Floats, Floats]:
     """Placed frames (frames, E) before a gap, and as many after it: both ends of a random walk in ``root_sixd``."""
     walk = walks(contract, rng, 1, 2 * frames)[0].astype(np.float64)
     past, after = np.split(placed_by_way(walk, contract.fps).astype(np.float32), 2)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 from click.testing import CliRunner
 from language_data import walker
+from stores import prepare
 
 from motet.cli import main
 from motet_train.data.corpus import Record
 from motet_train.data.preparation import Preparation
-from motet_train.data.store import Store, prepare
+from motet_train.data.store import Store
 from motet_train.runs import Run
 
 ACTIONS = {

@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from stores import prepare
 
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
 from motet_train.data.corpus import Record
 from motet_train.data.preparation import Preparation
-from motet_train.data.store import Store, prepare
+from motet_train.data.store import Store
 
 SKELETON = Skeleton(
     (

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kit_zip import JOINTS, mmm_xml, write_kit_zip
+from stores import prepare
 
 from motet.figures.feet.treadmill import with_travel
 from motet.formats import read_motion, write_motion
@@ -22,7 +23,6 @@ from motet_train.data.corpus import Record, Skipped, read_corpus, recordings
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import SIXD
 from motet_train.data.recorded import gaits_of
-from motet_train.data.store import prepare
 from motet_train.data.table import Person, person, read_gaits, read_people, read_table
 
 

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from codes_data import PREPARATION, trained
 from codes_data import small_store as own_figures
 from language_data import small_store as angles_store
+from stores import prepare
 
 from motet.bundle.manifest import Manifest
 from motet.cli import main
@@ -25,7 +26,7 @@ from motet_train.data.batches import frame_mirror
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import GapWindow, GapWindows, gap_window
-from motet_train.data.store import Store, prepare, split
+from motet_train.data.store import Store, split
 from motet_train.evaluate.fill import FILL_GOALS, fill_report
 from motet_train.evaluate.tables import reached
 from motet_train.models.filler import Filler, FillerConfig

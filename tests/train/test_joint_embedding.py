@@ -9,6 +9,7 @@ import pytest
 import torch
 from click.testing import CliRunner
 from language_data import records
+from stores import prepare
 from torch import Tensor
 
 from motet.cli import main
@@ -19,7 +20,7 @@ from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet_train.data.batches import Pairs, views
 from motet_train.data.preparation import Preparation
 from motet_train.data.sentences import alike
-from motet_train.data.store import Store, prepare
+from motet_train.data.store import Store
 from motet_train.models.joint_embedding import (
     DEVIATION_FLOOR,
     JointEmbedding,

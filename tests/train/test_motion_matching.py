@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from stores import prepare
 
 import motet
 from motet import to_humanoid
@@ -29,7 +30,6 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.preparation import SIXD
 from motet_train.data.recorded import gaits_of, recordings
-from motet_train.data.store import prepare
 from motet_train.data.table import Gait, read_gaits
 from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import Matching, MatchingConfig

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from scipy.spatial.transform import Rotation
+from stores import prepare
 
 from motet.errors import FormatError
 from motet.figures.humanoid.bones import HUMANOID
@@ -27,7 +28,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
-from motet_train.data.store import Store, prepare, split
+from motet_train.data.store import Store, split
 from motet_train.models.kinematics import VectorPlaces, vector_figure_of
 from motet_train.papers.li2018.expmap import (
     CMU_LAYOUT,

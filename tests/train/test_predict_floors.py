@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from stores import prepare
 from test_predict_data import write_files
 
 from motet.figures.humanoid.bones import HUMANOID
@@ -15,7 +16,6 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import VECTORS
-from motet_train.data.store import prepare
 from motet_train.evaluate.predict import floors as predict_floors
 from motet_train.evaluate.predict.floors import (
     CONSTANT,

@@ -13,7 +13,7 @@ from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import read_motion
 from motet.motion.mirroring import mirror
 from motet_train.data.errors import DataError
-from motet_train.evaluate.text_adherence.prompts import RULE_BY_NAME, actions, holds, prompts
+from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, RULE_BY_NAME, actions, holds
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, longest, spells, swings, track_of
 
 WAVE = np.sin(2 * np.pi * times(2.0))
@@ -157,7 +157,7 @@ def test_rules_tell_figures_apart(rule: str, given: dict[str, Any], yes: np.ndar
 
 def test_every_rule_is_told_apart_and_asked_for() -> None:
     assert {case[0] for case in CASES} == set(RULE_BY_NAME)
-    asked = [rule for prompt in prompts() for rule in prompt.rules]
+    asked = [rule for prompt in EVERYDAY_PROMPTS for rule in prompt.rules]
     assert {rule["is"] for rule in asked} == set(RULE_BY_NAME)
     for rule in asked:
         inspect.signature(RULE_BY_NAME[rule["is"]]).bind(
@@ -237,7 +237,7 @@ def recorded() -> dict[str, Track]:
 
 
 def passed(track: Track) -> set[str]:
-    return {prompt.text for prompt in prompts() if prompt.passes(track)}
+    return {prompt.text for prompt in EVERYDAY_PROMPTS if prompt.passes(track)}
 
 
 def test_recorded_trials_do_what_they_show(recorded: dict[str, Track]) -> None:
@@ -267,7 +267,7 @@ def test_a_motion_is_seen_the_same_at_any_frame_rate() -> None:
 
 
 def test_the_table_of_prompts() -> None:
-    found = prompts()
+    found = EVERYDAY_PROMPTS
     assert len(found) >= 60
     assert len({prompt.text for prompt in found}) == len(found)
     assert {prompt.group for prompt in found} == {"locomotion", "rest"}
@@ -291,5 +291,5 @@ def test_the_table_of_results_has_every_prompt_with_its_rules() -> None:
     for line in table.splitlines()[1:]:
         cells = line.split("\t")
         rules[cells[1]] = cells[2]
-    for prompt in prompts():
+    for prompt in EVERYDAY_PROMPTS:
         assert [rule.split()[0] for rule in rules[prompt.text].split(";")] == [rule["is"] for rule in prompt.rules]

@@ -14,7 +14,7 @@ from motet.formats import read_motion
 from motet.motion.motion import Motion
 from motet.search.model import IndexSettings
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.prompts import Trial, prompts
+from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, Trial
 from motet_train.evaluate.text_adherence.table import (
     CHOICES,
     embedded,
@@ -77,7 +77,7 @@ def test_r_precision_of_who_knows_nothing_and_of_few_rivals() -> None:
 
 
 def test_rivals_ask_for_something_else() -> None:
-    asked = prompts()
+    asked = EVERYDAY_PROMPTS
     texts = [prompt.text for prompt in asked]
     found = {texts[own]: {texts[i] for i in others} for own, others in enumerate(rivals(asked))}
     assert "a fighter does a high kick" not in found["a person kicks with the left leg"]
@@ -129,7 +129,7 @@ def test_who_does_what_is_asked_is_found_and_near(monkeypatch: pytest.MonkeyPatc
     assert wrong["r_precision"]["1"] == pytest.approx(1 / 3)
     assert set(space_report(model, asked, {"": made}, ())) == {"r_precision"}  # type: ignore[arg-type]
 
-    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LYING, LEFT, ZOMBIE))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(STILL, LYING, LEFT, ZOMBIE))
     report = says_table(Half().generate, TRIALS, seeds=2, search=model)  # type: ignore[arg-type]
     assert report["r_precision"]["1"] == 0.25  # never lies, refuses the zombie, and turning is seen as standing
     assert report["r_precision_lookup"]["1"] == 0.5

@@ -1,6 +1,7 @@
-"""The table of "does what it says" on made-up trials and generators, its measures, and the command."""
+"""The table of does what it says on made-up trials and generators, its measures, and the command."""
 
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,20 +10,45 @@ import pytest
 from click.testing import CliRunner
 from says_figures import HIPS, led, shifted, standing, stepping, times, walking
 
+import motet
+import motet.keyed
 from motet.cli import main
-from motet.errors import TextError
+from motet.errors import TextError, TextWarning
 from motet.figures.humanoid.bones import HUMANOID
+from motet.figures.humanoid.retarget import on_humanoid
+from motet.generate.model import CodesModel
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, Entry, Store
+from motet_train.evaluate.figures import save
 from motet_train.evaluate.positions import jerk, length
 from motet_train.evaluate.text_adherence import table
-from motet_train.evaluate.text_adherence.prompts import LookUp, Prompt, Trial, prompts, read_trials, trained_on
-from motet_train.evaluate.text_adherence.table import depth, poses, says_table, says_text, slide, spread
-from motet_train.evaluate.text_adherence.track import RATE, Track
+from motet_train.evaluate.text_adherence.prompts import (
+    EVERYDAY_PROMPTS,
+    OUTSIDE,
+    LookUp,
+    Prompt,
+    Trial,
+    read_trials,
+    trained_on,
+)
+from motet_train.evaluate.text_adherence.table import (
+    depth,
+    poses,
+    said_to_be_outside,
+    says_drawings,
+    says_table,
+    says_text,
+    slide,
+    spread,
+)
+from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
 CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
+
+
 STILL, LYING, LEFT, ZOMBIE = (
     "a person just stands there",
     "a man is lying on the floor",
@@ -60,13 +86,13 @@ class Half:
 
 
 def only(*texts: str) -> tuple[Prompt, ...]:
-    return tuple(prompt for prompt in prompts() if prompt.text in texts)
+    return tuple(prompt for prompt in EVERYDAY_PROMPTS if prompt.text in texts)
 
 
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Some prompts instead of all."""
-    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LYING, LEFT, ZOMBIE))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(STILL, LYING, LEFT, ZOMBIE))
 
 
 @pytest.mark.usefixtures("few")
@@ -101,7 +127,7 @@ def test_without_trials_there_are_no_other_columns() -> None:
 
 
 def test_the_text_has_a_column_for_each_generator(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(table, "prompts", lambda: only(STILL, LEFT))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(STILL, LEFT))
     report = says_table(Half().generate, TRIALS, seeds=2)
     lines = says_text({"runs/a": report, "runs/b": report}).splitlines()
     assert lines[0].split() == ["%", "a", "b", "lookup", "real", "others"]
@@ -209,7 +235,7 @@ def test_trials_of_a_folder(corpus: Path) -> None:
 
 def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = "a person runs straight forward"
-    monkeypatch.setattr(table, "prompts", lambda: only(run))
+    monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(run))
     result = CliRunner().invoke(main, ["evaluate", "language-to-motion", "--says", "--data", str(corpus), "--json"])
     assert result.exit_code == 0, result.output
     report = json.loads(result.stdout)
@@ -230,3 +256,55 @@ def test_the_command_says_what_does_not_go_together(tmp_path: Path) -> None:
         result = CliRunner().invoke(main, ["evaluate", "--says", *arguments])
         assert result.exit_code != 0
         assert said in str(result.output) + str(result.exception)
+
+
+class Walks:
+    """Whatever is asked, it walks; and remembers what it was asked."""
+
+    def __init__(self, walk: Motion) -> None:
+        self.walk, self.asked = on_humanoid(walk), list[str]()
+
+    def generate(self, text: str, seed: int) -> Motion:
+        self.asked.append(text)
+        return self.walk
+
+
+def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_path: Path) -> None:
+    walks = Walks(motet.read(CMU_FOLDER / "39_14.amc"))
+    drawings = says_drawings(walks.generate)
+    figure = drawings["says"]()
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    done = [prompt.text for prompt in EVERYDAY_PROMPTS if prompt.passes(track_of(walks.walk))]
+    assert titles[0] == walks.asked[0] == "a person walks straight forward"
+    assert set(titles) <= set(done)
+    eights = [EVERYDAY_PROMPTS[start : start + 8] for start in range(0, len(EVERYDAY_PROMPTS), 8)]
+    assert titles == [
+        next(p.text for p in part if p.text in done) for part in eights if set(done) & {p.text for p in part}
+    ]
+    assert figure.get_suptitle().startswith(
+        f"every eighth prompt; {len(walks.asked) - len(titles)} whose motions did not"
+    )
+    (picture,) = save(drawings, tmp_path)
+    assert picture.name == "says.png"
+
+
+def test_what_no_recording_shows_is_said_to_be_outside() -> None:
+    model = motet.load("generate")
+    assert isinstance(model, CodesModel)
+    keyed = {act.says[0] for act in motet.keyed.ours().values()}
+    others = []
+    for sentence in OUTSIDE:
+        if not any(model.likeliest(part).action in keyed for part in model.parts(sentence)):
+            others.append(sentence)
+    assert len(others) == 24
+    assert said_to_be_outside(model, others) >= 0.8
+    silent = set()
+    for sentence in others:
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", TextWarning)
+            model.generate(sentence, max_seconds=0.2)
+        silent |= set() if told else {sentence}
+    # what hand-keyed clips show
+    assert silent == {"someone drives a car", "a man does push ups", "a woman does yoga in the lotus position"}
+    assert said_to_be_outside(model, ["a person walks forward", "a man is running", "someone kicks"]) == 0
+    assert said_to_be_outside(model, ["xyzzy", ""]) == 1

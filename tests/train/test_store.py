@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 from kit_zip import JOINTS, write_kit_zip
 from language_data import walker
+from stores import prepare
 
 from motet.cli import main
 from motet.errors import OutputError
@@ -24,7 +25,7 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record, Skipped, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import ANGLES, FULL, SIXD, VECTORS, Preparation, preparation
-from motet_train.data.store import Entry, Store, prepare, split
+from motet_train.data.store import Entry, Store, prepare_parts, split
 
 PLAIN = Preparation("root_angles", humanoid=False, trim=False, cut=False)
 
@@ -124,7 +125,8 @@ def test_what_does_not_fit_is_skipped_with_its_reason(tmp_path: Path) -> None:
     }
     records = [replace(run, name=name, motion=motion) for name, (motion, _) in others.items()]
     seen: list[object] = []
-    found = prepare([run, Skipped("gone", "it is gone"), *records], tmp_path / "store", PLAIN, seen.append)
+    prepare_parts([run, Skipped("gone", "it is gone"), *records], tmp_path / "store", {".": PLAIN}, seen.append)
+    found = Store.open(tmp_path / "store")
     assert [entry.name for entry in found.records] == ["09_07"]
     assert len(found.frames) == 138
     reasons = {item.name: item.reason for item in found.skipped}

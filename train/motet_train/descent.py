@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
+from motet.bundle.fields import Json
 from motet_train import distributed
 from motet_train.models.net import Net
 from motet_train.muon import Muon
@@ -230,7 +231,7 @@ class GradientLearner(Generic[Trained]):
     training: Training
     loss: Callable[[Any], Terms]
     batches: Callable[[np.random.Generator], Iterable[Batch]]
-    validate: Callable[[], Mapping[str, Any]] = dict
+    validate: Callable[[], Json] = dict
     on_share: Callable[[float], object] = lambda share: None
     others: Mapping[str, Part] = field(default_factory=dict)
 

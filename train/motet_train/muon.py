@@ -1,12 +1,17 @@
 """The optimiser Muon (Jordan et al. 2024) in float32, and its combination with AdamW."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import chain
 from typing import Any
 
 import torch
 from torch import Tensor
+
+from motet.bundle.fields import Json
+
+Groups = list[dict[str, Any]]
+"""Parameter groups as in torch's optimisers: settings by name, and "params"."""
 
 NEWTON_SCHULZ = (3.4445, -4.7750, 2.0315)
 """Coefficients of Jordan's polynomial a x + b x^3 + c x^5; five iterations bring values from 0.001 to 1 close to 1."""
@@ -20,9 +25,9 @@ class Muon:
     Muon's steps are orthogonal matrices: every direction of a matrix, also a rare one, is learned at the same rate.
     """
 
-    def __init__(self, groups: Iterable[Mapping[str, Any]], lr: float) -> None:
-        matrices: list[dict[str, Any]] = []
-        others: list[dict[str, Any]] = []
+    def __init__(self, groups: Iterable[Json], lr: float) -> None:
+        matrices: Groups = []
+        others: Groups = []
         for group in groups:
             part = matrices if "muon" in group else others
             part.append(dict(group))
@@ -33,7 +38,7 @@ class Muon:
             self.parts.append(torch.optim.AdamW(others, lr=lr, betas=(0.9, 0.98)))
 
     @property
-    def param_groups(self) -> list[dict[str, Any]]:
+    def param_groups(self) -> Groups:
         """The parameter groups of both, as in torch's optimisers."""
         return list(chain.from_iterable(part.param_groups for part in self.parts))
 
@@ -47,11 +52,11 @@ class Muon:
         for part in self.parts:
             part.zero_grad(set_to_none=set_to_none)
 
-    def state_dict(self) -> dict[str, Any]:
+    def state_dict(self) -> Json:
         """The states of both."""
         return {"parts": [part.state_dict() for part in self.parts]}
 
-    def load_state_dict(self, state_dict: Mapping[str, Any], /) -> None:
+    def load_state_dict(self, state_dict: Json, /) -> None:
         """Restore a state from :meth:`state_dict`."""
         for part, state in zip(self.parts, state_dict["parts"], strict=True):
             part.load_state_dict(state)
@@ -64,7 +69,7 @@ class Orthogonal(torch.optim.Optimizer):
     on those with it.
     """
 
-    def __init__(self, groups: list[dict[str, Any]], lr: float) -> None:
+    def __init__(self, groups: Groups, lr: float) -> None:
         super().__init__(groups, {"lr": lr, "weight_decay": 0.0})
 
     @torch.no_grad()

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from motet.bundle.fields import Json
 from motet.errors import MotetError
 from motet_train.data.corpus import Corpus
 from motet_train.data.predict_data import store_material
@@ -86,7 +87,7 @@ class Plan:
     by: str = "trial"
     device: str = "cpu"
     vectors: WordVectors | None = None
-    changes: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
+    changes: Mapping[str, Mapping[str, Json]] = field(default_factory=dict)
     about: About = field(default_factory=lambda: About("", "motet_train.plan"))
 
     def train(self) -> None:

@@ -4,13 +4,14 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
+from motet.bundle.fields import Json
 from motet_train import distributed
 from motet_train.data.corpus import Record, Skipped
 from motet_train.runs import RunError
@@ -27,7 +28,7 @@ class Watcher:
     def step(self, done: int, total: int, unit: str, loss: float) -> None:
         """After each step."""
 
-    def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
+    def chunk(self, line: Json, total: int, unit: str) -> None:
         """After each chunk, with its line of the log."""
 
 
@@ -67,7 +68,7 @@ class Shown(Watcher):
         self.bar.set_postfix(loss=f"{loss:.4g}", refresh=False)
         self.bar.update(done - (unit == "epoch") - self.bar.n)  # an epoch is done after its last step
 
-    def chunk(self, line: Mapping[str, Any], total: int, unit: str) -> None:
+    def chunk(self, line: Json, total: int, unit: str) -> None:
         """Log the line of a chunk, or move the bar, and add its numbers to TensorBoard."""
         figures = {key: value for key, value in line.items() if isinstance(value, int | float) and key != unit}
         done = line[unit]

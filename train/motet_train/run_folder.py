@@ -2,14 +2,14 @@
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import torch
 
+from motet.bundle.fields import Json
 from motet.errors import OutputError
 from motet_train import distributed
 from motet_train.progress import Shown, log
@@ -19,9 +19,7 @@ from motet_train.settings import to_toml
 from motet_train.trainer import CHECKPOINT, LOG
 
 
-def trained(
-    job: Job, train: Callable[[Job], Run], options: Mapping[str, Any], resume: bool = False, boards: bool = False
-) -> Run:
+def trained(job: Job, train: Callable[[Job], Run], options: Json, resume: bool = False, boards: bool = False) -> Run:
     """Train in the job's folder, with all processes, and leave the run there.
 
     train: called with the job, whose precision is adapted to the device and whose progress is shown. options: those

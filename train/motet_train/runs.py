@@ -14,6 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from motet.bundle.fields import Json
 from motet.bundle.graph import Arrays, Graph, GraphSpec
 from motet.bundle.manifest import Manifest
 from motet.errors import MotetError
@@ -39,7 +40,7 @@ from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM
 RUN_MANIFEST = "run.json"
 WEIGHTS = "weights.pt"
 
-MODELS: Mapping[str, Callable[[Mapping[str, Any]], Net]] = {
+MODELS: Mapping[str, Callable[[Json], Net]] = {
     "tdbn": TDBN.from_config,
     "motion-to-language": MotionToLanguage.from_config,
     "language-to-motion": LanguageToMotion.from_config,
@@ -108,7 +109,7 @@ class TorchGraph:
 class Run:
     """A trained model and its manifest: see :meth:`motet_train.recipes.recipe.Job.manifest`."""
 
-    manifest: Mapping[str, Any]
+    manifest: Json
     model: Net
 
     def torch_graphs(self) -> dict[str, Graph]:
@@ -176,7 +177,7 @@ def read_state(path: Path) -> Any:
         raise RunError(f"{path} cannot be read: {str(error).partition(chr(10))[0] or 'it is cut off'}") from error
 
 
-def surroundings(device: str) -> dict[str, Any]:
+def surroundings(device: str) -> Json:
     """The machine and software of a training, for its manifest."""
     kind = device.partition(":")[0].upper()
     about: dict[str, Any] = {"threads": torch.get_num_threads()}
@@ -187,7 +188,7 @@ def surroundings(device: str) -> dict[str, Any]:
     return about
 
 
-def refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
+def refuse_other(path: Path, manifest: Json) -> None:
     """RunError if the run.json at ``path`` is of a run that was started with other data or settings."""
     if not path.exists():
         return
@@ -200,7 +201,7 @@ def refuse_other(path: Path, manifest: Mapping[str, Any]) -> None:
         raise RunError(f"{path.parent} was started with other settings, so cannot be resumed: {', '.join(different)}")
 
 
-def _essence(manifest: Mapping[str, Any]) -> dict[str, Any]:
+def _essence(manifest: Json) -> Json:
     """The entries that must be equal for a run to continue; the length of training may differ."""
     training = manifest.get("training", {})
     essence = {key: manifest.get(key) for key in ("model", "config", "motion", "vocabulary", "control")}

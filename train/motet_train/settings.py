@@ -17,6 +17,7 @@ from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from motet.bundle.fields import Json
 from motet.errors import MotetError
 from motet_train.recipes.recipe import Recipe
 
@@ -57,12 +58,12 @@ def _read(path: Path) -> dict[str, Any]:
         raise SettingsError(f"the settings {path} cannot be read: {error}") from error
 
 
-def _refuse_unknown(path: Path, tables: Mapping[str, Any], expected: Collection[str], inside: str = "") -> None:
+def _refuse_unknown(path: Path, tables: Json, expected: Collection[str], inside: str = "") -> None:
     if unknown := sorted(tables.keys() - set(expected)):
         raise SettingsError(f"{path}: unknown table [{inside}{unknown[0]}]: expected one of {', '.join(expected)}")
 
 
-def changed(recipe: Recipe, tables: Mapping[str, Mapping[str, Any]], options: Mapping[str, Any]) -> Recipe:
+def changed(recipe: Recipe, tables: Mapping[str, Json], options: Json) -> Recipe:
     """The recipe changed by tables, and over that by options, each of which sets the field of its name.
 
     Options that are None change nothing. SettingsError names a setting that is unknown or of a wrong type.
@@ -85,7 +86,7 @@ def changed(recipe: Recipe, tables: Mapping[str, Mapping[str, Any]], options: Ma
     return recipe
 
 
-def to_toml(options: Mapping[str, Any], recipe: Recipe) -> str:
+def to_toml(options: Json, recipe: Recipe) -> str:
     """The text of a file that :func:`read_settings` reads, with all settings of the recipe."""
     lines = [f"{name} = {_plain(value)}" for name, value in options.items() if value is not None]
     for table, part in PART_OF_TABLE.items():
@@ -121,7 +122,7 @@ def _with_underscores(data: dict[str, Any]) -> dict[str, Any]:
     return renamed
 
 
-def _replaced(current: Any, changes: Mapping[str, Any], where: str) -> Any:
+def _replaced(current: Any, changes: Json, where: str) -> Any:
     """A dataclass with some fields replaced, also inside of fields that are dataclasses."""
     hints = get_type_hints(type(current))
     values = {}

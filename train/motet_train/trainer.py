@@ -6,7 +6,7 @@ It trains a :class:`Learner`. The random numbers of a chunk depend on the seed a
 import json
 import pickle
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from motet.bundle.fields import Json
 from motet.files import write_whole
 from motet_train import distributed
 from motet_train.progress import SILENT, Watcher
@@ -60,7 +61,7 @@ class Learner(Protocol):
     def chunk(self, start: int, stop: int, rng: np.random.Generator) -> Iterator[tuple[int, float, float]]:
         """Train from one unit to another; after each step the units done, the loss and how much it weighs."""
 
-    def validate(self) -> Mapping[str, Any]:
+    def validate(self) -> Json:
         """Entries of the log for the chunk: under "validation" the number to minimise, if there is one."""
 
 

@@ -5,7 +5,7 @@ import pytest
 import torch
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from motet_train.papers.tdbn.rbm import CRBM, Borrowed, CRBMLayer, Learning, Past, transitions
+from motet_train.papers.tdbn.rbm import CRBM, CRBMLayer, Learning, Past, transitions
 
 
 def small_crbm(free: int = 0) -> CRBM:
@@ -69,8 +69,8 @@ def test_windows_borrow_whole_body_parts_and_some_of_a_rivals_control() -> None:
     units = [[row.expand(len(part), -1) for part in group] for row, group in zip(torch.eye(3), frames, strict=True)]
     data = transitions(frames, units, taps=2, onsets=(1.0, 1.0, 16.0))
     generator = torch.Generator().manual_seed(0)
-    borrowed = Borrowed(past=0.3, block=2, control=0.4)
-    layer = CRBMLayer(small_crbm(), data, Learning(1), generator, True, Past(), borrowed)
+    past = Past(borrowed=0.3, block=2, rival=0.4)
+    layer = CRBMLayer(small_crbm(), data, Learning(1), generator, True, past)
     rows = torch.arange(len(data.past)).repeat(500)
     past, control = layer._windows(rows)
     # parts (N, K, 2, 2): taps, body parts, codes

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from codes_data import PREPARATION, trained
+from stores import prepare
 
 from motet import to_humanoid
 from motet.bundle.manifest import Manifest
@@ -25,7 +26,7 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import gaits_of, recordings
-from motet_train.data.store import Store, prepare
+from motet_train.data.store import Store
 from motet_train.evaluate.steer import following
 from motet_train.evaluate.steer.report import Recorded, steer_report
 from motet_train.papers.tdbn.clips import TRUNK_PART, body_parts

@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import click
 
+from motet.bundle.fields import Json
 from motet.generate.base import GenerateModel
 from motet.generate.model import CodesModel
 from motet.models.base import BundleModel
@@ -38,7 +39,7 @@ from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
 from motet_train.evaluate.text_adherence.bare import bare_report
 from motet_train.evaluate.text_adherence.composed import composed_report
 from motet_train.evaluate.text_adherence.numbers import numbers_report
-from motet_train.evaluate.text_adherence.prompts import Trial, outside, prompts, read_trials, trained_on
+from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, OUTSIDE, Trial, read_trials, trained_on
 from motet_train.evaluate.text_adherence.table import best_of, said_to_be_outside, says_drawings, says_table, says_text
 from motet_train.papers.li2018.expmap import is_expmap
 from motet_train.papers.li2018.figures import drawings as protocol_drawings
@@ -90,7 +91,7 @@ class Suite:
     """The measurements of a kind of models. what: its name in messages. data: the data required, "" if optional."""
 
     what: str
-    measure: Callable[[Mapping[str, Any], Inputs], Results]
+    measure: Callable[[Json, Inputs], Results]
     data: str = "the store that they were trained on"
     draws: bool = True
 
@@ -147,7 +148,7 @@ def _language(models: Mapping[str, LanguageModel], inputs: Inputs) -> Results:
     return Results(results.figures, results.text, lambda: _language_drawings(models, corpora))
 
 
-def _language_report(name: str, models: Mapping[str, Any], corpora: Mapping[str, SplitStore]) -> Report:
+def _language_report(name: str, models: Json, corpora: Mapping[str, SplitStore]) -> Report:
     model = models[name]
     corpus = corpora[name]
     # a describe model of the same split closes the chain
@@ -234,8 +235,8 @@ def _says_report(model: GenerateModel, trials: Sequence[Trial], search: SearchMo
         report |= numbers_report(model, seeds=range(3))
         report |= bare_report(model, seeds=range(3))
     report["said_outside"] = {
-        "outside": said_to_be_outside(model, outside()),
-        "prompts": said_to_be_outside(model, [prompt.text for prompt in prompts()]),
+        "outside": said_to_be_outside(model, OUTSIDE),
+        "prompts": said_to_be_outside(model, [prompt.text for prompt in EVERYDAY_PROMPTS]),
     }
     return report
 

@@ -137,15 +137,11 @@ def train_predictor(job: Job, data: Path, by: str | None, **corpus: Any) -> Run:
     return predict.train_predict(expmap_material(read_expmap_files(data)), job)
 
 
-MISSING_SHOWN = 10
-"""Files that are missing, of which each has a line; the others are counted."""
-
-
 def read_expmap_files(data: Path) -> ExpmapCorpus:
-    """The corpus of text files in a folder or zip; missing files are named on stderr."""
+    """The corpus of text files in a folder or zip; missing files are named on stderr, ten of them."""
     corpus = read_expmap(data)
     if corpus.missing and distributed.rank() == 0:
-        shown = corpus.missing[:MISSING_SHOWN]
+        shown = corpus.missing[:10]
         for name in shown:
             click.echo(f"motet: {data} lacks {name}", err=True)
         if more := len(corpus.missing) - len(shown):

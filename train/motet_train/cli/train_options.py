@@ -10,6 +10,7 @@ from typing import Any
 import click
 import torch
 
+from motet.bundle.fields import Json
 from motet.motion.skeleton import METRES
 from motet_train import distributed
 from motet_train.data.store import SPLITS
@@ -87,7 +88,7 @@ unit_in = click.option("--unit-in", type=click.Choice(list(METRES)), help="Lengt
 
 
 def train_command(
-    name: str, recipes: Mapping[str, Recipe], *options: Option, defaults: Mapping[str, Any] | None = None
+    name: str, recipes: Mapping[str, Recipe], *options: Option, defaults: Json | None = None
 ) -> Callable[[Callable[..., Run]], click.Command]:
     """A command that trains one of the recipes; the function receives the job and the command's own options.
 
@@ -138,7 +139,7 @@ def _train(
     trained(Job(recipe, about, out, shared["device"]), train, options, resume, boards)
 
 
-def _changed(context: click.Context, recipe: Recipe, values: Mapping[str, Any]) -> Recipe:
+def _changed(context: click.Context, recipe: Recipe, values: Json) -> Recipe:
     """The recipe with the settings of a file and, over them, those of options."""
     recipe = changed(recipe, context.meta.get("motet.tables", {}), values)
     if values["precision"] == "bfloat16" and recipe.training is None:
@@ -156,7 +157,7 @@ def _fields(recipe: Recipe, names: Collection[str]) -> set[str]:
     return fields
 
 
-def begun(name: str, options: Mapping[str, Any]) -> About:
+def begun(name: str, options: Json) -> About:
     """Set torch's threads, and log a line for each chunk unless --quiet; the entries of the manifest about the run."""
     torch.set_num_threads(options["threads"])
     log.setLevel(logging.INFO if logging.getLogger("motet").isEnabledFor(logging.WARNING) else logging.NOTSET)
@@ -164,14 +165,14 @@ def begun(name: str, options: Mapping[str, Any]) -> About:
     return About(name, command, options["seed"], options["licence"], options["data_licence"])
 
 
-def _summarise(out: Path, manifest: Mapping[str, Any]) -> None:
+def _summarise(out: Path, manifest: Json) -> None:
     """Print the figures of a run, and the next command."""
     if distributed.rank() == 0:
         click.echo(_summary(out, manifest["training"]))
         click.echo(f"next: {_next(out, manifest)}")
 
 
-def _next(out: Path, manifest: Mapping[str, Any]) -> str:
+def _next(out: Path, manifest: Json) -> str:
     """The next command for a run."""
     if manifest["verb"] == "codec":
         return f"motet train codes --codec {out} --actions RUN"
@@ -180,7 +181,7 @@ def _next(out: Path, manifest: Mapping[str, Any]) -> str:
     return f"motet evaluate {out}; motet export {out} -o {out.name}.zip"
 
 
-def _summary(out: Path, training: Mapping[str, Any]) -> str:
+def _summary(out: Path, training: Json) -> str:
     unit = "step" if "steps" in training else "epoch"
     entries = [f"{training['parameters']:,} parameters", f"{training[f'{unit}s']} {unit}s in {training['seconds']:g} s"]
     entries += [f"{key} {training[key]:.4f}" for key in ("loss", "validation", "reconstruction") if key in training]

@@ -15,31 +15,16 @@ from motet.motion.rotations import Array
 from motet.representation.contract import named
 from motet.representation.root_block import poses_of
 
-SHORTEST_ACT = 4.0
-"""Shortest act, in seconds."""
-
 LONGEST_ACT = 12.0
 """Longest act, in seconds; a shorter take is a single act."""
-
-LOOK_AHEAD_SECONDS = 0.4
-"""Seconds from a pose to the later pose that is compared with it, so that movement counts as well as posture."""
-
-RETURN_DISTANCE = 0.4
-"""Largest distance of any joint, in metres, between the start and the end of an act."""
-
-KNOWN_DISTANCE = 0.45
-"""Largest distance of any joint, in metres, at which an act still shows a pose: hopping on one foot is another act."""
-
-KNOWN_SHARE = 0.95
-"""Share of a take's poses that each of its acts must show: starting and stopping are often shown only once."""
 
 
 def acts(motion: Motion) -> list[tuple[int, int]]:
     """Consecutive spans of frames (start, stop) of the acts in a motion in ``root_sixd``.
 
-    An act ends when the figure has first returned to the pose and movement in which it began, and has shown all poses
-    of the take. What remains after the last act is left out. A take that is short, or does not repeat itself, is one
-    span.
+    An act takes 4 to 12 s, and ends when the figure has first returned to the pose and movement in which it began,
+    and has shown all poses of the take. What remains after the last act is left out. A take that is short, or does
+    not repeat itself, is one span.
     """
     if len(motion) <= LONGEST_ACT * motion.fps:
         return [(0, len(motion))]
@@ -55,21 +40,25 @@ def acts(motion: Motion) -> list[tuple[int, int]]:
 def _end(distances: Array, start: int, fps: float) -> int | None:
     """The end of the act that begins at frame ``start``, from the distances of frames (T, T)."""
     second = round(fps)
-    shortest = start + round(SHORTEST_ACT * fps)
+    shortest = start + round(4 * fps)
     longest = start + round(LONGEST_ACT * fps)
     for stop in range(shortest, min(longest, len(distances))):
-        if distances[stop, start] > RETURN_DISTANCE:
+        # back in its first pose: no joint is farther than 40 cm
+        if distances[stop, start] > 0.4:
             continue
+        # a pose is shown if no joint is farther than 45 cm: hopping on one foot is another act; starting and stopping
+        # are often shown only once
         nearest_in_act = distances[start:stop].min(axis=0)
-        if np.mean(nearest_in_act <= KNOWN_DISTANCE) >= KNOWN_SHARE:
+        if np.mean(nearest_in_act <= 0.45) >= 0.95:
             # within the next second, cut where the figure is closest to its first pose
             return stop + int(np.argmin(distances[stop : stop + second, start]))
     return None
 
 
 def _local_positions(motion: Motion) -> Array:
-    """Positions of joints at each frame and AHEAD of it, (T, 2 J, 3) in metres, relative to the root at that frame."""
-    ahead = round(LOOK_AHEAD_SECONDS * motion.fps)
+    """Positions of joints at each frame and 0.4 s later, so that movement counts as well as posture, (T, 2 J, 3) in
+    metres, relative to the root at that frame."""
+    ahead = round(0.4 * motion.fps)
     world = positions(named("root_sixd").motion(motion))
     pose = poses_of(motion.values, motion.fps)[: len(world) - ahead]
     now_and_ahead = np.concatenate([world[: len(pose)], world[ahead:]], axis=1)

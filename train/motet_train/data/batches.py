@@ -22,6 +22,9 @@ from motet_train.data.store import Store
 
 Ids = NDArray[np.int64]
 
+Sentences = tuple[tuple[Ids, ...], ...]
+"""For each motion its sentences as ids."""
+
 Visit = tuple[int, int, int | None]
 """A motion, its down-sampling offset, and which of its sentences; None for one that is drawn."""
 
@@ -80,8 +83,8 @@ class Examples:
 
     store: Store
     records: tuple[int, ...]
-    sentences: tuple[tuple[Ids, ...], ...]
-    mirrored: tuple[tuple[Ids, ...], ...]
+    sentences: Sentences
+    mirrored: Sentences
     mirror: FrameMirror | None = None
 
     def epoch(
@@ -246,7 +249,7 @@ class Views:
 
     seen: Tensor
     frames: NDArray[np.int64]
-    sentences: tuple[tuple[tuple[Ids, ...], ...], ...]
+    sentences: tuple[Sentences, ...]
     groups: NDArray[np.int64]
 
     def only(self, motions: Sequence[int]) -> "Views":

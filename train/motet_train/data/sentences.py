@@ -9,6 +9,9 @@ from itertools import product
 from motet.text.vocabulary import MAX_WORDS, NEW_MODEL_RULES
 from motet_train.data.store import Store
 
+Wordings = tuple[tuple[str, ...], ...]
+"""For each action its sentences."""
+
 RIGHT_OF_LEFT = {
     "left": "right",
     "lefts": "rights",
@@ -69,8 +72,8 @@ class Actions:
     """
 
     of: Mapping[tuple[int, bool], int]
-    sentences: tuple[tuple[str, ...], ...]
-    unseen: tuple[tuple[str, ...], ...]
+    sentences: Wordings
+    unseen: Wordings
 
     def __len__(self) -> int:
         """Number of actions."""
@@ -94,7 +97,7 @@ def actions_of(store: Store, records: tuple[int, ...]) -> Actions:
     return Actions(of, _listed(sentences), _listed(unseen))
 
 
-def _listed(sentences: Mapping[int, Iterable[str]]) -> tuple[tuple[str, ...], ...]:
+def _listed(sentences: Mapping[int, Iterable[str]]) -> Wordings:
     return tuple(map(tuple, sentences.values()))
 
 

@@ -12,6 +12,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motet.bundle.graph import Floats
 from motet.generate.codec import nearest_moves, seen_from
 from motet.motion.rotations import Array
 from motet.representation import placed
@@ -242,7 +243,7 @@ class CodeWindows:
         columns = [np.stack(column) for column in zip(*rows, strict=True)]
         return CodeBatch(*map(torch.from_numpy, columns))
 
-    def _window(self, motion: CodedMotion, start: int) -> tuple[Codes, Codes, Codes, NDArray[np.float32]]:
+    def _window(self, motion: CodedMotion, start: int) -> tuple[Codes, Codes, Codes, Floats]:
         """Codes (N, P), the codes one step earlier (N, P), ages (N,) and weights (N,) from one step on."""
         window = motion.codes[start : start + self.steps]
         count = len(window)

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.errors import MotetError, MotionError
 from motet.figures.trimming import repeated
 from motet.files import new_folder
@@ -28,7 +28,6 @@ from motet_train.data.corpus import Record, Skipped
 from motet_train.data.errors import DataError
 from motet_train.data.preparation import Preparation
 
-Floats = NDArray[np.float32]
 Item = Record | Skipped
 
 FRAMES_FILE = "frames.npy"
@@ -127,7 +126,7 @@ class Store:
 
     @staticmethod
     def open(path: Path) -> "Store":
-        """Open a store that :func:`prepare` wrote; DataError if it is incomplete."""
+        """Open a store that :func:`prepare_parts` wrote; DataError if it is incomplete."""
         try:
             index = json.loads((path / INDEX).read_text(encoding="utf-8"))
             frames = np.load(path / FRAMES_FILE, mmap_mode="r")
@@ -167,17 +166,6 @@ def is_store(path: Path) -> bool:
 def part(path: Path, representation: str) -> Path:
     """The path of the store in a representation: the part of that name if there is one, else the path itself."""
     return path / representation if (path / representation / INDEX).is_file() else path
-
-
-def prepare(
-    items: Iterable[Item],
-    path: Path,
-    preparation: Preparation,
-    progress: Callable[[Item], object] = lambda item: None,
-) -> Store:
-    """Write the store of a corpus in one representation, see :func:`prepare_parts`."""
-    prepare_parts(items, path, {".": preparation}, progress)
-    return Store.open(path)
 
 
 def prepare_parts(

@@ -7,10 +7,11 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from motet.bundle.fields import Json
 from motet_train.data.errors import DataError
 
 
-def read_toml(file: str, name: str) -> dict[str, Any]:
+def read_toml(file: str, name: str) -> Json:
     """The TOML file ``name`` beside the file of a module."""
     return tomllib.loads(Path(file).with_name(name).read_text(encoding="utf-8"))
 

@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
+from motet.motion.rotations import Array
 from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_train.data.errors import DataError
 
 FIRST = 50_000
 """Number of words of a file that may become common words; files begin with the most frequent."""
-
-NEIGHBOUR_COSINE = 0.55
-"""Least cosine of neighbours; four in ten common English words are as near to a word of our sentences."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,20 +25,19 @@ class WordTable:
     """
 
     common: Mapping[str, str]
-    vectors: NDArray[np.float64]
+    vectors: Array
 
 
 def word_table(path: Path, words: Sequence[str], size: int) -> WordTable:
     """The table of a file of vectors (:func:`read_word_vectors`) for a vocabulary, with ``size`` numbers per word."""
     read = read_word_vectors(path, words, FIRST)
     common = nearest(read, words[len(SPECIALS) :])
-    vectors, _ = principal(read, (*words, *common), size)
-    return WordTable(common, vectors)
+    return WordTable(common, principal(read, (*words, *common), size))
 
 
-def nearest(vectors: Mapping[str, NDArray[np.float64]], words: Sequence[str]) -> dict[str, str]:
+def nearest(vectors: Mapping[str, Array], words: Sequence[str]) -> dict[str, str]:
     """The further words that have vectors, each with the nearest of ``words`` by cosine, if that is
-    :data:`NEIGHBOUR_COSINE`."""
+    0.55: four in ten common English words are as near to a word of our sentences."""
     known = [word for word in words if word in vectors and len(word) > 1]
     others = [word for word in vectors if word not in set(words)]
     if not others or not known:
@@ -52,16 +49,16 @@ def nearest(vectors: Mapping[str, NDArray[np.float64]], words: Sequence[str]) ->
     neighbours = {}
     for word, row in zip(others, cosines, strict=True):
         best = int(row.argmax())
-        if row[best] >= NEIGHBOUR_COSINE:
+        if row[best] >= 0.55:
             neighbours[word] = known[best]
     return neighbours
 
 
-def _unit(vector: NDArray[np.float64]) -> NDArray[np.float32]:
+def _unit(vector: Array) -> Floats:
     return (vector / (np.linalg.norm(vector) or 1.0)).astype(np.float32)
 
 
-def read_word_vectors(path: Path, words: Collection[str], first: int = 0) -> dict[str, NDArray[np.float64]]:
+def read_word_vectors(path: Path, words: Collection[str], first: int = 0) -> dict[str, Array]:
     """The vectors (E,) of ``words`` in a file, and of its ``first`` further words of two letters or more.
 
     The file is text as of GloVe and word2vec: in each line a word and E numbers, separated by spaces; of two lines of a
@@ -69,7 +66,7 @@ def read_word_vectors(path: Path, words: Collection[str], first: int = 0) -> dic
     line that is different, or says that none of the words has a vector.
     """
     wanted = set(words)
-    vectors: dict[str, NDArray[np.float64]] = {}
+    vectors: dict[str, Array] = {}
     size = 0
     for number, line in _lines(path):
         if _is_header(number, line):
@@ -97,7 +94,7 @@ def _is_header(number: int, line: str) -> bool:
     return number == 1 and len(parts) == 2 and all(map(str.isdigit, parts))
 
 
-def _vector(numbers: list[str], place: str) -> NDArray[np.float64]:
+def _vector(numbers: list[str], place: str) -> Array:
     try:
         vector = np.array(numbers, dtype=np.float64)
     except ValueError as error:
@@ -123,12 +120,10 @@ def _lines(path: Path) -> Iterator[tuple[int, str]]:
         raise DataError(f"the word vectors {path} cannot be read: {error}") from error
 
 
-def principal(
-    vectors: Mapping[str, NDArray[np.float64]], words: Sequence[str], size: int
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def principal(vectors: Mapping[str, Array], words: Sequence[str], size: int) -> Array:
     """Principal components of vectors as rows (words, size), scaled to an overall standard deviation of 1.
 
-    Also returns which words have a vector; rows of others, and components beyond the number of axes, are 0.
+    Rows of words without a vector, and components beyond the number of axes, are 0.
     """
     known = np.array([word in vectors for word in words])
     # principal axes of the words with a vector
@@ -138,4 +133,4 @@ def principal(
     parts = rows @ axes[:size].T
     components = np.zeros((len(words), size))
     components[known, : parts.shape[1]] = parts / (parts.std() or 1.0)
-    return components, known
+    return components

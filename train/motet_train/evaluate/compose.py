@@ -15,7 +15,7 @@ from motet.generate.model import CodesModel
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet_train.evaluate.positions import BALLS, acceleration, leap, speed
-from motet_train.evaluate.tables import Report, read_goals
+from motet_train.evaluate.tables import Figures, Report, read_goals
 
 FOLDER = Path(__file__).parent
 
@@ -81,11 +81,11 @@ def _figures(compositions: Sequence[tuple[Motion, Sequence[Met]]]) -> Report:
     return report
 
 
-def _mean_and_worst(errors: Sequence[float]) -> dict[str, float]:
+def _mean_and_worst(errors: Sequence[float]) -> Figures:
     return {"mean": float(np.mean(errors)), "worst": max(errors)}
 
 
-def _quality(motions: Sequence[Motion]) -> dict[str, float]:
+def _quality(motions: Sequence[Motion]) -> Figures:
     speeds = []
     accelerations = []
     leaps = []

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from motet.bundle.fields import Json
 from motet.draw.svg import shapes
 from motet.errors import OutputError
 from motet.files import write_whole
@@ -65,7 +66,7 @@ def bones_of(skeleton: Skeleton) -> Bones:
     return [(joint.parent, i) for i, joint in enumerate(skeleton.joints) if joint.parent >= 0]
 
 
-def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any], width: float = 0.9) -> None:
+def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any]) -> None:
     """Draw poses (K, J, 2) in body heights from left to right, :data:`SPACING` apart.
 
     colours: one for each pose, or one for each of its bones.
@@ -73,7 +74,7 @@ def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any
     shifts = SPACING * np.arange(len(points))
     placed = points + shifts[:, None, None] * [1, 0]
     for pose, colour in zip(placed[:, np.array(bones)], colours, strict=True):
-        axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=width))
+        axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=0.9))
     axes.autoscale_view()
     axes.set_aspect("equal")
     axes.axis("off")
@@ -132,7 +133,7 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
     return figure
 
 
-def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Mapping[str, Mapping[str, Any]]) -> None:
+def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Mapping[str, Json]) -> None:
     """Plot errors (N,) against the true time."""
     for name, error in systems.items():
         milliseconds = (np.arange(len(error)) + 1) / fps * 1000

@@ -10,7 +10,10 @@ from tqdm import tqdm
 
 from motet_train.data.table import read_toml
 
-Report = dict[str, dict[str, float]]
+Figures = dict[str, float]
+"""Key -> figure."""
+
+Report = dict[str, Figures]
 """Group -> key -> figure. A measure is a function of a model and data that returns a report, or yields its parts."""
 
 Goals = Mapping[str, tuple[float | None, float | None]]

@@ -5,7 +5,6 @@ Letters in shapes: B rows, W words, A actions, E numbers of a word's vector.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -13,7 +12,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
 from motet.text.vocabulary import SPECIALS, UNK
-from motet_train.models.net import Net, before, constants, float_rows, gelu, id_rows
+from motet_train.models.net import Graphs, Net, before, constants, float_rows, gelu, id_rows
 
 UNKNOWN = SPECIALS.index(UNK)
 """The id of unknown words."""
@@ -99,7 +98,7 @@ class ActionNet(Net):
         lengths = id_rows("lengths")
         return self, GraphSpec((words, lengths), (float_rows("context", self.config.actions),))
 
-    def graphs(self) -> dict[str, Any]:
+    def graphs(self) -> Graphs:
         """None: it is a part of the model that writes codes."""
         return {}
 

@@ -11,7 +11,7 @@ Letters in shapes: B rows, T frames, N steps of codes (T = hop N), D channels, G
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Self
 
 import torch
 from torch import Tensor, nn
@@ -21,7 +21,7 @@ from motet.generate.codec import PATH_CHANNELS
 from motet.representation.root_sixd import ROOT_SIXD
 from motet_train.data.errors import DataError
 from motet_train.models.kinematics import SixdPlaces, Tree
-from motet_train.models.net import Net, constants, gelu, normalised
+from motet_train.models.net import Graphs, Net, constants, gelu, normalised
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class MotionCodec(Net):
         levels = self.config.levels
         return torch.tensor([math.prod(levels[:place]) for place in range(len(levels))], device=self.steps.device)
 
-    def graphs(self) -> dict[str, Any]:
+    def graphs(self) -> Graphs:
         """None: a codec is a part of the model that writes its codes."""
         return {}
 

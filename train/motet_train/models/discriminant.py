@@ -14,12 +14,6 @@ from motet_train.data.batches import Views
 from motet_train.models.joint_embedding import LIMIT, JointEmbedding
 from motet_train.models.net import normalised
 
-BETWEEN_RECORDINGS_WEIGHT = 2.0
-"""How much more differences between recordings of an action count than those between views of one."""
-
-RIDGE = 1.0
-"""The part of the mean variance that is added to each: some hundred motions do not tell all covariances."""
-
 
 @torch.no_grad()
 def discriminate(net: JointEmbedding, seen: Views) -> None:
@@ -30,10 +24,11 @@ def discriminate(net: JointEmbedding, seen: Views) -> None:
     flat = motions.flatten(0, 1)
     mean = flat.mean(dim=0)
 
-    # what does not matter: differences between views of a motion, and between recordings of an action
+    # what does not matter: differences between views of a motion, and twice as much between recordings of an action
     within = _covariance((views - motions[:, :, None]).flatten(0, 2))
-    within += BETWEEN_RECORDINGS_WEIGHT * _covariance(_around(flat, seen.groups))
-    within += RIDGE * within.diagonal().mean() * torch.eye(len(within))
+    within += 2.0 * _covariance(_around(flat, seen.groups))
+    # and the mean variance, as some hundred motions do not tell all covariances
+    within += within.diagonal().mean() * torch.eye(len(within))
 
     # the directions in which motions differ most, relative to that
     whitened = torch.linalg.cholesky(torch.linalg.inv(within))

@@ -19,6 +19,9 @@ from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS
 from motet.representation.root_sixd import SIXD_KINDS
 from motet_train.models.net import constants
 
+Offsets = tuple[tuple[float, ...], ...]
+"""For each joint (x, y, z) from its parent."""
+
 
 def forward_kinematics(parents: Sequence[int], offsets: Tensor, local: Tensor, bones: Sequence[int]) -> Tensor:
     """Places (N, J, 3) from the root of the joints of N poses, all those of one depth at once.
@@ -85,7 +88,7 @@ class Tree:
     """
 
     parents: tuple[int, ...] = ()
-    offsets: tuple[tuple[float, ...], ...] = ()
+    offsets: Offsets = ()
     bones: tuple[int, ...] = ()
 
 
@@ -140,7 +143,7 @@ class VectorFigure:
     """
 
     parents: tuple[int, ...] = ()
-    offsets: tuple[tuple[float, ...], ...] = ()
+    offsets: Offsets = ()
     bones: tuple[int, ...] = ()
     vectors: tuple[int, ...] = ()
     root: tuple[int, ...] = ()
@@ -268,7 +271,7 @@ class Figure:
     """
 
     parents: tuple[int, ...] = ()
-    offsets: tuple[tuple[float, ...], ...] = ()
+    offsets: Offsets = ()
     orders: tuple[str, ...] = ()
     columns: tuple[tuple[int, ...], ...] = ()
     root: tuple[int, ...] = ()

@@ -14,7 +14,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet_train.data.batches import Batch
-from motet_train.models.net import Net, Part, before, normalised
+from motet_train.models.net import Graphs, Net, Part, before, normalised
 from motet_train.models.recurrent import GRU, Attention, Decoder, Encoder, WordEmbedding
 
 PAD = 0
@@ -176,7 +176,7 @@ class MotionToLanguage(LanguageNet):
         attended = self.attention(following[:, None], states, lengths)[:, 0]
         return self.log_probabilities(torch.cat([following, attended], dim=-1)), following
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder and the step, each with its contract."""
         size = 2 * self.config.encoder_units[-1]
         frames = TensorSpec("frames", ("batch", "time", self.config.channels))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from motet.bundle.fields import Json
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.motion.rotations import Array
 from motet.representation.contract import Z_LIMIT
@@ -47,7 +48,7 @@ class Net(nn.Module, ABC):
         self.register_buffer("scale", torch.ones(channels))
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> Self:
+    def from_config(cls, config: Json) -> Self:
         """An untrained net of a configuration from a manifest."""
         return cls(configured(cls.CONFIG, config))
 
@@ -87,6 +88,11 @@ class Part(nn.Module):
         self.forward = function
 
 
+def encoder_and_step(net: Any, encoder: GraphSpec, step: GraphSpec) -> Graphs:
+    """The graphs of a net's ``encode`` and ``step`` with their contracts."""
+    return {"encoder": (Part(net, net.encode), encoder), "step": (Part(net, net.step), step)}
+
+
 def _rename(net: Net, state: dict[str, Any], prefix: str, *details: Any) -> None:
     """Give the weights of an older run the names of today, before they are loaded."""
     for key in list(state):
@@ -101,7 +107,7 @@ def tuples(value: Any) -> Any:
     return tuple(map(tuples, value)) if isinstance(value, list) else value
 
 
-def configured(kind: Any, data: Mapping[str, Any]) -> Any:
+def configured(kind: Any, data: Json) -> Any:
     """The dataclass ``kind``, and the dataclasses in its fields, from JSON."""
     hints = get_type_hints(kind)
     parts = {name: hints[name] for name in data if is_dataclass(hints.get(name))}

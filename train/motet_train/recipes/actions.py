@@ -18,6 +18,7 @@ from motet_train.data.sentences import Actions, actions_of
 from motet_train.data.store import Store
 from motet_train.data.word_table import WordTable, word_table
 from motet_train.descent import GradientLearner, Term, Terms
+from motet_train.evaluate.tables import Figures
 from motet_train.models.action_net import ActionNet, ActionsConfig, stems_of
 from motet_train.recipes.language import divided, manifest
 from motet_train.recipes.recipe import ADAMW, Job, Recipe
@@ -158,7 +159,7 @@ class ActionSentences:
         return SentenceBatch(*padded_tensors(ids, "int64"), torch.from_numpy(actions))
 
     @torch.no_grad()
-    def measured(self, net: ActionNet) -> dict[str, float]:
+    def measured(self, net: ActionNet) -> Figures:
         """For sentences in unseen wordings the cross-entropy of their actions (validation), and how often the most
         likely action is one of these (understood)."""
         if self.unseen is None:

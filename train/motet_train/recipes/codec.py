@@ -15,6 +15,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.sixd_windows import SixdWindows, Window
 from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms
+from motet_train.evaluate.tables import Figures
 from motet_train.models.codec import CodecConfig, MotionCodec, places_in_world
 from motet_train.models.kinematics import joint_weights, tree_of
 from motet_train.models.motion_codes import MotionCodes
@@ -183,7 +184,7 @@ def _sharpness(places: Tensor) -> Tensor:
 
 
 @torch.no_grad()
-def _measured(net: MotionCodec, validation: Window) -> dict[str, float]:
+def _measured(net: MotionCodec, validation: Window) -> Figures:
     """On validation windows: the mean error of joints in cm, the sharpness of movement relative to the true one, and
     the share of codes in use."""
     # how far decoded joints are from the true ones

@@ -10,7 +10,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from motet.bundle.fields import Json
 from motet.generate.memory import Memory, MemorySettings, squared_distances
+from motet.motion.rotations import Array
 from motet.representation.base import FrameMirror
 from motet.representation.root_block import poses_of
 from motet_train.data.acts import acts
@@ -41,9 +43,6 @@ DRAWING_SETTINGS: dict[str, Any] = {
 
 ALIKE_PAIRS = 0.2018
 """Share of the pairs of steps within long recordings that count as alike."""
-
-MEASURED_RECORDINGS = 1000
-"""Long recordings in which the distances of steps are measured, at most."""
 
 
 @dataclass(frozen=True)
@@ -141,15 +140,15 @@ def alike_distance(memory: Memory) -> float:
                 lengthy.append(memory.keys[action][recording.places])
     if not lengthy:
         return memory.settings.alike_distance
-    # distances of all pairs of steps in some of them
+    # distances of all pairs of steps in a thousand of them at most
     distances = []
-    for keys in lengthy[:: -(-len(lengthy) // MEASURED_RECORDINGS)]:
+    for keys in lengthy[:: -(-len(lengthy) // 1000)]:
         distances.append(squared_distances(keys)[np.triu_indices(len(keys), 1)])
     alike = float(np.quantile(np.concatenate(distances), ALIKE_PAIRS))
     return max(float(f"{alike:.3g}"), MemorySettings.RANGES["alike_distance"][1].low)
 
 
-def _parts(codec: Run, actions: Run, sentences: Mapping[str, Any]) -> tuple[MotionCodec, ActionNet]:
+def _parts(codec: Run, actions: Run, sentences: Json) -> tuple[MotionCodec, ActionNet]:
     """The nets of two runs; DataError for other runs, or for a net of actions that was trained on other sentences."""
     if not isinstance(codec.model, MotionCodec):
         raise DataError(f"codes need the run of a codec (motet train codec), not of {codec.manifest['model']}")
@@ -185,7 +184,7 @@ def coded(
     return motions
 
 
-def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float, ended: bool = False) -> Codes:
+def codes_of(codec: MotionCodec, frames: Array, fps: float, ended: bool = False) -> Codes:
     """Frames (T, D) to codes (N, P), without the frames of an incomplete last step. ended: with the move that ends a
     motion after them, if there are any."""
     hop = codec.config.hop
@@ -200,7 +199,7 @@ def codes_of(codec: MotionCodec, frames: NDArray[np.float64], fps: float, ended:
     return codes
 
 
-def _moves(codec: MotionCodec, frames: NDArray[np.float64], fps: float) -> Codes:
+def _moves(codec: MotionCodec, frames: Array, fps: float) -> Codes:
     """The root moves (N,) of frames (T, D) of whole steps."""
     poses = poses_of(frames, fps)
     poses = np.concatenate([poses, 2 * poses[-1:] - poses[-2:-1]])  # the root keeps its pace after the end

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from motet.bundle.graph import Floats
 from motet.models.nearest_neighbour import GOES_LEFT, GOES_RIGHT, GOES_STRAIGHT, AnswerSettings, Known, log_odds
+from motet.motion.rotations import Array, Mask
 from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.batches import Examples, Views
 from motet_train.data.errors import DataError
@@ -216,10 +217,10 @@ class Tried(NamedTuple):
     """Answers about motions of held-out people, (N,) each: the share of near motions for which each is right, the
     similarity of the nearest, the group of people, and whether it is right."""
 
-    share: NDArray[np.float64]
-    similarity: NDArray[np.float64]
+    share: Array
+    similarity: Array
     group: NDArray[np.int64]
-    right: NDArray[np.bool_]
+    right: Mask
 
 
 def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, visits: KnownVisits) -> Tried:
@@ -293,7 +294,7 @@ def learned(tried: Tried, sure: float) -> AnswerSettings:
     )
 
 
-def _sure_from(tried: Tried, probabilities: NDArray[np.float64], sure: float) -> float:
+def _sure_from(tried: Tried, probabilities: Array, sure: float) -> float:
     """The probability from which a share of ``sure`` is right in every group that has such; 1 if none has."""
     bounds = []
     for group in set(tried.group):
@@ -302,7 +303,7 @@ def _sure_from(tried: Tried, probabilities: NDArray[np.float64], sure: float) ->
     return max(bounds, default=1.0)
 
 
-def _lowest(probabilities: NDArray[np.float64], right: NDArray[np.bool_], wanted: float) -> list[float]:
+def _lowest(probabilities: Array, right: Mask, wanted: float) -> list[float]:
     """The lowest probability at and above which the wanted share of answers is right, if there is one."""
     order = np.argsort(-probabilities, kind="stable")
     precision = np.cumsum(right[order]) / np.arange(1, len(order) + 1)

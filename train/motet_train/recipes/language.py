@@ -1,6 +1,5 @@
 """Training between motion and language, either way, from a store; and the recipes of the motion-to-language model."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from motet.bundle.fields import Json
 from motet.bundle.manifest import Manifest
 from motet.models.describe import ConfidenceSettings, DescribeModel
 from motet.models.language import MAX_SECONDS
@@ -121,7 +121,7 @@ def train_language(store: Store, job: Job, data: str = "", by: str = "trial") ->
     return job.run(net, learner, about, tuned=partial(_confidence, corpus))
 
 
-def _config(recipe: Recipe, corpus: Divided) -> dict[str, Any]:
+def _config(recipe: Recipe, corpus: Divided) -> Json:
     """The sizes of a recipe's net for a corpus."""
     config = asdict(recipe.sized(channels=len(corpus.contract.channels), words=len(corpus.vocabulary)))
     if "travelled" in config and not named(corpus.store.representation).required:
@@ -136,7 +136,7 @@ def _learner(job: Job, corpus: Divided, net: LanguageNet) -> GradientLearner[Lan
     train = corpus.examples(corpus.parts.train)
     validation = corpus.examples(corpus.parts.validation)
 
-    def validated() -> dict[str, Any]:
+    def validated() -> Json:
         longest = visits.windows and visits.windows[1]
         return {"validation": round(validation_loss(net, validation, batch_size, longest), 6)}
 
@@ -171,7 +171,7 @@ def _confidence(corpus: Divided, run: Run) -> tuple[ConfidenceSettings]:
     return (calibrated(scores, right),)
 
 
-def manifest(job: Job, corpus: Divided, config: Mapping[str, Any], data: str, by: str) -> dict[str, Any]:
+def manifest(job: Job, corpus: Divided, config: Json, data: str, by: str) -> dict[str, Any]:
     """The manifest of a run of a model that reads or writes sentences. data: the store's name."""
     parts = corpus.parts
     records = corpus.store.records

@@ -1,12 +1,12 @@
 """The recipe of a figure steered by motion matching, and its training from a store."""
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from motet.bundle.fields import Json
 from motet.representation.contract import MotionContract
 from motet.steering.foot_lock import FootLockSettings
 from motet.steering.rows import MatchingRows, rows_of
@@ -128,7 +128,7 @@ def _loss(net: Matching, rows: Tensor, true: tuple[Tensor, Tensor], weights: Ten
 
 
 @torch.no_grad()
-def _measured(net: Matching, true: tuple[Tensor, Tensor]) -> dict[str, Any]:
+def _measured(net: Matching, true: tuple[Tensor, Tensor]) -> Json:
     """The mean error of joints' positions in centimetres, and of bones' rotations in degrees."""
     poses, points = true
     rotations, height = net.poses(net.codes)

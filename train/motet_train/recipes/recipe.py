@@ -1,11 +1,12 @@
 """A recipe, and the job of training by it: from a learner and a manifest to a run."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from motet.bundle.fields import Json
 from motet.files import write_whole
 from motet.representation.contract import MotionContract
 from motet.settings import Settings
@@ -56,7 +57,7 @@ class Recipe:
     derived: tuple[str, ...] = ()
     training: Training | None = None
     visits: Any = None
-    defaults: Mapping[str, Any] = field(default_factory=dict)
+    defaults: Json = field(default_factory=dict)
     settings: tuple[Settings, ...] = ()
 
     def sized(self, **derived: Any) -> Any:
@@ -64,7 +65,7 @@ class Recipe:
         assert set(derived) == set(self.derived)
         return replace(self.config, **derived)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """The training, for the manifest."""
         fields: dict[str, Any] = {}
         for part in (self.training, self.visits):
@@ -93,10 +94,10 @@ class Job:
     def manifest(
         self,
         contract: MotionContract,
-        config: Mapping[str, Any],
-        defaults: Mapping[str, Any],
+        config: Json,
+        defaults: Json,
         data_licence: str | None,
-        training: Mapping[str, Any] | None = None,
+        training: Json | None = None,
         **more: Any,
     ) -> dict[str, Any]:
         """The manifest of a new run, ready for JSON; the bundle's begins with it.
@@ -128,8 +129,8 @@ class Job:
         self,
         net: Net,
         learner: Learner,
-        manifest: Mapping[str, Any],
-        more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
+        manifest: Json,
+        more: Callable[[Sequence[Line]], Json] = lambda log: {},
         tuned: Callable[[Run], Sequence[Settings]] = lambda run: (),
     ) -> Run:
         """Train; the folder is a run after the first chunk, and a stopped run resumes.
@@ -155,7 +156,7 @@ class Job:
             run.save(self.folder)
         return run
 
-    def _begin(self, manifest: Mapping[str, Any]) -> None:
+    def _begin(self, manifest: Json) -> None:
         """Write the manifest and the settings of a new run."""
         refuse_other(self.folder / RUN_MANIFEST, manifest)
         write_whole(self.folder / RUN_MANIFEST, json.dumps(manifest, indent=1) + "\n")
@@ -163,7 +164,7 @@ class Job:
             write_whole(self.folder / SETTINGS, self.settings)
 
 
-def _results(log: Sequence[Line], learner: Learner, net: Net) -> dict[str, Any]:
+def _results(log: Sequence[Line], learner: Learner, net: Net) -> Json:
     """The figures of a training, from its log."""
     best = kept(log, learner.keep)
     seconds = sum(line["seconds"] for line in log)
@@ -178,7 +179,7 @@ def _results(log: Sequence[Line], learner: Learner, net: Net) -> dict[str, Any]:
     }
 
 
-def data_of(store: Store, name: str, by: str, parts: Split, start: Run | None = None) -> dict[str, Any]:
+def data_of(store: Store, name: str, by: str, parts: Split, start: Run | None = None) -> Json:
     """The data of a training, for the manifest, and the training of the run from which it starts."""
     about: dict[str, Any] = {
         "data": {"name": name, "motions": len(store.records)},
@@ -189,7 +190,7 @@ def data_of(store: Store, name: str, by: str, parts: Split, start: Run | None = 
     return about
 
 
-def origin(training: Mapping[str, Any]) -> dict[str, Any]:
+def origin(training: Json) -> Json:
     """How a part of a net was trained, and what it started from, by its manifest's training."""
     keys = ("command", "seed", "epochs", "steps", "seconds", "word_vectors")
     parts = {key: training[key] for key in keys if key in training}

@@ -8,7 +8,6 @@ Acts are recordings as ``generate`` shows them, parts of which are chosen and jo
 
 import json
 import tomllib
-from collections.abc import Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 import motet.keyed
 import motet.steering
+from motet.bundle.fields import Json
 from motet.bundle.packing import packed
 from motet.generate.model import CodesModel
 from motet.models.load import load_as
@@ -28,16 +28,13 @@ from motet.steering.model import SteerModel
 from motet.steering.repertoire import SEAM, STEPS_OF_UNIT, at_tempo, joined
 from motet_train.data.errors import DataError
 
-BASE_SECONDS = 12.0
-"""Seconds of the standing figure over which acts are keyed."""
-
 KEPT_COLUMNS = ("name", "also", "side", "limb")
 """What the document keeps of the table."""
 
 TARGET = Path(motet.steering.__file__).with_name("repertoire.json")
 
 
-def table() -> dict[str, Any]:
+def table() -> Json:
     """``acts.toml``: the acts, and the words of sentences."""
     return tomllib.loads((files("motet_train.data") / "acts.toml").read_text(encoding="utf-8"))
 
@@ -48,10 +45,10 @@ class Maker:
     def __init__(self, generate: CodesModel, control: SteerModel) -> None:
         self.generate = generate
         self.control = control
-        self.standing: Motion = control.run(f"stop {BASE_SECONDS:g}s")
+        self.standing: Motion = control.run("stop 12s")  # over which acts are keyed
         self._shown: dict[str, Array] = {}
 
-    def numbers(self, act: Mapping[str, Any]) -> Array:
+    def numbers(self, act: Json) -> Array:
         """The frames (T, W) of an act of the table."""
         name = act["name"]
         if "keyed" in act:
@@ -89,7 +86,7 @@ def continuous(numbers: Array) -> Array:
     return np.column_stack([signed.reshape(len(numbers), -1), numbers[:, -4:]])
 
 
-def made(acts: Mapping[str, Any], maker: Maker) -> dict[str, Any]:
+def made(acts: Json, maker: Maker) -> Json:
     """The document of ``repertoire.json``."""
     documents = dict[str, dict[str, Any]]()
     rows = list[Array]()
@@ -108,13 +105,13 @@ def made(acts: Mapping[str, Any], maker: Maker) -> dict[str, Any]:
     return {"words": words(acts["words"]), "acts": [*documents.values()], "steps": STEPS_OF_UNIT, **frames}
 
 
-def arms_alone(act: Mapping[str, Any], kept: Array) -> bool:
+def arms_alone(act: Json, kept: Array) -> bool:
     """Whether an act is one of the upper body: as the table says, or keyed with hips that stay."""
     moves = np.ptp(kept[:, -4:], axis=0).max() > 0.02
     return bool(act.get("arms", "keyed" in act and not moves))
 
 
-def words(texts: Mapping[str, Any]) -> dict[str, Any]:
+def words(texts: Json) -> Json:
     """The words of the table as lists; those with a stroke between them are phrases."""
     lists = dict[str, Any]()
     for name, text in texts.items():

@@ -15,6 +15,7 @@ from motet_train.data.sentences import usable
 from motet_train.data.store import Store
 from motet_train.descent import GradientLearner, Term, Training
 from motet_train.evaluate.language.split_store import description_groups
+from motet_train.evaluate.tables import Figures
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
 from motet_train.recipes.language import Divided, divided, manifest
@@ -89,7 +90,7 @@ def seen_by(net: JointEmbedding, examples: Examples, visits: SearchVisits, seed:
 
 
 def space_learner(
-    net: JointEmbedding, training: Training, seen: Views, validate: Callable[[], dict[str, float]] = dict
+    net: JointEmbedding, training: Training, seen: Views, validate: Callable[[], Figures] = dict
 ) -> GradientLearner[JointEmbedding]:
     """A learner of a net on views, whose statistics the net takes first."""
     net.see_by(seen.seen)
@@ -123,7 +124,7 @@ class _UnseenSentences:
         self.rows = torch.tensor(rows)
 
     @torch.no_grad()
-    def measures(self, net: JointEmbedding) -> dict[str, float]:
+    def measures(self, net: JointEmbedding) -> Figures:
         """The mean cross-entropy of the motions that a sentence describes, and how often one is among the best 5."""
         device = net.mean.device
         # scores of all pairs

@@ -3,17 +3,17 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.models.describe import DescribeModel, Description
 from motet.models.nearest_neighbour import NOTHING
+from motet.motion.rotations import Array, Mask
 from motet_train.data.kinds import Shown, named, shown_by
 from motet_train.data.store import Split, Store, matches
 from motet_train.evaluate.language.attributes import common_side, side, turning
-from motet_train.evaluate.language.confidence import CHAIN, Truths, fits_timeline, share, timelines_of
+from motet_train.evaluate.language.confidence import CHAIN, fits_timeline, share, timelines_of
 from motet_train.evaluate.language.describe import nearest_motions
 from motet_train.evaluate.language.split_store import SplitStore
-from motet_train.evaluate.tables import Report
+from motet_train.evaluate.tables import Figures, Report
 
 BINS = 10
 """Bins of the probability in the expected calibration error."""
@@ -52,7 +52,7 @@ def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
     }
 
 
-def _action_figures(model: DescribeModel, shown: list[Shown], descriptions: list[Description]) -> dict[str, float]:
+def _action_figures(model: DescribeModel, shown: list[Shown], descriptions: list[Description]) -> Figures:
     pairs = list(zip(shown, descriptions, strict=True))
     right = np.array([actions.right(description.text) for actions, description in pairs])
     sure = np.array([description.confident for description in descriptions])
@@ -93,7 +93,7 @@ def _shown(corpus: SplitStore, record: int) -> Shown:
     return shown_by((*entry.sentences, *entry.unseen), entry.action)
 
 
-def _turns(corpus: SplitStore, records: Sequence[int], descriptions: Sequence[Description]) -> dict[str, float]:
+def _turns(corpus: SplitStore, records: Sequence[int], descriptions: Sequence[Description]) -> Figures:
     mentioned = []
     for record, description in zip(records, descriptions, strict=True):
         sentences = corpus.sentences(record)
@@ -107,7 +107,7 @@ def _turns(corpus: SplitStore, records: Sequence[int], descriptions: Sequence[De
     return {"of": float(len(mentioned)), "told": share(np.array(mentioned, dtype=bool))}
 
 
-def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int], count: int = 40) -> dict[str, float]:
+def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int], count: int = 40) -> Figures:
     """Figures of timelines of three motions of 2 to 12 s, drawn at random and joined: the share of time with a right
     description ("time_right"), of joins with a cut within half a second ("joins_found"), and of cuts with a join
     ("cuts_right"). Empty if there are fewer than three such motions."""
@@ -123,7 +123,7 @@ def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int], 
     return {"time_right": share(np.array(right)), **described.cut_shares(count)}
 
 
-def calibration_error(probability: NDArray[np.float64], right: Truths) -> float:
+def calibration_error(probability: Array, right: Mask) -> float:
     """The expected calibration error (Guo et al. 2017): the mean distance between probability (N,) and share of right
     ones over tenths of the probability, weighted by their size."""
     # equal bins of the probability
@@ -132,7 +132,7 @@ def calibration_error(probability: NDArray[np.float64], right: Truths) -> float:
     return float(sum(errors) / len(right))
 
 
-def error_by_chance(probability: NDArray[np.float64], times: int = 1000) -> float:
+def error_by_chance(probability: Array, times: int = 1000) -> float:
     """The mean calibration error of perfectly calibrated probabilities (N,), due to the small number of motions."""
     # outcomes drawn with these very probabilities
     drawn = np.random.default_rng(0).random((times, len(probability))) < probability

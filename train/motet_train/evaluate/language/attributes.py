@@ -8,6 +8,7 @@ from itertools import chain
 import numpy as np
 
 from motet_train.evaluate.language.split_store import plain
+from motet_train.evaluate.tables import Figures
 
 Patterns = dict[str, str]
 """Name of an attribute -> regular expression of the words that express it."""
@@ -93,7 +94,7 @@ def _verbs_right(text: str, agreed: frozenset[str], sentences: Sequence[str]) ->
     return bool(verbs & agreed) and verbs <= mentioned(VERBS, *sentences)
 
 
-def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) -> dict[str, float]:
+def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) -> Figures:
     """The shares of hypotheses that are right, NaN without any, and their numbers with the suffix "_of".
 
     "verbs": a verb that people agree on is mentioned, and none that nobody mentioned. "sides": the side that people

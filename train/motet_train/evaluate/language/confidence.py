@@ -6,13 +6,14 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.models.describe import ConfidenceSettings, DescribeModel, Description, Part
 from motet.motion.motion import Motion
+from motet.motion.rotations import Array, Mask
 from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.evaluate.language.attributes import ACTIONS, action_right, common, mentioned
 from motet_train.evaluate.language.split_store import SplitStore
+from motet_train.evaluate.tables import Figures
 
 ENOUGH = 20
 """Descriptions needed to choose a limit."""
@@ -23,14 +24,8 @@ TIMELINES = 60
 CHAIN = 3
 """Motions of a timeline."""
 
-SHORTEST_PART = 2.0
-LONGEST_PART = 12.0
-"""Seconds that a motion of a timeline lasts."""
 
-Truths = NDArray[np.bool_]
-
-
-def confidence(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> dict[str, float]:
+def confidence(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> Figures:
     """The shares of the best descriptions of some records (``of``) that are right, and confident.
 
     "right_if_confident", "right_if_not": the shares of confident and of other ones that are right. "kept": the share of
@@ -54,7 +49,7 @@ def confidence(model: DescribeModel, corpus: SplitStore, records: Sequence[int])
     }
 
 
-def judged(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> tuple[list[Description], Truths]:
+def judged(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> tuple[list[Description], Mask]:
     """The best description of each record, and whether it is right."""
     descriptions = [row[0] for row in model.describe(corpus.motions(records))]
     right = []
@@ -63,7 +58,7 @@ def judged(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> 
     return descriptions, np.array(right, dtype=np.bool_)
 
 
-def calibrated(scores: NDArray[np.float64], right: Truths) -> ConfidenceSettings:
+def calibrated(scores: Array, right: Mask) -> ConfidenceSettings:
     """The limit that is right most often, with right descriptions at or above it and wrong ones below.
 
     scores: (N,) log-probabilities. The limit lies half-way between two of them; of equally good limits it is the
@@ -98,7 +93,7 @@ class Timelines(NamedTuple):
     cuts: int
     moments: list[Moment]
 
-    def cut_shares(self, count: int) -> dict[str, float]:
+    def cut_shares(self, count: int) -> Figures:
         """The shares of joins in ``count`` timelines with a cut, and of cuts with a join."""
         return {
             "joins_found": self.joins_found / (count * (CHAIN - 1)),
@@ -127,7 +122,7 @@ def timelines_of(model: DescribeModel, corpus: SplitStore, chains: Iterable[Sequ
     return Timelines(joins_found, cuts, moments)
 
 
-def timeline_figures(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> dict[str, float]:
+def timeline_figures(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> Figures:
     """Figures of :data:`TIMELINES`, three motions of 2 to 12 s joined at random, neighbours of different actions.
 
     "joins_found", "cuts_right": the shares of joins with a cut within a second, and of cuts with a join. "parts": how
@@ -157,8 +152,8 @@ def timeline_figures(model: DescribeModel, corpus: SplitStore, records: Sequence
 
 
 def fits_timeline(motion: Motion) -> bool:
-    """Whether a motion is long and short enough for a timeline."""
-    return SHORTEST_PART <= motion.duration <= LONGEST_PART
+    """Whether a motion is long and short enough for a timeline: 2 to 12 s."""
+    return 2.0 <= motion.duration <= 12.0
 
 
 def _others(corpus: SplitStore, records: Sequence[int]) -> Mapping[int, Sequence[tuple[str, int]]]:
@@ -215,12 +210,12 @@ def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) 
     return len(joins) - len(free_joins)
 
 
-def share(truths: Truths) -> float:
+def share(truths: Mask) -> float:
     """The share of true flags, NaN without any flags."""
     return float(truths.mean()) if len(truths) else np.nan
 
 
-def _auc(scores: NDArray[np.float64], right: Truths) -> float:
+def _auc(scores: Array, right: Mask) -> float:
     """How often the score of a right description is above that of a wrong one; equal ones count half."""
     from sklearn.metrics import roc_auc_score  # imported here, so that training does not load it
 

@@ -20,7 +20,7 @@ from motet_train.evaluate.language.attributes import words_right
 from motet_train.evaluate.language.confidence import confidence, timeline_figures
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, plain, unknown_words_allowed
-from motet_train.evaluate.tables import Report, gathered
+from motet_train.evaluate.tables import Figures, Report, gathered
 
 RANKS = 5
 """Hypotheses for each motion, as in the paper."""
@@ -56,7 +56,7 @@ def ranked(row: Sequence[Hypothesis], rank: int) -> Hypothesis:
     return row[min(rank, len(row) - 1)]
 
 
-def ranks(hypotheses: Sequence[Sequence[str]], references: References, marks: bool = False) -> dict[str, float]:
+def ranks(hypotheses: Sequence[Sequence[str]], references: References, marks: bool = False) -> Figures:
     """BLEU of the first, second, ... fifth hypothesis of every motion, as "1" to "5" (a row of table 2).
 
     A motion with fewer hypotheses counts with its last one.
@@ -231,7 +231,7 @@ def _unseen(
     }
 
 
-def _by_order(hypotheses: list[list[str]], copied: References, references: References) -> dict[str, float]:
+def _by_order(hypotheses: list[list[str]], copied: References, references: References) -> Figures:
     """BLEU of the first hypotheses, and of copying, for n-grams of each length."""
     best = [row[0] for row in hypotheses]
     scores = {f"bleu_{n}": bleu(best, references, longest=n) for n in NGRAM_ORDERS}

@@ -15,7 +15,7 @@ from motet_train.evaluate.language.attributes import common_side, common_turning
 from motet_train.evaluate.language.describe import RANKS, bleu, ranked, ranks, retrieved
 from motet_train.evaluate.language.motions import measures, quiet_energy
 from motet_train.evaluate.language.split_store import SplitStore, unknown_words_allowed
-from motet_train.evaluate.tables import Report, gathered, read_goals
+from motet_train.evaluate.tables import Figures, Report, gathered, read_goals
 
 LANGUAGE_GOALS = read_goals("language")
 
@@ -94,7 +94,7 @@ def knows(model: GenerateModel, sentence: str, every_word: bool = False) -> bool
         return False
 
 
-def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> dict[str, float]:
+def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> Figures:
     """A row of table 3: BLEU of the descriptions of the first to the fifth motion, "1" to "5".
 
     Each sentence with a generated motion counts once; its references are all sentences of its record.
@@ -106,7 +106,7 @@ def chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> di
     return ranks(list(zip(*texts, strict=True)), corpus.references(answers.records))
 
 
-def bounds_chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> dict[str, float]:
+def bounds_chained(describe: DescribeModel, answers: Answers, corpus: SplitStore) -> Figures:
     """The same for recorded motions.
 
     retrieval: the training motion with the most similar sentence, the floor. data: the motion that the sentence
@@ -178,39 +178,29 @@ Thresholds = Mapping[str, float]
 
 
 class KindPrompt(NamedTuple):
-    """A sentence, the test of its motions, and the thresholds that the test needs."""
+    """A sentence, and the quantity of its motions that is at least one threshold, and below another if it has one."""
 
     sentence: str
-    passes: Callable[[Travel, Thresholds], bool]
-    needs: tuple[str, ...]
+    quantity: Callable[[Travel], float]
+    least: str
+    below: str | None = None
+
+    def measurable(self, limits: Thresholds) -> bool:
+        """Whether its thresholds exist."""
+        return self.least in limits and (self.below is None or self.below in limits)
+
+    def passes(self, travel: Travel, limits: Thresholds) -> bool:
+        """Whether a motion is of the kind."""
+        most = np.inf if self.below is None else limits[self.below]
+        return limits[self.least] <= self.quantity(travel) < most
 
 
 ASKED: Mapping[str, KindPrompt] = {
-    "walks": KindPrompt(
-        "a person walks",
-        lambda travel, limits: limits["slow"] <= travel.speed < limits["run"],
-        ("slow", "run"),
-    ),
-    "runs": KindPrompt(
-        "a person runs",
-        lambda travel, limits: travel.speed >= limits["run"],
-        ("run",),
-    ),
-    "left": KindPrompt(
-        "a person walks and turns left",
-        lambda travel, limits: travel.turn >= limits["turn"],
-        ("turn",),
-    ),
-    "right": KindPrompt(
-        "a person walks and turns right",
-        lambda travel, limits: travel.turn <= -limits["turn"],
-        ("turn",),
-    ),
-    "jumps": KindPrompt(
-        "a person jumps",
-        lambda travel, limits: travel.rise >= limits["rise"],
-        ("rise",),
-    ),
+    "walks": KindPrompt("a person walks", lambda travel: travel.speed, "slow", "run"),
+    "runs": KindPrompt("a person runs", lambda travel: travel.speed, "run"),
+    "left": KindPrompt("a person walks and turns left", lambda travel: travel.turn, "turn"),
+    "right": KindPrompt("a person walks and turns right", lambda travel: -travel.turn, "turn"),
+    "jumps": KindPrompt("a person jumps", lambda travel: travel.rise, "rise"),
 }
 
 
@@ -250,7 +240,7 @@ def kinds(corpus: SplitStore) -> dict[str, list[Travel]]:
     return travels
 
 
-def thresholds(travels: Mapping[str, Sequence[Travel]]) -> dict[str, float]:
+def thresholds(travels: Mapping[str, Sequence[Travel]]) -> Figures:
     """The thresholds between :func:`kinds`, except those between kinds without training motions.
 
     slow: m/s, half of the speed that nine of ten training walks exceed. run: m/s, half-way between the median speeds of
@@ -283,10 +273,10 @@ def _half_way(lower: list[float], upper: list[float]) -> float:
 
 def measurable(limits: Thresholds) -> dict[str, KindPrompt]:
     """The entries of ASKED whose thresholds exist."""
-    return {key: prompt for key, prompt in ASKED.items() if set(prompt.needs) <= set(limits)}
+    return {key: prompt for key, prompt in ASKED.items() if prompt.measurable(limits)}
 
 
-def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> dict[str, float]:
+def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> Figures:
     """The ceiling of a model: for each measurable entry of ASKED the share of the training motions of that kind that
     pass its test; NaN without such motions."""
     shares = {}
@@ -296,7 +286,7 @@ def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> d
     return shares
 
 
-def prompted(model: GenerateModel, limits: Thresholds, seeds: int = 10) -> dict[str, float]:
+def prompted(model: GenerateModel, limits: Thresholds, seeds: int = 10) -> Figures:
     """For each measurable entry of ASKED the share of seeds whose most likely motion passes its test.
 
     A sentence without a word that the model knows counts as failed.

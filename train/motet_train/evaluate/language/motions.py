@@ -15,9 +15,10 @@ from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS, from_root_block
 from motet_train.evaluate import positions as places
 from motet_train.evaluate.language.split_store import SplitStore
+from motet_train.evaluate.tables import Figures
 
 
-def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) -> dict[str, float]:
+def measures(motions: Sequence[Motion], contract: MotionContract, quiet: float) -> Figures:
     """Means over motions of seconds, speed (m/s), energy, energy of the last second, and foot skate (m/s).
 
     frozen: the share whose last second has less energy than ``quiet``, see :func:`energy`. Speed and skate are left out

@@ -10,13 +10,13 @@ from scipy.spatial.distance import cdist
 
 from motet.models.describe import DescribeModel
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices, Mask
 from motet.search.model import Hit, Index, IndexSettings, Member, SearchModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, description_groups, unknown_words_allowed
-from motet_train.evaluate.tables import Report, gathered, read_goals
+from motet_train.evaluate.tables import Figures, Report, gathered, read_goals
 
 SEARCH_GOALS = read_goals("search")
 
@@ -59,7 +59,7 @@ def _search_parts(model: SearchModel, corpus: SplitStore, describe: DescribeMode
     yield {"motion": _nearest(model, looks, groups, test_motions)}
 
 
-def _nearest(model: SearchModel, looks: Looks, groups: Numbers, test_motions: Sequence[Motion]) -> dict[str, float]:
+def _nearest(model: SearchModel, looks: Looks, groups: Numbers, test_motions: Sequence[Motion]) -> Figures:
     """How often the training motion nearest to a test motion is described like it, by the model and by features."""
     corpus = looks.corpus
     # by the model, and by features
@@ -99,7 +99,7 @@ class _TestQueries:
         takes = np.array([entry.take or entry.name for entry in entries])
         return _TestQueries(sentences, rows, takes, groups[list(test)])
 
-    def figures(self, train_groups: Numbers) -> dict[str, float]:
+    def figures(self, train_groups: Numbers) -> Figures:
         """The number of sentences, the share with a known subject, and the best "first_5"."""
         query_groups = self.groups[self.rows]
         motions_alike = (query_groups[:, None] == self.groups).sum(axis=1)
@@ -109,7 +109,7 @@ class _TestQueries:
             "best_5": float(np.minimum(1, 5 / motions_alike).mean()),
         }
 
-    def ranks(self, prefix: str, order: NDArray[np.intp]) -> Report:
+    def ranks(self, prefix: str, order: Indices) -> Report:
         """Ranks of each sentence's motion and of those alike. order: (Q, N) test motions, best first."""
         return {
             f"{prefix}text": _ranks(self.takes[order] == self.takes[self.rows][:, None]),
@@ -117,7 +117,7 @@ class _TestQueries:
         }
 
 
-def _orders(model: SearchModel, corpus: SplitStore, sentences: Sequence[str]) -> NDArray[np.intp]:
+def _orders(model: SearchModel, corpus: SplitStore, sentences: Sequence[str]) -> Indices:
     """The test motions (Q, N) in the order in which sentences find them."""
     index = _index(model, corpus, corpus.parts.test)
     with unknown_words_allowed():
@@ -135,7 +135,7 @@ def _likelihoods(describe: DescribeModel, motions: Sequence[Motion], sentences: 
     return np.array(rows)
 
 
-def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> dict[str, float]:
+def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> Figures:
     """How well a score tells that no hit matches the query: sentences search for motions of their own part, motions for
     training motions. Each counts twice, the second time without the motions that have an equal description.
 
@@ -143,7 +143,7 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> dict[s
     settings: the share of right first hits that are accepted ("_kept"), and of wrong ones that are rejected ("_told").
     """
     settings = model.settings(IndexSettings)
-    figures: dict[str, float] = {}
+    figures: Figures = {}
     for kind, least in (("text", settings.like_text), ("motion", settings.like_motion)):
         # the limit that validation would choose
         if corpus.parts.validation:
@@ -159,7 +159,7 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> dict[s
 
 def _first_hits(
     model: SearchModel, corpus: SplitStore, part: Sequence[int], groups: Numbers, kind: str
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Array, Mask]:
     """The scores (Q,) of the first hits of a part's sentences or motions, and whether they are right."""
     searched = part if kind == "text" else corpus.parts.train
     index = _index(model, corpus, searched)
@@ -206,14 +206,14 @@ def _queries(corpus: SplitStore, part: Sequence[int]) -> tuple[list[int], list[s
     return rows, queries
 
 
-def _ranks(right: NDArray[np.bool_]) -> dict[str, float]:
+def _ranks(right: Mask) -> Figures:
     """By which hits (Q, N), best first, are right: the shares among the first, and the median rank."""
     ranks = right.argmax(axis=1) + 1
     shares = {f"first_{count}": float((ranks <= count).mean()) for count in (1, 5, 10)}
     return {**shares, "median_rank": float(np.median(ranks))}
 
 
-def _shares(nearest: Mapping[str, Numbers], test: Numbers, train: Numbers) -> dict[str, float]:
+def _shares(nearest: Mapping[str, Numbers], test: Numbers, train: Numbers) -> Figures:
     """The share of nearest motions described like the test motion, among those whose description is in training."""
     known = np.isin(test, train)
     shares = {key: float((groups == test)[known].mean()) if known.any() else np.nan for key, groups in nearest.items()}

@@ -2,26 +2,22 @@
 not."""
 
 from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.errors import TextWarning, collected
 from motet.generate.base import Generated, GenerateModel
 from motet.generate.model import Story
 from motet.text.clauses import stem
 from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.table import read_toml
-from motet_train.evaluate.tables import Report
+from motet_train.evaluate.tables import Figures, Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import track_of
 
-
-@cache
-def table() -> Mapping[str, Any]:
-    """bare.toml: "bare", commands with the rules that a motion must keep; "odd", stems of words for other acts."""
-    return read_toml(__file__, "bare.toml")
+BARE_COMMANDS = read_toml(__file__, "bare.toml")
+"""Commands with the rules that a motion must keep, "bare", and stems of words for other acts, "odd"."""
 
 
 def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
@@ -30,9 +26,9 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
 
     "bare_right" and "bare_unwarned" have them by command.
     """
-    right: dict[str, float] = {}
-    unwarned: dict[str, float] = {}
-    for row in table()["bare"]:
+    right: Figures = {}
+    unwarned: Figures = {}
+    for row in BARE_COMMANDS["bare"]:
         outcomes = [_outcome(model, row, seed) for seed in seeds]
         right[row["text"]] = float(np.mean([does for does, _ in outcomes]))
         unwarned[row["text"]] = float(np.mean([not does and not warned for does, warned in outcomes]))
@@ -47,10 +43,10 @@ def bare_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
 
 def _mean(shares: Mapping[str, float], kept: bool) -> float:
     """The mean over the half of the commands that is kept back, or over the other."""
-    return float(np.mean([shares[row["text"]] for row in table()["bare"] if row.get("kept", False) == kept]))
+    return float(np.mean([shares[row["text"]] for row in BARE_COMMANDS["bare"] if row.get("kept", False) == kept]))
 
 
-def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[bool, bool]:
+def _outcome(model: GenerateModel, row: Json, seed: int) -> tuple[bool, bool]:
     """Whether the motion of a command does what it says, and whether there was a warning."""
     with collected(TextWarning) as warnings:
         (generated,) = model.generate(row["text"], seed=seed)
@@ -58,11 +54,11 @@ def _outcome(model: GenerateModel, row: Mapping[str, Any], seed: int) -> tuple[b
     return does, bool(warnings)
 
 
-def odd_words(generated: Generated, row: Mapping[str, Any]) -> set[str]:
+def odd_words(generated: Generated, row: Json) -> set[str]:
     """The stems of words for other acts in the sentences of the actions that a motion shows."""
     shown = [generated.action]
     if isinstance(generated, Story):
         shown += [passage.action for passage in generated.passages]
     stems = set(map(stem, NEW_MODEL_RULES.words(" ".join(shown))))
     allowed = {*map(stem, NEW_MODEL_RULES.words(row["text"])), *row.get("also", ())}
-    return stems & set(table()["odd"]) - allowed
+    return stems & set(BARE_COMMANDS["odd"]) - allowed

@@ -1,23 +1,20 @@
 """Sentences that ask for several actions in a row: whether they are split correctly, and each part is shown in turn."""
 
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.generate.model import CodesModel, Story
 from motet_train.data.table import read_toml
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
 from motet_train.evaluate.text_adherence.track import Track, track_of
 
-
-@cache
-def table() -> Mapping[str, Any]:
-    """composed.toml: "composed", texts with the rules of each of their parts; "whole", texts that have no parts."""
-    return read_toml(__file__, "composed.toml")
+COMPOSED_TEXTS = read_toml(__file__, "composed.toml")
+"""Texts with the rules of each of their parts, "composed", and texts that have no parts, "whole"."""
 
 
 def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
@@ -26,13 +23,13 @@ def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
     split = []
     all_parts: list[list[bool]] = []
     orders = {}
-    for row in table()["composed"]:
+    for row in COMPOSED_TEXTS["composed"]:
         split.append(len(model.parts(row["text"])) == len(row["parts"]))
         motions = [_shown(model, row, seed) for seed in seeds]
         orders[row["text"]] = float(np.mean([all(parts) for parts in motions]))
         all_parts += motions
     # texts that must not be split
-    whole = [len(model.parts(text)) == 1 for text in table()["whole"]]
+    whole = [len(model.parts(text)) == 1 for text in COMPOSED_TEXTS["whole"]]
     return {
         "composed": {
             "split": float(np.mean(split)),
@@ -44,7 +41,7 @@ def composed_report(model: CodesModel, seeds: Sequence[int]) -> Report:
     }
 
 
-def _shown(model: CodesModel, row: Mapping[str, Any], seed: int) -> list[bool]:
+def _shown(model: CodesModel, row: Json, seed: int) -> list[bool]:
     """Whether each part of a composed text is shown in its passage. A motion with another number of passages is cut at
     tenths of its duration where most parts are shown."""
     (generated,) = model.generate(row["text"], seed=seed)

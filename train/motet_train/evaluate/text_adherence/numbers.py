@@ -1,11 +1,10 @@
 """Sentences with numbers: whether a motion turns, goes, steps, repeats and lasts as much as the sentence says."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.generate.base import GenerateModel
 from motet_train.data.table import read_toml
 from motet_train.evaluate.language.split_store import unknown_words_allowed
@@ -13,17 +12,14 @@ from motet_train.evaluate.positions import length, spells
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.rules import HAND_BONES
 from motet_train.evaluate.text_adherence.table import slide
-from motet_train.evaluate.text_adherence.track import RATE, Track, calm, pair, swings, track_of
+from motet_train.evaluate.text_adherence.track import RATE, Track, calm, swings, track_of
 
 BARS = {"degrees": (0.1, 0.0), "metres": (0.1, 0.0), "steps": (0.0, 1.0), "times": (0.0, 0.0), "seconds": (0.0, 0.1)}
 """Kind of number -> tolerances: a share of the number, and an amount."""
 
 
-@cache
-def table() -> Sequence[Mapping[str, Any]]:
-    """The rows of numbers.toml."""
-    rows: Sequence[Mapping[str, Any]] = read_toml(__file__, "numbers.toml")["number"]
-    return rows
+NUMBERS: Sequence[Json] = read_toml(__file__, "numbers.toml")["number"]
+"""The rows of the table of sentences with numbers."""
 
 
 def numbers_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
@@ -32,7 +28,7 @@ def numbers_report(model: GenerateModel, seeds: Sequence[int]) -> Report:
     shares = {}
     kind_shares: dict[str, list[float]] = {kind: [] for kind in BARS}
     slides = []
-    for row in table():
+    for row in NUMBERS:
         tracks = _tracks(model, row["text"], seeds)
         share = float(np.mean([met(track, row) for track in tracks]))
         shares[row["text"]] = share
@@ -53,7 +49,7 @@ def _tracks(model: GenerateModel, text: str, seeds: Sequence[int]) -> list[Track
         return [track_of(model.generate(text, seed=seed)[0].motion) for seed in seeds]
 
 
-def met(track: Track, row: Mapping[str, Any]) -> bool:
+def met(track: Track, row: Json) -> bool:
     """Whether a motion has the number of a row of the table, within the tolerances."""
     kind = next(kind for kind in BARS if kind in row)
     value = measured(track, kind, row.get("act", ""))
@@ -78,8 +74,7 @@ def measured(track: Track, kind: str, act: str = "") -> float:
 def steps(track: Track) -> int:
     """How often a foot moves over the ground by at least 15 cm while it is faster than 0.4 m/s."""
     count = 0
-    for name in pair("Foot"):
-        places = track.joint(name)[:, [0, 2]]
+    for places in track.joints("Foot")[..., [0, 2]]:
         # while the foot is fast
         speeds = calm(length(np.diff(places, axis=0)) * RATE, 0.1)
         fast = np.concatenate([[False], speeds > 0.4])
@@ -97,8 +92,7 @@ def jumps(track: Track) -> int:
 
 def jumping_jacks(track: Track) -> int:
     """How often both hands go above the shoulders and come down again."""
-    up = np.greater(track.heights("Hand"), track.heights("UpperArm")).all(axis=0)
-    return len(spells(np.asarray(up)))
+    return len(spells(track.hands_up))
 
 
 def kicks(track: Track) -> int:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
 
+from motet.bundle.fields import Json
 from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.motion.motion import Motion
@@ -41,7 +41,7 @@ class Prompt:
 
     text: str
     group: str
-    rules: Sequence[Mapping[str, Any]]
+    rules: Sequence[Json]
     shown: Sequence[str]
     aside: Sequence[str]
     walk: bool = False
@@ -64,7 +64,7 @@ class Prompt:
         return False
 
 
-def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
+def holds(track: Track, rules: Sequence[Json]) -> bool:
     """Whether a motion passes all of some rules."""
     if track.seconds < SHORTEST_SHOWN:
         return False
@@ -76,20 +76,13 @@ def holds(track: Track, rules: Sequence[Mapping[str, Any]]) -> bool:
     return True
 
 
-@cache
-def _table() -> Mapping[str, Any]:
-    return read_toml(__file__, "prompts.toml")
+_TABLE = read_toml(__file__, "prompts.toml")
 
+EVERYDAY_PROMPTS = tuple(Prompt(**row) for row in _TABLE["prompt"])
+"""All prompts, in the order of the file."""
 
-@cache
-def prompts() -> tuple[Prompt, ...]:
-    """All prompts, in the order of the file."""
-    return tuple(Prompt(**row) for row in _table()["prompt"])
-
-
-def outside() -> tuple[str, ...]:
-    """Everyday sentences about actions that no recorded trial shows."""
-    return tuple(_table()["outside"])
+OUTSIDE: Sequence[str] = _TABLE["outside"]
+"""Everyday sentences about actions that no recorded trial shows."""
 
 
 @cache

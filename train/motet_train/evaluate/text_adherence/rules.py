@@ -16,10 +16,6 @@ VELOCITY_COLUMNS = {"forward": (0, 1), "backward": (0, -1), "left": (1, 1), "rig
 CLEAR = 0.1
 """Metres above which a foot is clearly off the ground; in a run both feet are only for a moment."""
 
-SHORTEST_FLIGHT = 0.12
-LONGEST_FLIGHT = 0.9
-"""Seconds of a jump: shorter flights are running steps, in longer ones the figure stands on something."""
-
 HAND_BONES = pair("Hand")
 
 
@@ -123,7 +119,8 @@ def jumps(track: Track, rise: float, count: int = 1, metres: float = 0.0, most_m
     for start, stop in spells(track.soles.min(axis=1) > CLEAR):
         seconds = (stop - start) / RATE
         lands = start > 0 and stop < len(track)
-        if not lands or not SHORTEST_FLIGHT <= seconds <= LONGEST_FLIGHT:
+        # shorter flights are running steps, in longer ones the figure stands on something
+        if not lands or not 0.12 <= seconds <= 0.9:
             continue
         high = hips[start:stop].max() - standing_hips >= rise
         distance = np.linalg.norm(track.path[stop] - track.path[start - 1])
@@ -166,8 +163,7 @@ def jumping_jacks(track: Track, count: int) -> bool:
     """At least ``count`` times the feet are half a metre apart sideways while both hands are above the shoulders."""
     left, right = track.bodies("Foot")
     wide = np.abs(left[:, 0] - right[:, 0]) >= 0.5
-    up = np.greater(track.heights("Hand"), track.heights("UpperArm")).all(axis=0)
-    return len(spells(wide & up)) >= count
+    return len(spells(wide & track.hands_up)) >= count
 
 
 def lifts_feet(track: Track, height: float) -> bool:
@@ -183,16 +179,15 @@ def steps_a_second(track: Track, least: float) -> bool:
 
 def raises(track: Track, side: str, above: float, seconds: float = 0.3) -> bool:
     """A hand is a number of metres above the head's joint, at about the mouth, for a while; "both": at once."""
-    up = [hand - track.height("head") >= above for hand in track.heights("Hand")]
+    up = track.heights("Hand") - track.height("head") >= above
     return longest(_hands(up, side)) >= seconds
 
 
 def waves(track: Track, count: int) -> bool:
     """A raised hand, above its elbow and at about shoulder height, goes from side to side ``count`` times, by 10 cm."""
-    parts = zip(track.bodies("Hand"), track.heights("LowerArm"), track.heights("UpperArm"), strict=True)
-    for hand, elbow_height, shoulder_height in parts:
-        raised = hand[:, 1] > np.maximum(elbow_height, shoulder_height - 0.1)
-        if any(swings(hand[start:stop, 0], 0.1) >= count for start, stop in spells(raised)):
+    raised = track.heights("Hand") > np.maximum(track.heights("LowerArm"), track.heights("UpperArm") - 0.1)
+    for hand, hand_raised in zip(track.bodies("Hand"), raised, strict=True):
+        if any(swings(hand[start:stop, 0], 0.1) >= count for start, stop in spells(hand_raised)):
             return True
     return False
 
@@ -217,7 +212,7 @@ def _thrust(track: Track, hand: str) -> Array:
 
 def reaches_down(track: Track, most: float, side: str = "either") -> bool:
     """A hand comes down to a number of metres above the ground for a moment."""
-    return longest(_hands([hand <= most for hand in track.heights("Hand")], side)) >= 0.1
+    return longest(_hands(track.heights("Hand") <= most, side)) >= 0.1
 
 
 def wipes(track: Track, count: int) -> bool:
@@ -234,21 +229,17 @@ def wipes(track: Track, count: int) -> bool:
 
 def to_mouth(track: Track) -> bool:
     """A hand is at the mouth for half a second, the other one lower than the chest."""
-    head = track.joint("head")
-    near = [length(track.joint(name) - head) < 0.42 for name in HAND_BONES]
-    low = [hand < track.height("chest") + 0.05 for hand in track.heights("Hand")]
-    return max(longest(near[0] & low[1]), longest(near[1] & low[0])) >= 0.5
+    near = length(track.joints("Hand") - track.joint("head")) < 0.42
+    low = track.heights("Hand") < track.height("chest") + 0.05
+    return max(map(longest, near & low[::-1])) >= 0.5
 
 
 def on_guard(track: Track, share: float = 0.5) -> bool:
     """Both hands are in front of the chest, between its height and the mouth, for a share of the time."""
-    low = track.height("chest") - 0.1
-    high = track.height("head") + 0.05
-    guards = []
-    for hand in track.bodies("Hand"):
-        height = hand[:, 1]
-        guards.append((height > low) & (height < high) & (hand[:, 2] > 0.1))
-    return bool((guards[0] & guards[1]).mean() >= share)
+    heights = track.heights("Hand")
+    between = (heights > track.height("chest") - 0.1) & (heights < track.height("head") + 0.05)
+    guards = between & (track.bodies("Hand")[..., 2] > 0.1)
+    return bool(guards.all(axis=0).mean() >= share)
 
 
 def hands_together(track: Track, most: float, share: float = 0.5) -> bool:
@@ -265,11 +256,9 @@ def arms_ahead(track: Track) -> bool:
     """Both arms are stretched out to the front at about shoulder height for half of the time."""
     bones = [HUMANOID.offsets[HUMANOID.index(name)] for name in ("leftLowerArm", "leftHand")]
     arm_length = sum(np.linalg.norm(bone) for bone in bones)
-    stretched = []
-    for hand, shoulder in zip(track.bodies("Hand"), track.bodies("UpperArm"), strict=True):
-        offset = hand - shoulder
-        stretched.append((offset[:, 2] > 0.6 * arm_length) & (np.abs(offset[:, 1]) < 0.3))
-    return bool((stretched[0] & stretched[1]).mean() >= 0.5)
+    offsets = track.bodies("Hand") - track.bodies("UpperArm")
+    stretched = (offsets[..., 2] > 0.6 * arm_length) & (np.abs(offsets[..., 1]) < 0.3)
+    return bool(stretched.all(axis=0).mean() >= 0.5)
 
 
 def swings_arms(track: Track, count: int, metres: float = 0.2) -> bool:
@@ -309,14 +298,11 @@ def crouches(track: Track, when: str = "any", hips: float = 0.65) -> bool:
     part = _part(track, when)
     hips_height = part.height("hips")
     low = (hips_height < hips) & (part.height("head") > hips_height + 0.25)
-    cosines = []
-    for side in LEFT_RIGHT:
-        knee = part.joint(sided(side, "LowerLeg"))
-        # the angle at the knee
-        thigh = direction(part.joint(sided(side, "UpperLeg")) - knee)
-        shin = direction(part.joint(sided(side, "Foot")) - knee)
-        cosines.append((thigh * shin).sum(axis=-1))
-    bent = np.maximum(*cosines) > np.cos(np.radians(110))
+    # the angles at both knees
+    knees = part.joints("LowerLeg")
+    thighs = direction(part.joints("UpperLeg") - knees)
+    shins = direction(part.joints("Foot") - knees)
+    bent = (thighs * shins).sum(axis=-1).max(axis=0) > np.cos(np.radians(110))
     return _for_a_while(low & bent)
 
 
@@ -343,14 +329,12 @@ def comes_up(track: Track, metres: float) -> bool:
 
 def sits(track: Track) -> bool:
     """Sits on a seat for a second, at rest: the thighs within 50 degrees of level, the hips behind a foot."""
-    seated: Flags = (track.height("hips") > 0.45) & (track.pace < 0.3)
+    at_rest = (track.height("hips") > 0.45) & (track.pace < 0.3)
     highest_knee = np.sin(np.radians(50)) * 0.42  # metres from the hip, by the length of a thigh
-    foot_ahead = np.full(len(track), -np.inf)
-    parts = zip(track.bodies("UpperLeg"), track.bodies("LowerLeg"), track.bodies("Foot"), strict=True)
-    for hip, knee, foot in parts:
-        seated &= np.abs(hip[:, 1] - knee[:, 1]) < highest_knee
-        foot_ahead = np.maximum(foot_ahead, foot[:, 2] - hip[:, 2])
-    return longest(seated & (foot_ahead > 0.2)) >= 1.0
+    rises = np.abs(track.heights("UpperLeg") - track.heights("LowerLeg"))
+    level_thighs = (rises < highest_knee).all(axis=0)
+    foot_ahead = (track.bodies("Foot") - track.bodies("UpperLeg"))[..., 2].max(axis=0)
+    return longest(at_rest & level_thighs & (foot_ahead > 0.2)) >= 1.0
 
 
 def bends(track: Track, degrees: float, seconds: float) -> bool:
@@ -401,7 +385,7 @@ def still(track: Track) -> bool:
 def sways(track: Track, count: int, metres: float = 0.1) -> bool:
     """The trunk goes from side to side above the feet ``count`` times, by a number of metres."""
     # the chest, sideways from the middle of the feet
-    feet = np.mean(track.bodies("Foot"), axis=0)[:, 0]
+    feet = track.bodies("Foot")[..., 0].mean(axis=0)
     sideways = track.body("upperChest")[:, 0] - feet
     return swings(calm(sideways, 0.2), metres) >= count
 
@@ -414,7 +398,7 @@ def twists(track: Track, count: int, degrees: float = 40.0) -> bool:
 
 def _yaw(track: Track, part: str) -> Array:
     """The angle (T,) about y of the line from the right to the left joint of a part, radians."""
-    across = np.subtract(*map(track.joint, pair(part)))
+    across = np.subtract(*track.joints(part))
     yaw: Array = np.arctan2(-across[:, 2], across[:, 0])
     return yaw
 
@@ -426,12 +410,9 @@ def climbs(track: Track, metres: float) -> bool:
 
 def feet_stay(track: Track, most: float = 0.15) -> bool:
     """Each foot stays within a number of metres of its median place on the ground."""
-    for name in pair("Foot"):
-        foot = track.joint(name)[:, [0, 2]]
-        distances = length(foot - np.median(foot, axis=0))
-        if np.percentile(distances, 95) > most:
-            return False
-    return True
+    feet = track.joints("Foot")[..., [0, 2]]
+    distances = length(feet - np.median(feet, axis=1, keepdims=True))
+    return bool((np.percentile(distances, 95, axis=1) <= most).all())
 
 
 def lasts(track: Track, seconds: float) -> bool:
@@ -441,17 +422,13 @@ def lasts(track: Track, seconds: float) -> bool:
 
 def _between_hands(track: Track) -> Array:
     """The distance (T,) between the wrists, metres."""
-    return length(np.subtract(*map(track.joint, HAND_BONES)))
+    return length(np.subtract(*track.joints("Hand")))
 
 
-def _hands(flags: list[Flags], side: str) -> Flags:
-    """The flags (T,) of one hand, of either or of both, by those of the left and the right one."""
+def _hands(flags: Flags, side: str) -> Flags:
+    """The flags (T,) of one hand, of either or of both, by those (2, T) of the left and the right one."""
     left, right = flags
-    if side == "left":
-        return left
-    if side == "right":
-        return right
-    return left | right if side == "either" else left & right
+    return np.asarray({"left": left, "right": right, "either": left | right, "both": left & right}[side])
 
 
 def _part(track: Track, when: str) -> Track:

@@ -21,8 +21,8 @@ from motet_train.data.errors import DataError
 from motet_train.evaluate.figures import Drawings, strips
 from motet_train.evaluate.language.split_store import unknown_words_allowed
 from motet_train.evaluate.positions import BALLS, jerk, length, skate
-from motet_train.evaluate.tables import Report, aligned, read_goals, report_table, short_names
-from motet_train.evaluate.text_adherence.prompts import SHORTEST_SHOWN, LookUp, Prompt, Trial, actions, prompts
+from motet_train.evaluate.tables import Figures, Report, aligned, read_goals, report_table, short_names
+from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, SHORTEST_SHOWN, LookUp, Prompt, Trial, actions
 from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
 
 SAYS_GOALS = read_goals("says")
@@ -32,8 +32,6 @@ CHOICES = 32
 
 Vectors = Mapping[str, Floats]
 """The text of a prompt -> vectors (N, E) of motions from :func:`embedded`."""
-
-Figures = dict[str, float]
 
 Generator = Callable[[str, int], Motion]
 """Makes a motion of a human figure from a sentence and a seed; TextError for a sentence that it does not accept."""
@@ -67,18 +65,18 @@ def says_table(
     # every source for every prompt, and what recorded trials show
     rows, vectors = _measured(sources, search)
     if train_trials:
-        rows["_real"] = {prompt.text: _real(prompt, trials) for prompt in prompts()}
-    known = list(_trials_shown(prompts(), train_trials))
+        rows["_real"] = {prompt.text: _real(prompt, trials) for prompt in EVERYDAY_PROMPTS}
+    known = list(_trials_shown(EVERYDAY_PROMPTS, train_trials))
     report: Report = {}
     for kind, figures in rows.items():
         report |= _groups(kind, figures, known)
 
     # what only trials and a space tell
     if train_trials:
-        report["prompt_others"] = {prompt.text: _passed_by_others(prompt, trials) for prompt in prompts()}
+        report["prompt_others"] = {prompt.text: _passed_by_others(prompt, trials) for prompt in EVERYDAY_PROMPTS}
         report["quality"] |= _ratios(rows[""], rows["_real"])
     if search is not None:
-        report |= space_report(search, prompts(), vectors, trials)
+        report |= space_report(search, EVERYDAY_PROMPTS, vectors, trials)
     return report
 
 
@@ -98,7 +96,7 @@ def _measured(
     vectors in the space of a search model."""
     rows: dict[str, dict[str, Figures]] = {kind: {} for kind in sources}
     vectors: dict[str, dict[str, Floats]] = {kind: {} for kind in sources}
-    for prompt in tqdm(prompts(), unit=" prompts", disable=None, leave=False):
+    for prompt in tqdm(EVERYDAY_PROMPTS, unit=" prompts", disable=None, leave=False):
         # prompt by prompt, so that motions need not be kept
         for kind, (source, count) in sources.items():
             motions = _motions(source, prompt, count)
@@ -191,7 +189,7 @@ def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
     """The means over groups of prompts, the mean quality, and the turns and shares of each prompt."""
     # the prompts of each group
     groups: dict[str, list[str]] = {"all": [], "locomotion": [], "rest": []}
-    for prompt in prompts():
+    for prompt in EVERYDAY_PROMPTS:
         groups["all"].append(prompt.text)
         groups[prompt.group].append(prompt.text)
     if known:
@@ -199,7 +197,7 @@ def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
 
     # means over these, and figures of single prompts
     shares = {text: row["share"] for text, row in rows.items()}
-    turns = {prompt.text: rows[prompt.text]["turn"] for prompt in prompts() if prompt.turns}
+    turns = {prompt.text: rows[prompt.text]["turn"] for prompt in EVERYDAY_PROMPTS if prompt.turns}
     says = {}
     for name, texts in groups.items():
         says[name] = _mean([shares[text] for text in texts])
@@ -323,7 +321,7 @@ def rivals(candidates: Sequence[Prompt]) -> list[list[int]]:
     return [np.flatnonzero(row).tolist() for row in apart]
 
 
-def r_precision(similarity: Array, rival_similarity: Array) -> dict[str, float]:
+def r_precision(similarity: Array, rival_similarity: Array) -> Figures:
     """R-precision by the similarity of motions to their own prompt (N,) and to each of its rivals (N, K).
 
     Guo et al. draw 31 rivals for each motion. This is the mean over all draws, so nothing depends on a seed: if b of K
@@ -359,7 +357,7 @@ def frechet(first: Floats, second: Floats) -> float:
     return float(((m - n) ** 2).sum() + (a**2).sum() + (b**2).sum() - 2 * cross_trace)
 
 
-def _precisions(vectors: Vectors, candidates: Sequence[Prompt], texts: Floats) -> dict[str, float]:
+def _precisions(vectors: Vectors, candidates: Sequence[Prompt], texts: Floats) -> Figures:
     """The means over the prompts that have vectors."""
     rows = []
     for column, (prompt, others) in enumerate(zip(candidates, rivals(candidates), strict=True)):
@@ -395,7 +393,7 @@ def says_text(reports: Mapping[str, Report]) -> str:
             columns[key] = first[f"prompt_{key}"]
 
     rows = [["%", *columns]]
-    for prompt in prompts():
+    for prompt in EVERYDAY_PROMPTS:
         rows.append([prompt.text, *(_per_cent(shares[prompt.text]) for shares in columns.values())])
 
     # all other figures
@@ -409,17 +407,17 @@ def _per_cent(share: float) -> str:
     return "" if np.isnan(share) else f"{100 * share:.0f}"
 
 
-def says_drawings(generator: Generator, every: int = 8) -> Drawings:
+def says_drawings(generator: Generator) -> Drawings:
     """Every eighth prompt whose motion of seed 0 passes, or else the next one that passes before the eighth after it;
     the title has the number of prompts that were passed over."""
-    return {"says": lambda: _strips_of_passed(generator, every)}
+    return {"says": lambda: _strips_of_passed(generator)}
 
 
-def _strips_of_passed(generator: Generator, every: int) -> Figure:
+def _strips_of_passed(generator: Generator) -> Figure:
     motions: dict[str, Motion] = {}
     failed = 0
-    for start in range(0, len(prompts()), every):
-        for prompt in prompts()[start : start + every]:
+    for start in range(0, len(EVERYDAY_PROMPTS), 8):
+        for prompt in EVERYDAY_PROMPTS[start : start + 8]:
             motion = generator(prompt.text, 0)
             if prompt.passes(track_of(motion)):
                 motions[prompt.text] = motion

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motet.figures.humanoid import HUMANOID, LEFT_RIGHT, on_humanoid, sided
+from motet.figures.humanoid import HUMANOID, on_humanoid, sided
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion, resampled
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices
 from motet_train.data.errors import DataError
 from motet_train.evaluate.positions import Flags, length, running_mean, spells
 
@@ -36,7 +35,7 @@ class Track:
         """Its duration."""
         return len(self) / RATE
 
-    def frames(self, which: slice | NDArray[np.intp]) -> "Track":
+    def frames(self, which: slice | Indices) -> "Track":
         """Some of the frames, above the same ground."""
         part = Track(self.points[which])
         part.__dict__["ground"] = self.ground
@@ -61,10 +60,13 @@ class Track:
         """Height (T,) of a joint above the ground."""
         return self.joint(name)[:, 1] - self.ground
 
-    def heights(self, part: str) -> tuple[Array, Array]:
-        """Heights (T,) of the left and the right joint of a part above the ground."""
-        left, right = map(self.height, pair(part))
-        return left, right
+    def joints(self, part: str) -> Array:
+        """Positions (2, T, 3) of the left and the right joint of a part."""
+        return np.stack([self.joint(name) for name in pair(part)])
+
+    def heights(self, part: str) -> Array:
+        """Heights (2, T) of the left and the right joint of a part above the ground."""
+        return self.joints(part)[..., 1] - self.ground
 
     @cached_property
     def soles(self) -> Array:
@@ -73,6 +75,11 @@ class Track:
         heights = [self.heights(part) for part in ("Foot", "Toes", "Toes_end")]
         lowest: Array = np.min(heights, axis=0).T
         return lowest
+
+    @property
+    def hands_up(self) -> Flags:
+        """When (T,) both hands are above the shoulders."""
+        return np.asarray((self.heights("Hand") > self.heights("UpperArm")).all(axis=0))
 
     @cached_property
     def path(self) -> Array:
@@ -94,8 +101,8 @@ class Track:
 
     def _across(self, part: str) -> Array:
         """The line (T, 2) over the ground from the right to the left joint of a part."""
-        left, right = map(self.joint, pair(part))
-        return left[:, [0, 2]] - right[:, [0, 2]]
+        left, right = self.joints(part)[..., [0, 2]]
+        return np.asarray(left - right)
 
     @property
     def turn(self) -> float:
@@ -136,10 +143,9 @@ class Track:
         front = x * sin + z * cos
         return np.stack([left, self.height(name), front], axis=1)
 
-    def bodies(self, part: str) -> tuple[Array, Array]:
-        """The left and the right joint of a part as :meth:`body` gives them."""
-        left, right = map(self.body, pair(part))
-        return left, right
+    def bodies(self, part: str) -> Array:
+        """The left and the right joint (2, T, 3) of a part as :meth:`body` gives them."""
+        return np.stack([self.body(name) for name in pair(part)])
 
     def motion_of(self, name: str, beside: str = "hips") -> Array:
         """Speed (T,) of a joint relative to another one, m/s, averaged over a tenth of a second."""
@@ -156,13 +162,12 @@ def track_of(motion: Motion) -> Track:
 
 def pair(part: str) -> tuple[str, str]:
     """The names of the left and the right joint of a part."""
-    left, right = (sided(side, part) for side in LEFT_RIGHT)
-    return left, right
+    return sided("left", part), sided("right", part)
 
 
 def direction(vectors: Array) -> Array:
-    """Vectors (T, N), normalised."""
-    return vectors / np.maximum(length(vectors), 1e-9)[:, None]
+    """Vectors (..., N), normalised."""
+    return vectors / np.maximum(length(vectors), 1e-9)[..., None]
 
 
 def _unwrapped_angles(across: Array) -> Array:

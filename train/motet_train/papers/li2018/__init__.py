@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from motet.bundle.fields import Json
 from motet_train.models.net import configured
 from motet_train.papers.li2018 import convseq2seq, recurrent, srnn
 from motet_train.papers.li2018.stepwise import Stepwise
@@ -30,7 +31,7 @@ SYSTEMS: Mapping[str, tuple[type[Any], type[Any], str]] = {
 """Name of a model -> the system, its configuration (a dataclass), and its name in help texts."""
 
 
-def from_config(name: str, config: Mapping[str, Any]) -> Stepwise:
+def from_config(name: str, config: Json) -> Stepwise:
     """The net of a manifest's configuration."""
     kind, sizes, _ = SYSTEMS[name]
     system = kind(configured(sizes, config["system"]))

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from motet.bundle.graph import Floats
 from motet.errors import FormatError
 from motet.formats.text import naming, numbers
 from motet.motion.rotations import Array
@@ -323,7 +323,7 @@ def validation_files(corpus: ExpmapCorpus) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _sequence(frames: Array) -> NDArray[np.float32]:
+def _sequence(frames: Array) -> Floats:
     return frames[1:].astype(np.float32)  # a file's first frame can be a T-pose that was added
 
 

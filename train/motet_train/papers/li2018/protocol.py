@@ -6,7 +6,6 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.motion.rotations import Array, rotmat_to_rotvec, rotvec_to_rotmat
 from motet.predict.model import PredictModel
@@ -101,10 +100,6 @@ def windows(motions: Sequence[Array], count: int = 8, layout: Layout = CMU_LAYOU
     frames = [motion[::STRIDE] for motion in motions]
     starts = window_starts([len(motion) for motion in frames], count, layout.first, layout.room)
     return np.stack([frames[motion][start : start + PROTOCOL_WINDOW] for motion, start in starts])
-
-
-def _cut(frames: Array, starts: NDArray[np.int64]) -> Array:
-    return np.asarray(frames[starts[:, None] + np.arange(PROTOCOL_WINDOW)])
 
 
 def window_errors(predicted: Array, truth: Array) -> Array:
@@ -219,7 +214,7 @@ def training_windows(corpus: ExpmapCorpus) -> list[Array]:
             frames = motion[1::STRIDE]  # a file's first frame can be a T-pose that was added
             if len(frames) >= PROTOCOL_WINDOW:
                 starts = np.linspace(0, len(frames) - PROTOCOL_WINDOW, 8).astype(int)
-                group_windows.append(_cut(frames, starts))
+                group_windows.append(frames[starts[:, None] + np.arange(PROTOCOL_WINDOW)])
         if group_windows:
             by_group.append(scaling.with_constants(np.concatenate(group_windows)))
     return by_group

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
 
+from motet.bundle.fields import Json
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
@@ -117,7 +118,7 @@ def _learner(net: Stepwise, config: Any, windows: Windows, job: Job) -> Gradient
     def batches(rng: np.random.Generator) -> Iterator[Tensor]:
         yield windows.draw(training.batch, rng)
 
-    def validated() -> dict[str, Any]:
+    def validated() -> Json:
         return {"validation": round(validation_error(learner.kept, windows.material), 6)}
 
     def loss(windows: Tensor) -> Terms:

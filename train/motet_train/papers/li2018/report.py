@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from motet.bundle.fields import Json
 from motet.motion.rotations import Array
 from motet.predict.model import PredictModel
 from motet_train.data.errors import DataError
@@ -43,8 +44,11 @@ Models = Mapping[str, PredictModel]
 Groups = Mapping[str, Sequence[str]]
 """Title of a group of runs that differ only in their seed -> their names."""
 
-Errors = Mapping[str, Mapping[tuple[str, str], Array]]
-"""System -> FEW, MANY or ANGLE_ERRORS, and an action or MEAN -> error (25,)."""
+Parts = Mapping[tuple[str, str], Array]
+"""FEW, MANY or ANGLE_ERRORS, and an action or MEAN -> error (25,)."""
+
+Errors = Mapping[str, Parts]
+"""System -> its errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +103,7 @@ class Results:
         return figures
 
 
-def _nested(parts: Mapping[tuple[str, str], Array]) -> dict[str, Any]:
+def _nested(parts: Parts) -> Json:
     nested: dict[str, Any] = {}
     for (kind, action), error in parts.items():
         nested.setdefault(kind, {})[action] = by_frame(error)
@@ -114,7 +118,7 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
     # windows of the test files
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
-    measured: dict[str, Mapping[tuple[str, str], Array]] = {}
+    measured: dict[str, Parts] = {}
     with tqdm(systems.items(), unit=" systems", disable=None, leave=False) as bar:
         for name, system in bar:
             few = predictions(system, test, scaling, 8, corpus.layout)
@@ -280,7 +284,7 @@ def harness_table(models: Models, groups: Groups) -> str:
     return aligned(rows)
 
 
-def _range(trainings: Sequence[Mapping[str, Any]], key: str) -> str:
+def _range(trainings: Sequence[Json], key: str) -> str:
     """The least and the largest value of an entry, or the only one."""
     values = {training[key] for training in trainings if key in training}
     return "-".join(map(str, sorted({min(values), max(values)}))) if values else ""
@@ -298,7 +302,7 @@ def cost_table(models: Models, groups: Groups) -> str:
     return aligned(rows, left=(0, 3))
 
 
-def _machine(training: Mapping[str, Any]) -> str:
+def _machine(training: Json) -> str:
     threads = training.get("threads")
     machine: str = training.get("machine", "")
     return machine if threads is None else f"{machine}, threads: {threads}"

@@ -137,8 +137,7 @@ class SRNN(Taught):
         super().__init__()
         self.config = config
         # the channels of each type
-        spine, *limbs = config.parts
-        channels = {"spine": [spine], "arm": limbs[:2], "leg": limbs[2:]}
+        channels = {"spine": config.parts[:1], "arm": config.parts[1:3], "leg": config.parts[3:]}
         widths = {name: len(parts[0]) for name, parts in channels.items()}
         self.edges = nn.ModuleDict({name: Edge(_edge_width(name, widths), config) for name in EDGES})
         self.nodes = nn.ModuleDict({name: Node(widths[name], config) for name in NODES})
@@ -149,8 +148,8 @@ class SRNN(Taught):
             "edges": (sum(EDGES.values()), 2 * config.units),
             "nodes": (sum(NODES.values()), 2 * config.units),
         }
-        places = torch.tensor(list(chain.from_iterable(config.parts))).argsort()
-        constants(self, places=places, **{name: torch.tensor(parts) for name, parts in channels.items()})
+        order = torch.tensor(list(chain.from_iterable(config.parts)))
+        constants(self, places=order.argsort(), **{name: torch.tensor(parts) for name, parts in channels.items()})
 
     def begin(self, seed: Tensor) -> State:
         """The RNNs have seen all seed frames, of which there are at least two, but the last."""

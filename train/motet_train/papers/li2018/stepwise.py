@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec
-from motet_train.models.net import Graphs, Net, Part, constants, float_rows, normalised
+from motet_train.models.net import Graphs, Net, constants, encoder_and_step, float_rows, normalised
 
 State = dict[str, Tensor]
 """The state of a system by name, each part (B, ...)."""
@@ -180,7 +180,7 @@ class Stepwise(Net):
         next_state = float_rows("next_state", carried)
         step = GraphSpec((context, state), (frame, next_state), {"state": "next_state"})
         encoder = GraphSpec((frames,), (context, state))
-        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+        return encoder_and_step(self, encoder, step)
 
 
 def _rows(state: State, shapes: Shapes) -> list[Tensor]:

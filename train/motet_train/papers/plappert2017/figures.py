@@ -4,11 +4,10 @@ import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from sklearn.manifold import TSNE
 
+from motet.bundle.graph import Floats
 from motet.generate.base import GenerateModel
 from motet.models.describe import DescribeModel
 from motet.representation.root_block import from_root_block
@@ -71,7 +70,7 @@ def losses(run: Path) -> Figure:
 class Contexts:
     """Context vectors (N, C) laid out in a plane by t-SNE, once for all pictures of them."""
 
-    def __init__(self, vectors: NDArray[np.float32]) -> None:
+    def __init__(self, vectors: Floats) -> None:
         perplexity = min(30.0, (len(vectors) - 1) / 3)
         self.places = TSNE(2, perplexity=perplexity, init="pca", random_state=0).fit_transform(vectors)
 

@@ -16,7 +16,7 @@ from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import LanguageNet, SummaryHead
-from motet_train.models.net import Graphs, Part, before, float_rows, id_rows, normalised
+from motet_train.models.net import Graphs, before, encoder_and_step, float_rows, id_rows, normalised
 from motet_train.models.recurrent import GATES, GRU, Decoder, Encoder, WordEmbedding, mask
 
 
@@ -262,4 +262,4 @@ class LanguageToMotion(LanguageNet):
         )
         step = GraphSpec((frame, context, state), outputs, {"state": "next_state"})
         encoder = GraphSpec((words, lengths), (context,))
-        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+        return encoder_and_step(self, encoder, step)

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motet.errors import MotionError
 from motet.formats import READABLE, read_motion
 from motet.motion.kinematics import skeleton_of, without_heading
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices
 from motet.motion.skeleton import LEFT, MIDDLE, Skeleton, sides_of
 from motet.representation.base import phases
 from motet.representation.retargeting import in_joints_of
@@ -19,6 +18,9 @@ from motet_train.data.cmu_trials import CMU_CLIPS, CMU_LICENCE, cmu_trial
 from motet_train.data.errors import DataError
 
 TRUNK_PART = "trunk"
+
+Sequences = Mapping[str, Sequence[Array]]
+"""Label -> sequences (T, D) of frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +133,7 @@ class BodyParts:
     """
 
     names: tuple[str, ...]
-    of_channel: NDArray[np.intp]
+    of_channel: Indices
     legs: tuple[int, ...]
 
 

@@ -7,19 +7,18 @@ D channels, L labels.
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
 from motet.figures.feet.contacts import lay_root_path
 from motet.figures.humanoid import map_of
 from motet.motion.kinematics import positions, skeleton_of
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices, Mask
 from motet_train.evaluate.positions import acceleration, arrival, leap, slide, speed, stances
+from motet_train.evaluate.tables import Figures
 from motet_train.papers.tdbn.clips import period
 from motet_train.papers.tdbn.study import Codes, ControlStudy, Recording, Reference, upsample
-
-Figures = dict[str, float]
 
 
 def limit_cycle(study: ControlStudy, role: str = "walk", seconds: float = 60.0) -> Figures:
@@ -93,9 +92,7 @@ def late_left_leg(study: ControlStudy, starts: int) -> tuple[Array, Array]:
     return run.frames, np.abs((phase - in_step + 0.5) % 1 - 0.5)
 
 
-def _forced(
-    study: ControlStudy, recorded: Recording, times: list[int], delay: int, leg_codes: NDArray[np.intp]
-) -> Recording:
+def _forced(study: ControlStudy, recorded: Recording, times: list[int], delay: int, leg_codes: Indices) -> Recording:
     """Walk on from times of a recorded walk, a leg's codes replaced by the recorded ones ``delay`` frames earlier."""
 
     def force(time: int, codes: Codes) -> None:
@@ -106,7 +103,7 @@ def _forced(
     return study.play(study.start(recorded.histories(times, study.model.taps)), walk, force)
 
 
-def _leg_phase(reference: Reference, frames: Array, loop: Array, leg: NDArray[np.intp], cycle: float) -> Array:
+def _leg_phase(reference: Reference, frames: Array, loop: Array, leg: Indices, cycle: float) -> Array:
     """Phase in cycles (T-2, B) of one leg: the best match of three frames of its angles on a loop (N, D)."""
     # windows of three frames at each point of one cycle of the upsampled loop
     points = round(cycle * 4)
@@ -178,7 +175,7 @@ def ramp_hysteresis(study: ControlStudy, seconds: float = 5.0, starts: int = 4) 
     }
 
 
-def _crossing(study: ControlStudy, gait: Array, changed: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
+def _crossing(study: ControlStudy, gait: Array, changed: Mask) -> tuple[Array, Mask]:
     """The gait parameter (B,) when frames (T, B) have changed for good, and whether they do."""
     time = arrival(changed, study.fps)
     frame = np.minimum(np.nan_to_num(time * study.fps, posinf=0) - 1, len(gait) - 1).astype(int)
@@ -203,7 +200,7 @@ def constant_hysteresis(study: ControlStudy, points: int = 41, starts: int = 4) 
     return {"constant_width": float(walk_to - run_to), "walk_to": float(walk_to), "run_to": float(run_to)}
 
 
-def _persists(study: ControlStudy, role: str, grid: Array, starts: int) -> NDArray[np.bool_]:
+def _persists(study: ControlStudy, role: str, grid: Array, starts: int) -> Mask:
     """Whether a gait persists at each gait parameter of a grid (N,)."""
     session = study.start(np.tile(study.phases(role, starts)[0], (len(grid), 1, 1)))
     control = gait_control(study, np.repeat(grid, starts))
@@ -213,7 +210,7 @@ def _persists(study: ControlStudy, role: str, grid: Array, starts: int) -> NDArr
     # judge the last two seconds
     frames = study.play(session, np.repeat(control[None], study.frames(2.0), axis=0)).frames
     running = study.nearer_to_run(frames).mean(axis=0) > 0.5
-    persists: NDArray[np.bool_] = (running == (role == "run")).reshape(len(grid), starts).all(axis=1)
+    persists: Mask = (running == (role == "run")).reshape(len(grid), starts).all(axis=1)
     return persists
 
 

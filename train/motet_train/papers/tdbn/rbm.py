@@ -359,29 +359,20 @@ class Past:
     weights from the past to the visible units, relative to the others. unrolled: of this many frames before the one to
     learn, the net makes a random number of the last ones itself, and so learns to return from where it strays, as in
     DAgger (Ross 2011).
+
+    Windows of motions that repeat, such as gaits, may borrow from others. borrowed: the probability with which the past
+    of a body part is that of a window drawn at random. The net so learns to take a body along whose parts move
+    differently, instead of letting it rest between two gaits. block: codes of a body part. rival: the largest share of
+    the control of the other motions that repeat; the share is uniform. The net so learns to keep its gait under a
+    control that is not pure.
     """
 
     noise: float = 0.0
     rate: float = 1.0
     unrolled: int = 0
-
-
-@dataclass(frozen=True)
-class Borrowed:
-    """Parts that windows of motions that repeat, such as gaits, borrow from others in the training of a CRBM.
-
-    past: the probability with which the past of a body part is that of a window drawn at random. The net so learns to
-    take a body along whose parts move differently, instead of letting it rest between two gaits. block: codes of a body
-    part. control: the largest share of the control of the other motions that repeat; the share is uniform. The net so
-    learns to keep its gait under a control that is not pure.
-    """
-
-    past: float = 0.0
+    borrowed: float = 0.0
     block: int = 1
-    control: float = 0.0
-
-
-NOTHING_BORROWED = Borrowed()
+    rival: float = 0.0
 
 
 class CRBMLayer(Layer):
@@ -398,14 +389,12 @@ class CRBMLayer(Layer):
         generator: torch.Generator,
         clamped: bool,
         recall: Past,
-        borrowed: Borrowed = NOTHING_BORROWED,
     ) -> None:
         super().__init__(crbm, learning, data.probabilities, generator)
         self.crbm = crbm
         self.data = data
         self.clamped = clamped
         self.recall = recall
-        self.borrowed = borrowed
 
     @torch.no_grad()
     def _learn(self, epoch: Epoch) -> float:
@@ -417,21 +406,21 @@ class CRBMLayer(Layer):
         return float(error.square().mean())
 
     def _windows(self, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """Past (B, K H) and control (B, C) of windows (B,), with what they borrow, see :class:`Borrowed`."""
+        """Past (B, K H) and control (B, C) of windows (B,), with what they borrow, see :class:`Past`."""
         past = self.data.past[rows]
         control = self.data.control[rows]
-        if not self.borrowed.past and not self.borrowed.control:
+        if not self.recall.borrowed and not self.recall.rival:
             return past, control
-        share = self.borrowed.control * torch.rand(len(rows), 1, generator=self.generator, device=past.device)
+        share = self.recall.rival * torch.rand(len(rows), 1, generator=self.generator, device=past.device)
         return self._borrowed_past(rows, past), torch.lerp(control, self.data.rival[rows], share)
 
     def _borrowed_past(self, rows: Tensor, past: Tensor) -> Tensor:
         """The past (B, K H) of windows (B,), of some body parts another window's in all its frames."""
         codes = len(self.crbm.visible_bias)
-        block = self.borrowed.block
+        block = self.recall.block
         others = torch.multinomial(self.probabilities, len(rows), replacement=True, generator=self.generator)
         chances = torch.rand(len(rows), codes // block, generator=self.generator, device=past.device)
-        of_part = (chances < self.borrowed.past) & self.data.repeats[rows, None]
+        of_part = (chances < self.recall.borrowed) & self.data.repeats[rows, None]
         of_code = of_part.repeat_interleave(block, dim=1).repeat(1, past.shape[1] // codes)
         return torch.where(of_code, self.data.past[others], past)
 

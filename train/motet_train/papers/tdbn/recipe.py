@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from motet.bundle.fields import Json
 from motet.bundle.manifest import Manifest
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
@@ -17,7 +18,7 @@ from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
 from motet_train import distributed
 from motet_train.data.errors import DataError
-from motet_train.papers.tdbn.clips import Clips, body_parts, is_periodic
+from motet_train.papers.tdbn.clips import Clips, Sequences, body_parts, is_periodic
 from motet_train.papers.tdbn.rbm import Layer, Stage
 from motet_train.papers.tdbn.report import missed_goals, study_of
 from motet_train.papers.tdbn.tdbn import TDBN, AngleCRBM, AngleCRBMConfig, ControlNet, Lessons, TDBNConfig
@@ -53,7 +54,7 @@ def train_control(clips: Clips, job: Job) -> Run:
     return train_lessons(net, job, manifest, _lessons(motions, config.onset), missed, results)
 
 
-def _check_lengths(motions: Mapping[str, Sequence[Array]], least: int) -> None:
+def _check_lengths(motions: Sequences, least: int) -> None:
     for label, group in motions.items():
         shortest = min(map(len, group))
         if shortest < least:
@@ -61,7 +62,7 @@ def _check_lengths(motions: Mapping[str, Sequence[Array]], least: int) -> None:
             raise DataError(f"{have}; it needs {least}")
 
 
-def _starts(motions: Mapping[str, Sequence[Array]], taps: int) -> dict[str, list[list[float]]]:
+def _starts(motions: Sequences, taps: int) -> Json:
     """The first frames of each label, from which sessions begin."""
     return {label: np.round(group[0][:taps], 6).tolist() for label, group in motions.items()}
 
@@ -73,7 +74,7 @@ def _contract(clips: Clips, fps: float, frames: Array) -> MotionContract:
     return MotionContract("angles", clips.channels, units, fps, frames.mean(axis=0), std, clips.skeleton)
 
 
-def _lessons(motions: Mapping[str, Sequence[Array]], onset: float) -> Lessons:
+def _lessons(motions: Sequences, onset: float) -> Lessons:
     """The sequences of each label under its control, with an onset for the motions that end."""
     controls = []
     onsets = []
@@ -89,7 +90,7 @@ def _missed(clips: Clips, run: Run, enough: int) -> list[str]:
     return missed_goals(study_of(model, clips), enough)
 
 
-def _results(net: ControlNet, frames: Array, std: Array, log: Sequence[Line]) -> dict[str, Any]:
+def _results(net: ControlNet, frames: Array, std: Array, log: Sequence[Line]) -> Json:
     """Entries of the manifest: RMS error in z units of coded frames (N, D), the nets tried, the goals missed."""
     moving = std > 0
     original = torch.tensor(frames, dtype=torch.float32)
@@ -114,10 +115,10 @@ def untrained(
 def train_lessons(
     net: ControlNet,
     job: Job,
-    manifest: Mapping[str, Any],
+    manifest: Json,
     lessons: Lessons,
     missed: Callable[[Run, int], list[str]] | None = None,
-    more: Callable[[Sequence[Line]], Mapping[str, Any]] = lambda log: {},
+    more: Callable[[Sequence[Line]], Json] = lambda log: {},
 ) -> Run:
     """Train a net that has its mean and scale; missed: the goals that a candidate misses, of several to choose from."""
     generator = torch.Generator(job.device).manual_seed(job.about.seed)
@@ -184,7 +185,7 @@ class DivergenceLearner:
         for self.done in range(start + 1, stop + 1):
             yield self.done, self.layer.epoch(self.done - 1 - self.bounds[number]), 1.0
 
-    def validate(self) -> Mapping[str, Any]:
+    def validate(self) -> Json:
         """The goals that a whole net misses."""
         if self.missed is None or self.done not in self.bounds or not self.stages[self._stage(self.done - 1)].whole:
             return {}
@@ -195,14 +196,14 @@ class DivergenceLearner:
     def _stage(self, done: int) -> int:
         return next(n for n, stop in enumerate(self.bounds[1:]) if done < stop)
 
-    def state_dict(self) -> dict[str, Any]:
+    def state_dict(self) -> Json:
         """Where learning is: the epochs done, the velocities of the layer, the generator."""
         assert self.layer is not None
         velocities = {name: ascent.velocity for name, ascent in self.layer.ascents.items()}
         generator = self.generator.get_state()
         return {"done": self.done, "fewest": self.fewest, "velocities": velocities, "generator": generator}
 
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    def load_state_dict(self, state: Json) -> None:
         """Go on there; the net has its weights."""
         self.done = state["done"]
         self.fewest = state["fewest"]

@@ -3,10 +3,10 @@
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 
+from motet.bundle.fields import Json
 from motet.papers.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
 from motet_train.evaluate.tables import Goals, Report, gathered, reached
@@ -105,7 +105,7 @@ def control_report(study: ControlStudy) -> Report:
 
     A figure that does not exist, such as the period of no loop, is NaN; a time that is never reached is infinite.
     """
-    training: Mapping[str, Any] = study.model.manifest.training
+    training: Json = study.model.manifest.training
     report: Report = {"train": {key: float(training[key]) for key in ("seconds", "reconstruction") if key in training}}
     parts = (_figures(study, name, group) for name, group in experiments_of(study).items())
     return report | gathered(parts, study.model.manifest.name)

@@ -23,7 +23,6 @@ from motet.representation.root_sixd import ROOT_SIXD, sixd_to_rotmat
 from motet.steering.foot_lock import FootLock, FootLockSettings
 from motet.steering.pose import Pose
 from motet.steering.recorded import Recording
-from motet_train.data.errors import DataError
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
 from motet_train.data.table import Gait
@@ -97,8 +96,7 @@ def train_steered(store: Store, job: Job, data: str = "") -> Run:
 
     DataError if a gait has no recording, or the store is in another representation.
     """
-    if store.representation != "root_sixd":
-        raise DataError(f"steering is trained on root_sixd (motet prepare --for codes), not {store.representation}")
+    store.needs_sixd("steering is trained on")
     config = replace(job.recipe.config, fps=store.fps)
     recorded = _recorded(store)
     contract, motions = mirrored_too(store, recorded)

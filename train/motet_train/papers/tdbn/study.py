@@ -4,7 +4,7 @@ Frames are compared in z units: each channel relative to its standard deviation 
 that are constant there. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motet.motion.motion import lines
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices, Mask
 from motet.papers.tdbn_control import TdbnModel, TdbnSession
 from motet.representation.contract import LIVING_STD
 from motet_train.evaluate.positions import arrival
-from motet_train.papers.tdbn.clips import period
+from motet_train.papers.tdbn.clips import Sequences, period
 
 Codes = NDArray[np.floating[Any]]
 
@@ -39,8 +39,8 @@ class Reference:
     motions: label -> sequences (T, D) at the model's frame rate. legs: indices of the leg channels.
     """
 
-    motions: Mapping[str, Sequence[Array]]
-    legs: NDArray[np.intp]
+    motions: Sequences
+    legs: Indices
 
     @property
     def clips(self) -> list[Array]:
@@ -115,8 +115,8 @@ class Recording:
 class Leg:
     """Indices of a leg's channels, and of its codes."""
 
-    channels: NDArray[np.intp]
-    codes: NDArray[np.intp]
+    channels: Indices
+    codes: Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +213,7 @@ class ControlStudy:
         """Seconds (B,) until frames (T, B, D) are on a gait's loop and stay there."""
         return arrival(self.reference.distance(frames, self.loop_points(role)) < ARRIVED, self.fps)
 
-    def nearer_to_run(self, frames: Array) -> NDArray[np.bool_]:
+    def nearer_to_run(self, frames: Array) -> Mask:
         """Whether each of frames (..., D) is nearer to the running loop than to the walking one."""
         to_walk = self.reference.distance(frames, self.loop_points("walk"))
         to_run = self.reference.distance(frames, self.loop_points("run"))

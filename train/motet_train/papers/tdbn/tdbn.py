@@ -18,14 +18,14 @@ from typing import Any, Self, get_type_hints
 import torch
 from torch import Tensor, nn
 
+from motet.bundle.fields import Json
 from motet.bundle.graph import GraphSpec, TensorSpec
 from motet.representation.contract import Z_LIMIT
-from motet_train.models.net import Net, Part, configured, normalised
+from motet_train.evaluate.tables import Figures
+from motet_train.models.net import Graphs, Net, configured, encoder_and_step, normalised
 from motet_train.papers.tdbn.rbm import (
     CRBM,
-    NOTHING_BORROWED,
     RBM,
-    Borrowed,
     CRBMLayer,
     Learning,
     Past,
@@ -80,7 +80,7 @@ class ControlNet(Net):
         self.register_buffer("expansion", torch.eye(labels).repeat_interleave(crbm.control_units // labels, dim=1))
 
     @property
-    def defaults(self) -> dict[str, float]:
+    def defaults(self) -> Figures:
         """The default options of a session."""
         return {"temperature": self.config.temperature}
 
@@ -100,12 +100,12 @@ class ControlNet(Net):
         """Codes (B, H) between their means (variety 0) and binary samples (variety 1), by noise (B, N)."""
         return mean + variety * ((noise < mean).to(mean.dtype) - mean)
 
-    def to_config(self) -> dict[str, Any]:
+    def to_config(self) -> Json:
         """The arguments of :meth:`from_config`; apart from tuples, ready for JSON."""
         return {**asdict(self.config), **self.sizes}
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any]) -> Self:
+    def from_config(cls, config: Json) -> Self:
         """An untrained net of the sizes that :meth:`to_config` wrote."""
         names = get_type_hints(cls.CONFIG).keys()
         settings = {key: value for key, value in config.items() if key in names}
@@ -130,13 +130,12 @@ class ControlNet(Net):
         generator: torch.Generator,
         past: Past,
         clamped: bool = True,
-        borrowed: Borrowed = NOTHING_BORROWED,
     ) -> CRBMLayer:
         """The training of the CRBM on sequences in the present codes."""
         codes = [list(map(self.encode, group)) for group in lessons.sequences]
         units = [list(map(self._units, group)) for group in lessons.controls]
         data = transitions(codes, units, self.config.taps, lessons.onsets, past.unrolled)
-        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past, borrowed)
+        return CRBMLayer(self.crbm, data, self.config.crbm, generator, clamped, past)
 
     def _units(self, control: Tensor) -> Tensor:
         """Control values (..., L) as control units (..., C)."""
@@ -171,7 +170,7 @@ class ControlNet(Net):
         frame = self.decode(next_codes)
         return next_codes, frame, torch.cat([history[:, 1:], next_codes[:, None]], dim=1)
 
-    def graphs(self) -> dict[str, tuple[nn.Module, GraphSpec]]:
+    def graphs(self) -> Graphs:
         """The encoder and the step, each with its contract."""
         codes = len(self.crbm.visible_bias)
         channels = len(self.mean)
@@ -192,7 +191,7 @@ class ControlNet(Net):
         )
         step = GraphSpec(tuple(inputs), outputs, {"history": "next_history"})
         encoder = GraphSpec((_spec("frames", channels),), (_spec("codes", codes),))
-        return {"encoder": (Part(self, self.encode), encoder), "step": (Part(self, self.step), step)}
+        return encoder_and_step(self, encoder, step)
 
 
 def _spec(name: str, *sizes: int) -> TensorSpec:
@@ -207,11 +206,11 @@ class TDBNConfig:
     for each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for
     the second (thesis 5.3). clamped: whether they keep their values in the reconstruction. sigma: standard
     deviation of a visible unit relative to its channel's: with a smaller one, codes are more precise. past_noise,
-    unrolled: noise and unrolled of :class:`Past`. borrowed_past, borrowed_control: past and control of
-    :class:`Borrowed`. onset: how many times as often the first window of a motion that ends is drawn as its last.
-    temperature: of the codes and of generation; learning anneals from 1 to it. initial: standard deviation of the
-    first weights. restarts: RBMs that learn side by side. tries: most CRBMs trained on each of them until a net reaches
-    its goals. rounds: how often all of this begins anew until then.
+    unrolled, borrowed_past, borrowed_control: noise, unrolled, borrowed and rival of :class:`Past`. onset: how many
+    times as often the first window of a motion that ends is drawn as its last. temperature: of the codes and of
+    generation; learning anneals from 1 to it. initial: standard deviation of the first weights. restarts: RBMs that
+    learn side by side. tries: most CRBMs trained on each of them until a net reaches its goals. rounds: how often
+    all of this begins anew until then.
     """
 
     fps: float = 40.0
@@ -319,9 +318,14 @@ class TDBN(ControlNet):
             self.rbm.take(rbms, number)
             self.begin_crbm(generator)
 
-        past = Past(config.past_noise, unrolled=config.unrolled)
-        borrowed = Borrowed(config.borrowed_past, config.hidden_per_part, config.borrowed_control)
-        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped, borrowed)
+        past = Past(
+            config.past_noise,
+            unrolled=config.unrolled,
+            borrowed=config.borrowed_past,
+            block=config.hidden_per_part,
+            rival=config.borrowed_control,
+        )
+        layer = partial(self.crbm_layer, lessons, generator, past, config.clamped)
         return Stage(config.crbm.epochs, begin, layer, whole=True)
 
     def _frames(self, lessons: Lessons) -> tuple[Tensor, Tensor]:
@@ -386,7 +390,7 @@ class AngleCRBM(ControlNet):
         return mean + variety * torch.sqrt(-2 * torch.log(1 - first)) * torch.cos(2 * math.pi * second)
 
     @property
-    def defaults(self) -> dict[str, float]:
+    def defaults(self) -> Figures:
         """The default options of a session, with the Gibbs iterations."""
         return {**super().defaults, "iterations": self.config.iterations}
 
