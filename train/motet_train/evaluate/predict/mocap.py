@@ -34,13 +34,28 @@ from motet_train.evaluate.predict.floors import (
     key,
     places,
 )
-from motet_train.evaluate.predict.plain_mlp import PLAIN_MLP, PlainMLP, positions_after, trained, training_clips
+from motet_train.evaluate.predict.plain_mlp import (
+    PLAIN_MLP,
+    PLAIN_MOTION,
+    PlainMLP,
+    positions_after,
+    trained,
+    training_clips,
+    with_bones,
+)
 from motet_train.evaluate.tables import aligned
 
-TITLES = {"place_cm": "joints in the world, cm", "pose_cm": "joints relative to the root, cm"}
+TITLES = {
+    "place_cm": "joints in the world, cm",
+    "pose_cm": "joints relative to the root, cm",
+    "bones_cm": "change of the bones' lengths, cm",
+}
 """Measure -> its title in tables."""
 
-PLACE, POSE = TITLES
+PLACE, POSE, BONES = TITLES
+
+BASELINES = (*FLOORS, PLAIN_MLP, PLAIN_MOTION)
+"""What models are compared with, in the order of tables."""
 
 COUNTS = ("people", "recordings", "windows")
 
@@ -96,8 +111,8 @@ class Measured:
     """The distances of all systems in each window, floors first.
 
     names: each window's recording. distances: system -> measure -> (W, N) in centimetres; the floors, and the plain MLP
-    if it was trained, before the models. seeds: each window's input. speeds: (W,) of the hips through it on average,
-    m/s.
+    and its motion if it was trained, before the models. seeds: each window's input. speeds: (W,) of the hips through it
+    on average, m/s.
     """
 
     names: tuple[str, ...]
@@ -124,7 +139,7 @@ class Measured:
         people = {entry.subject for entry in entries if entry.name in names}
         counts = dict(zip(COUNTS, (len(people), len(names), len(windows)), strict=True))
         figures: dict[str, Any] = {**counts, **self._means(name, windows)}
-        for floor in (*FLOORS, PLAIN_MLP):
+        for floor in BASELINES:
             if floor in self.distances:
                 figures[key(floor)] = self._means(floor, windows)
         # and how often standing still is nearer in the end
@@ -234,7 +249,7 @@ def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
     rows = [[f"{kind}: {counts}"]]
     for measure in TITLES if kind == "all" else (PLACE,):
         rows.append([TITLES[measure]])
-        for floor in (*FLOORS, PLAIN_MLP):
+        for floor in BASELINES:
             if key(floor) in first:
                 rows.append([f"  {floor}", *cells(first[key(floor)][measure], 1)])
         for name, part in parts.items():
@@ -297,18 +312,27 @@ def measured(
     predictions = floors(recorded, decays)
     if rival is not None:
         seed_places = np.stack(list(map(places, seeds)))
-        predictions[PLAIN_MLP] = 100 * positions_after(rival, seed_places / 100)
+        points = positions_after(rival, seed_places / 100)
+        predictions[PLAIN_MLP] = 100 * points
+        predictions[PLAIN_MOTION] = 100 * with_bones(points, recorded.rotations[:, -1])
     for name, model in models.items():
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
-    distances = {name: _distances(predicted, recorded.truth) for name, predicted in predictions.items()}
+    parents = recorded.skeleton.parents
+    distances = {name: distances_of(predicted, recorded.truth, parents) for name, predicted in predictions.items()}
     return Measured(tuple(names), distances, tuple(seeds), _speeds(seeds))
 
 
-def _distances(predicted: Array, truth: Array) -> dict[str, Array]:
+def distances_of(predicted: Array, truth: Array, parents: NDArray[np.intp]) -> dict[str, Array]:
     """How far predicted joints (W, N, J, 3) are from recorded ones, by measure."""
     in_world, relative = apart(predicted, truth)
-    return {PLACE: in_world, POSE: relative}
+    bones = _lengths(predicted, parents) - _lengths(truth, parents)
+    return {PLACE: in_world, POSE: relative, BONES: abs(bones).mean(axis=-1)}
+
+
+def _lengths(joints: Array, parents: NDArray[np.intp]) -> Array:
+    """The lengths (..., J - 1) of the bones between joints (..., J, 3)."""
+    return length(joints[..., 1:, :] - joints[..., parents[1:], :])
 
 
 def _speeds(seeds: Sequence[Motion]) -> Array:
