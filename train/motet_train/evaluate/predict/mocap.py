@@ -35,8 +35,8 @@ from motet_train.evaluate.predict.floors import (
     places,
 )
 from motet_train.evaluate.predict.plain_mlp import (
+    PLAIN_BONES,
     PLAIN_MLP,
-    PLAIN_MOTION,
     PlainMLP,
     positions_after,
     trained,
@@ -54,13 +54,10 @@ TITLES = {
 
 PLACE, POSE, BONES = TITLES
 
-BASELINES = (*FLOORS, PLAIN_MLP, PLAIN_MOTION)
+BASELINES = (*FLOORS, PLAIN_MLP, PLAIN_BONES)
 """What models are compared with, in the order of tables."""
 
 COUNTS = ("people", "recordings", "windows")
-
-QUARTERS = ("least expected", "second", "third", "most expected")
-"""Quarters of the windows by the expected error at a frame."""
 
 MOTION_KINDS: Mapping[str, str] = {
     "boxing": "boxing|boxers?|punch|punches|punching|jabs?",
@@ -111,8 +108,8 @@ class Measured:
     """The distances of all systems in each window, floors first.
 
     names: each window's recording. distances: system -> measure -> (W, N) in centimetres; the floors, and the plain MLP
-    and its motion if it was trained, before the models. seeds: each window's input. speeds: (W,) of the hips through it
-    on average, m/s.
+    if it was trained, before the models. seeds: each window's input. speeds: (W,) of the hips through it on average,
+    m/s.
     """
 
     names: tuple[str, ...]
@@ -175,26 +172,12 @@ def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.int
     """Expected and measured errors (W, N) in centimetres, compared at the reported frames.
 
     "ratio": measured over expected, ideally 1, in "all" windows and in each of ``kinds``, kind -> indices of its
-    windows. "quarters" of the windows, smallest expected errors first: the means of both, which should rise alike.
-    "rank_correlation": Spearman's, NaN where one of the two is constant.
+    windows. "rank_correlation": Spearman's, NaN where one of the two is constant.
     """
-    # how much larger errors are than expected
-    all_windows = np.arange(len(true))
     ratios = {}
-    for kind, windows in {"all": all_windows, **kinds}.items():
+    for kind, windows in {"all": np.arange(len(true)), **kinds}.items():
         ratios[kind] = by_frame(true[windows].mean(axis=0) / expected[windows].mean(axis=0))
-
-    # each frame's windows in the order of the errors expected there
-    order = np.argsort(expected, axis=0, kind="stable")
-    expected_rising = np.take_along_axis(expected, order, axis=0)
-    true_rising = np.take_along_axis(true, order, axis=0)
-    quarters = []
-    for part in np.array_split(all_windows, len(QUARTERS)):
-        if len(part):
-            expected_mean = by_frame(expected_rising[part].mean(axis=0))
-            true_mean = by_frame(true_rising[part].mean(axis=0))
-            quarters.append({"expected_cm": expected_mean, "measured_cm": true_mean})
-    return {"ratio": ratios, "quarters": quarters, "rank_correlation": by_frame(_rank_correlations(expected, true))}
+    return {"ratio": ratios, "rank_correlation": by_frame(_rank_correlations(expected, true))}
 
 
 def _rank_correlations(expected: Array, true: Array) -> Array:
@@ -210,14 +193,10 @@ def _rank_correlations(expected: Array, true: Array) -> Array:
 
 def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
     """Rows of a table, after a head with the frames."""
-    # ratios by kind, quarters by the expected error, and ranks
+    # ratios by kind, and ranks
     rows = [["measured mean error over the expected one, joints in the world"]]
     for kind, ratio in figures["ratio"].items():
         rows.append([f"  {kind}", *cells(ratio, 2)])
-    rows.append(["quarters of the windows by the expected error: expected, cm; and measured, cm"])
-    for title, quarter in zip(QUARTERS, figures["quarters"], strict=False):
-        for measure, errors in quarter.items():
-            rows.append([f"  {title}: {measure.removesuffix('_cm')}", *cells(errors, 2)])
     rows.append(["correlation of the ranks of expected and measured errors (Spearman)"])
     rows.append(["  all windows", *cells(figures["rank_correlation"], 2)])
     return rows
@@ -314,7 +293,7 @@ def measured(
         seed_places = np.stack(list(map(places, seeds)))
         points = positions_after(rival, seed_places / 100)
         predictions[PLAIN_MLP] = 100 * points
-        predictions[PLAIN_MOTION] = 100 * with_bones(points, recorded.rotations[:, -1])
+        predictions[PLAIN_BONES] = 100 * with_bones(points)
     for name, model in models.items():
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 

@@ -20,15 +20,15 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet_train.data.store import Store
-from motet_train.models.kinematics import forward_kinematics, product, rotvec_to_rotmat, smooth_length
+from motet_train.evaluate.positions import length
 from motet_train.models.net import zero_linear
 from motet_train.models.predictor import Block
 
 PLAIN_MLP = "plain MLP"
 """Its name in tables."""
 
-PLAIN_MOTION = f"{PLAIN_MLP} as a motion"
-"""The name of the motion that comes nearest to its points."""
+PLAIN_BONES = f"{PLAIN_MLP} with bones"
+"""The name of its points, once bones have kept their lengths."""
 
 STEPS = 7_000
 """Batches of training."""
@@ -51,12 +51,6 @@ STEP_SCALE = 20.0
 
 ACROSS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 """Left and right hip joint: the facing is at right angles to the line through them."""
-
-DRAWS = 150
-"""Steps in which bones are drawn to points."""
-
-LARGEST_DRAW = 0.1
-"""The first of these steps, in radians and metres; they become shorter linearly."""
 
 MIRRORED_JOINTS = partners_of(HUMANOID.names)
 MIRROR = torch.tensor([-1.0, 1.0, 1.0])
@@ -150,9 +144,9 @@ def _starts(lengths: Sequence[int], window: int) -> Array:
     """The first rows of all windows in clips of these lengths, one after the other."""
     starts = []
     first = 0
-    for length in lengths:
-        starts.append(np.arange(first, first + length - window + 1))
-        first += length
+    for frames in lengths:
+        starts.append(np.arange(first, first + frames - window + 1))
+        first += frames
     return np.concatenate(starts)
 
 
@@ -167,27 +161,14 @@ def positions_after(net: PlainMLP, seeds: Array) -> Array:
     return in_world
 
 
-def with_bones(points: Array, last: Array) -> Array:
-    """Positions (W, N, J, 3) of figures whose bones keep their lengths, as near to points (W, N, J, 3) as gradient
-    descent takes them from the last seed poses: rotations (W, J, 3, 3) from the parents, the roots' in the world."""
-    frames = points.shape[:2]
-    wanted = torch.from_numpy(points).float().flatten(0, 1)
-    posed = torch.tensor(last).float().permute(2, 3, 1, 0).repeat_interleave(frames[1], dim=3)
-    turns = torch.zeros(posed.shape[1:], requires_grad=True)
-    roots = wanted[:, :1].clone().requires_grad_()
-    parents = HUMANOID.parents.tolist()
-    offsets = torch.from_numpy(HUMANOID.offsets).float()
-    descent = torch.optim.Adam([turns, roots], lr=LARGEST_DRAW)
-    rates = torch.optim.lr_scheduler.LinearLR(descent, 1.0, 0.0, DRAWS)
-    for _ in range(DRAWS):
-        descent.zero_grad()
-        turned = product(posed, rotvec_to_rotmat(turns))
-        joints = roots + forward_kinematics(parents, offsets, turned, range(len(parents)))
-        smooth_length(joints - wanted, 1e-8).mean().backward()  # type: ignore[no-untyped-call]
-        descent.step()
-        rates.step()
-    near: Array = joints.detach().unflatten(0, frames).double().numpy()
-    return near
+def with_bones(points: Array) -> Array:
+    """Points (..., J, 3) with each bone at its length: from the hips outwards it is aimed at the point of its tip."""
+    joints = points.copy()
+    for joint, parent in enumerate(HUMANOID.parents[1:], start=1):
+        start = joints[..., parent, :]
+        aim = points[..., joint, :] - start
+        joints[..., joint, :] = start + aim / length(aim)[..., None] * length(HUMANOID.offsets[joint])
+    return joints
 
 
 def training_clips(store: Store, held_out: Sequence[str]) -> list[Array]:
