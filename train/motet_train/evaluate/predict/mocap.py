@@ -54,7 +54,7 @@ TITLES = {
 
 PLACE, POSE, BONES = TITLES
 
-BASELINES = (*FLOORS, PLAIN_MLP, PLAIN_BONES)
+RIVALS = (*FLOORS, PLAIN_MLP, PLAIN_BONES)
 """What models are compared with, in the order of tables."""
 
 COUNTS = ("people", "recordings", "windows")
@@ -136,7 +136,7 @@ class Measured:
         people = {entry.subject for entry in entries if entry.name in names}
         counts = dict(zip(COUNTS, (len(people), len(names), len(windows)), strict=True))
         figures: dict[str, Any] = {**counts, **self._means(name, windows)}
-        for floor in BASELINES:
+        for floor in RIVALS:
             if floor in self.distances:
                 figures[key(floor)] = self._means(floor, windows)
         # and how often standing still is nearer in the end
@@ -228,7 +228,7 @@ def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
     rows = [[f"{kind}: {counts}"]]
     for measure in TITLES if kind == "all" else (PLACE,):
         rows.append([TITLES[measure]])
-        for floor in BASELINES:
+        for floor in RIVALS:
             if key(floor) in first:
                 rows.append([f"  {floor}", *cells(first[key(floor)][measure], 1)])
         for name, part in parts.items():
@@ -290,16 +290,20 @@ def measured(
     recorded = Windows.of(windows, first.horizon)
     predictions = floors(recorded, decays)
     if rival is not None:
-        seed_places = np.stack(list(map(places, seeds)))
-        points = positions_after(rival, seed_places / 100)
-        predictions[PLAIN_MLP] = 100 * points
-        predictions[PLAIN_BONES] = 100 * with_bones(points)
+        predictions |= _by_plain_mlp(rival, seeds)
     for name, model in models.items():
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
     parents = recorded.skeleton.parents
     distances = {name: distances_of(predicted, recorded.truth, parents) for name, predicted in predictions.items()}
     return Measured(tuple(names), distances, tuple(seeds), _speeds(seeds))
+
+
+def _by_plain_mlp(rival: PlainMLP, seeds: Sequence[Motion]) -> dict[str, Array]:
+    """Its predictions (W, N, J, 3) in centimetres, as they are and with bones at their lengths."""
+    seed_places = np.stack(list(map(places, seeds)))
+    points = positions_after(rival, seed_places / 100)
+    return {PLAIN_MLP: 100 * points, PLAIN_BONES: 100 * with_bones(points)}
 
 
 def distances_of(predicted: Array, truth: Array, parents: NDArray[np.intp]) -> dict[str, Array]:
