@@ -5,9 +5,10 @@ import pytest
 import torch
 
 from motet.figures.humanoid.bones import HUMANOID
-from motet.motion.rotations import Array, axis_to_rotmat
+from motet.motion.kinematics import places_of
+from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet_train.evaluate.predict import plain_mlp
-from motet_train.evaluate.predict.plain_mlp import MIRRORED_JOINTS, positions_after, seen_from_last, trained
+from motet_train.evaluate.predict.plain_mlp import MIRRORED_JOINTS, positions_after, seen_from_last, trained, with_bones
 
 SEED, FRAMES = 4, 3
 
@@ -61,3 +62,18 @@ def test_the_mirror_image_of_a_seed_is_predicted_as_the_mirror_image() -> None:
     torch.nn.init.normal_(net.outward.weight, std=0.01)
     image = positions_after(net, seeds[:, :, MIRRORED_JOINTS] * (-1, 1, 1))
     np.testing.assert_allclose(image[:, :, MIRRORED_JOINTS] * (-1, 1, 1), positions_after(net, seeds), atol=1e-5)
+
+
+def test_points_get_bones_of_their_lengths() -> None:
+    turned = rotvec_to_rotmat(0.2 * np.random.default_rng(2).normal(size=(6, len(HUMANOID.names), 3)))
+    for joint, parent in enumerate(HUMANOID.parents[1:], start=1):
+        turned[:, joint] = turned[:, parent] @ turned[:, joint]
+    posed = (places_of(HUMANOID, turned) + np.array([1.0, 1.0, -2.0])).reshape(2, 3, -1, 3)
+    np.testing.assert_allclose(with_bones(posed), posed, atol=1e-9)
+    # points that are drawn together get bones of full length, and those of the hips point as before
+    hips = posed[:, :, :1]
+    drawn = with_bones(hips + 0.9 * (posed - hips))
+    lengths = np.linalg.norm(drawn[:, :, 1:] - drawn[:, :, HUMANOID.parents[1:]], axis=-1)
+    rest = np.linalg.norm(HUMANOID.offsets[1:], axis=-1)
+    np.testing.assert_allclose(lengths, np.broadcast_to(rest, lengths.shape), atol=1e-9)
+    np.testing.assert_allclose(drawn[:, :, 1], posed[:, :, 1], atol=1e-9)

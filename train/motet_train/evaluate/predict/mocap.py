@@ -34,18 +34,30 @@ from motet_train.evaluate.predict.floors import (
     key,
     places,
 )
-from motet_train.evaluate.predict.plain_mlp import PLAIN_MLP, PlainMLP, positions_after, trained, training_clips
+from motet_train.evaluate.predict.plain_mlp import (
+    PLAIN_BONES,
+    PLAIN_MLP,
+    PlainMLP,
+    positions_after,
+    trained,
+    training_clips,
+    with_bones,
+)
 from motet_train.evaluate.tables import aligned
 
-TITLES = {"place_cm": "joints in the world, cm", "pose_cm": "joints relative to the root, cm"}
+TITLES = {
+    "place_cm": "joints in the world, cm",
+    "pose_cm": "joints relative to the root, cm",
+    "bones_cm": "change of the bones' lengths, cm",
+}
 """Measure -> its title in tables."""
 
-PLACE, POSE = TITLES
+PLACE, POSE, BONES = TITLES
+
+RIVALS = (*FLOORS, PLAIN_MLP, PLAIN_BONES)
+"""What models are compared with, in the order of tables."""
 
 COUNTS = ("people", "recordings", "windows")
-
-QUARTERS = ("least expected", "second", "third", "most expected")
-"""Quarters of the windows by the expected error at a frame."""
 
 MOTION_KINDS: Mapping[str, str] = {
     "boxing": "boxing|boxers?|punch|punches|punching|jabs?",
@@ -124,7 +136,7 @@ class Measured:
         people = {entry.subject for entry in entries if entry.name in names}
         counts = dict(zip(COUNTS, (len(people), len(names), len(windows)), strict=True))
         figures: dict[str, Any] = {**counts, **self._means(name, windows)}
-        for floor in (*FLOORS, PLAIN_MLP):
+        for floor in RIVALS:
             if floor in self.distances:
                 figures[key(floor)] = self._means(floor, windows)
         # and how often standing still is nearer in the end
@@ -160,26 +172,12 @@ def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.int
     """Expected and measured errors (W, N) in centimetres, compared at the reported frames.
 
     "ratio": measured over expected, ideally 1, in "all" windows and in each of ``kinds``, kind -> indices of its
-    windows. "quarters" of the windows, smallest expected errors first: the means of both, which should rise alike.
-    "rank_correlation": Spearman's, NaN where one of the two is constant.
+    windows. "rank_correlation": Spearman's, NaN where one of the two is constant.
     """
-    # how much larger errors are than expected
-    all_windows = np.arange(len(true))
     ratios = {}
-    for kind, windows in {"all": all_windows, **kinds}.items():
+    for kind, windows in {"all": np.arange(len(true)), **kinds}.items():
         ratios[kind] = by_frame(true[windows].mean(axis=0) / expected[windows].mean(axis=0))
-
-    # each frame's windows in the order of the errors expected there
-    order = np.argsort(expected, axis=0, kind="stable")
-    expected_rising = np.take_along_axis(expected, order, axis=0)
-    true_rising = np.take_along_axis(true, order, axis=0)
-    quarters = []
-    for part in np.array_split(all_windows, len(QUARTERS)):
-        if len(part):
-            expected_mean = by_frame(expected_rising[part].mean(axis=0))
-            true_mean = by_frame(true_rising[part].mean(axis=0))
-            quarters.append({"expected_cm": expected_mean, "measured_cm": true_mean})
-    return {"ratio": ratios, "quarters": quarters, "rank_correlation": by_frame(_rank_correlations(expected, true))}
+    return {"ratio": ratios, "rank_correlation": by_frame(_rank_correlations(expected, true))}
 
 
 def _rank_correlations(expected: Array, true: Array) -> Array:
@@ -195,14 +193,10 @@ def _rank_correlations(expected: Array, true: Array) -> Array:
 
 def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
     """Rows of a table, after a head with the frames."""
-    # ratios by kind, quarters by the expected error, and ranks
+    # ratios by kind, and ranks
     rows = [["measured mean error over the expected one, joints in the world"]]
     for kind, ratio in figures["ratio"].items():
         rows.append([f"  {kind}", *cells(ratio, 2)])
-    rows.append(["quarters of the windows by the expected error: expected, cm; and measured, cm"])
-    for title, quarter in zip(QUARTERS, figures["quarters"], strict=False):
-        for measure, errors in quarter.items():
-            rows.append([f"  {title}: {measure.removesuffix('_cm')}", *cells(errors, 2)])
     rows.append(["correlation of the ranks of expected and measured errors (Spearman)"])
     rows.append(["  all windows", *cells(figures["rank_correlation"], 2)])
     return rows
@@ -234,7 +228,7 @@ def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
     rows = [[f"{kind}: {counts}"]]
     for measure in TITLES if kind == "all" else (PLACE,):
         rows.append([TITLES[measure]])
-        for floor in (*FLOORS, PLAIN_MLP):
+        for floor in RIVALS:
             if key(floor) in first:
                 rows.append([f"  {floor}", *cells(first[key(floor)][measure], 1)])
         for name, part in parts.items():
@@ -296,19 +290,32 @@ def measured(
     recorded = Windows.of(windows, first.horizon)
     predictions = floors(recorded, decays)
     if rival is not None:
-        seed_places = np.stack(list(map(places, seeds)))
-        predictions[PLAIN_MLP] = 100 * positions_after(rival, seed_places / 100)
+        predictions |= _by_plain_mlp(rival, seeds)
     for name, model in models.items():
         predictions[name] = np.stack([places(motion) for motion in model.predict(seeds, frames=first.horizon)])
 
-    distances = {name: _distances(predicted, recorded.truth) for name, predicted in predictions.items()}
+    parents = recorded.skeleton.parents
+    distances = {name: distances_of(predicted, recorded.truth, parents) for name, predicted in predictions.items()}
     return Measured(tuple(names), distances, tuple(seeds), _speeds(seeds))
 
 
-def _distances(predicted: Array, truth: Array) -> dict[str, Array]:
+def _by_plain_mlp(rival: PlainMLP, seeds: Sequence[Motion]) -> dict[str, Array]:
+    """Its predictions (W, N, J, 3) in centimetres, as they are and with bones at their lengths."""
+    seed_places = np.stack(list(map(places, seeds)))
+    points = positions_after(rival, seed_places / 100)
+    return {PLAIN_MLP: 100 * points, PLAIN_BONES: 100 * with_bones(points)}
+
+
+def distances_of(predicted: Array, truth: Array, parents: NDArray[np.intp]) -> dict[str, Array]:
     """How far predicted joints (W, N, J, 3) are from recorded ones, by measure."""
     in_world, relative = apart(predicted, truth)
-    return {PLACE: in_world, POSE: relative}
+    bones = _lengths(predicted, parents) - _lengths(truth, parents)
+    return {PLACE: in_world, POSE: relative, BONES: abs(bones).mean(axis=-1)}
+
+
+def _lengths(joints: Array, parents: NDArray[np.intp]) -> Array:
+    """The lengths (..., J - 1) of the bones between joints (..., J, 3)."""
+    return length(joints[..., 1:, :] - joints[..., parents[1:], :])
 
 
 def _speeds(seeds: Sequence[Motion]) -> Array:

@@ -20,11 +20,15 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet_train.data.store import Store
+from motet_train.evaluate.positions import length
 from motet_train.models.net import zero_linear
 from motet_train.models.predictor import Block
 
 PLAIN_MLP = "plain MLP"
 """Its name in tables."""
+
+PLAIN_BONES = f"{PLAIN_MLP} with bones"
+"""The name of its points, once bones have kept their lengths."""
 
 STEPS = 7_000
 """Batches of training."""
@@ -140,9 +144,9 @@ def _starts(lengths: Sequence[int], window: int) -> Array:
     """The first rows of all windows in clips of these lengths, one after the other."""
     starts = []
     first = 0
-    for length in lengths:
-        starts.append(np.arange(first, first + length - window + 1))
-        first += length
+    for frames in lengths:
+        starts.append(np.arange(first, first + frames - window + 1))
+        first += frames
     return np.concatenate(starts)
 
 
@@ -155,6 +159,16 @@ def positions_after(net: PlainMLP, seeds: Array) -> Array:
     both = (net(seen) + mirrored(net(mirrored(seen)))) / 2
     in_world: Array = (both @ turned[:, None].transpose(-1, -2) + origin).double().numpy()
     return in_world
+
+
+def with_bones(points: Array) -> Array:
+    """Points (..., J, 3) with each bone at its length: from the hips outwards it is aimed at the point of its tip."""
+    joints = points.copy()
+    for joint, parent in enumerate(HUMANOID.parents[1:], start=1):
+        start = joints[..., parent, :]
+        aim = points[..., joint, :] - start
+        joints[..., joint, :] = start + aim / length(aim)[..., None] * length(HUMANOID.offsets[joint])
+    return joints
 
 
 def training_clips(store: Store, held_out: Sequence[str]) -> list[Array]:
