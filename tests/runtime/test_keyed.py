@@ -175,6 +175,8 @@ def test_a_curve_goes_through_its_points() -> None:
             "[a]\nrepeat = { keys = [1, 3], every = 1, times = 2 }\n[[a.key]]\nat = 1\n",
             "repeat.keys: expected one",
         ),
+        ("[a]\nover = 'fly'\n[[a.key]]\nat = 1\n", "line 1: [a]: over: expected stand or walk, not 'fly'"),
+        ("[a]\npace = 9\n[[a.key]]\nat = 1\n", "line 1: [a]: pace: expected a number from 0.4 to 2"),
         ("[a]\n", "line 1: [a]: expected 1 to 100 keys"),
         ("[a]\n" + "[[a.key]]\nat = 1\n" * 10_000, "expected 1 to 100 keys"),
         ("a = 3\n", "[a]: expected a table, not '3'"),

@@ -50,11 +50,7 @@ def key(
     """
     chosen = _chosen(ours() if acts is None else read_acts(acts), names)
     outs = places(out, list(chosen), output=output)
-    if over is None:
-        model = load_as(SteerModel, "control", session)
-        bases = {name: _below(model, act, seed) for name, act in chosen.items()}
-    else:
-        bases = dict.fromkeys(chosen, read(over))
+    bases = _bases(chosen, seed, session) if over is None else dict.fromkeys(chosen, read(over))
     for (name, act), place in zip(chosen.items(), outs, strict=True):
         motion = output.write(place, act.motion(bases[name], seed), name)
         say_written(place, motion, f": {name}")
@@ -68,7 +64,11 @@ def _chosen(acts: Mapping[str, KeyedAct], names: tuple[str, ...]) -> Mapping[str
     return {name: acts[name] for name in names or acts}
 
 
-def _below(model: SteerModel, act: KeyedAct, seed: int) -> Motion:
-    """A person who stands and breathes, or walks, a little longer than an act."""
-    order = f"walk speed {WALK_SPEED * act.pace:.2f}" if act.over == "walk" else "stop"
-    return model.run(f"{order} {act.seconds(seed) + 1:.1f}s")
+def _bases(acts: Mapping[str, KeyedAct], seed: int, session: SessionOptions) -> dict[str, Motion]:
+    """For each act a person who stands and breathes, or walks, a little longer than it."""
+    model = load_as(SteerModel, "control", session)
+    bases = {}
+    for name, act in acts.items():
+        order = f"walk speed {WALK_SPEED * act.pace:.2f}" if act.over == "walk" else "stop"
+        bases[name] = model.run(f"{order} {act.seconds(seed) + 1:.1f}s")
+    return bases

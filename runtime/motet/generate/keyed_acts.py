@@ -100,7 +100,8 @@ class NamedAct:
 
     def lasting(self, seconds: float, seed: int) -> "NamedAct":
         """The act repeated more often, if it can be and is shorter than some seconds, or played up to twice as fast, if
-        it lasts longer."""
+        it lasts longer. seconds: 0 for its usual length."""
+        seconds = seconds or max(self.act.seconds(seed), WALKED_SECONDS if self.goes else 0.0)
         shortfall = seconds - self.act.seconds(seed)
         if shortfall > 0 and self.act.repeat and not self.is_counted:
             times = self.act.repeat.times[0] + math.ceil(shortfall / self.act.repeat.every[0])

@@ -12,7 +12,7 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
-from motet.generate.keyed_acts import WALKED_SECONDS, NamedAct
+from motet.generate.keyed_acts import NamedAct
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
@@ -247,10 +247,7 @@ class Teller:
     def _keyed(self, number: int, request: Request, act: NamedAct, context: Context | None) -> Iterator[Piece]:
         """An act by key poses, over a figure that stands, or does what the act is laid over, as long."""
         seed = int(self.noise[0].random((1,), np.float32)[0] * 1e7)
-        if request.seconds:
-            act = act.lasting(request.seconds, seed)
-        elif act.goes:
-            act = act.lasting(max(act.act.seconds(seed), WALKED_SECONDS), seed)
+        act = act.lasting(request.seconds, seed)
         # as many steps as the act has, or more; what lasts longer than it may is begun, and cut off
         seconds = act.act.seconds(seed)
         limit = seconds if act.is_counted else min(seconds, self.settings["max_seconds"])

@@ -100,16 +100,13 @@ def _settings(name: str, table: Any) -> dict[str, Any]:
     if not isinstance(keys, list) or not 1 <= len(keys) <= MOST_KEYS:
         raise _EntryError(f"expected 1 to {MOST_KEYS} keys, each a table [[{name}.key]]")
     settings: dict[str, Any] = {"says": _sentences(table.get("says", [name]))}
-    if "mirrored" in table:
-        settings["mirrored"] = table["mirrored"]
-        if not isinstance(table["mirrored"], bool):
-            raise _EntryError("mirrored: expected true or false")
-    if "over" in table:
-        settings["over"] = table["over"]
-        if table["over"] not in OVER:
-            raise _EntryError(f"over: expected {' or '.join(OVER)}, not {quoted(str(table['over']))}")
-    if "pace" in table:
-        settings["pace"], _ = _span([table["pace"]] * 2, PACE, "pace")
+    settings["mirrored"] = table.get("mirrored", False)
+    if not isinstance(settings["mirrored"], bool):
+        raise _EntryError("mirrored: expected true or false")
+    settings["over"] = table.get("over", OVER[0])
+    if settings["over"] not in OVER:
+        raise _EntryError(f"over: expected {' or '.join(OVER)}, not {quoted(str(settings['over']))}")
+    settings["pace"], _ = _span([table.get("pace", 1.0)] * 2, PACE, "pace")
     if "repeat" in table:
         settings["repeat"] = _repeat(table["repeat"], len(keys))
     for field, limits in (("ease", EASE), ("speed", SPEED), ("amplitude", AMPLITUDE)):
