@@ -1,6 +1,7 @@
 /* Joints that turn no faster than people's, as motet/steering/turn_limit.py says. */
 import { TURN_LIMIT, type turnSettings } from "../generated.js";
-import type { Quaternion } from "../motion/rotations.js";
+import { BONES } from "../figures/humanoid/bones.js";
+import { type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
 import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
 
@@ -12,31 +13,36 @@ const LIMITED = Object.entries(TURN_LIMIT.LIMITED).map(([bone, kind]): [number, 
   kind as Kind,
 ]);
 
-/** The joints of a figure as they were shown in the last tick, null before the first. */
+/** The joints of a figure as they were shown in the last tick. */
 export interface Joints {
-  rotations: Quaternion[] | null;
+  rotations: Float64Array;
+  /** Whether there was no tick yet. */
+  isNew: boolean;
 }
 
-/** A pose with joints that are on their way, a tick after the last. */
+export function newJoints(): Joints {
+  return { rotations: new Float64Array(4 * BONES.length), isNew: true };
+}
+
+/** Keep the joints of a pose on their way, a tick after the last. */
 export function limited(
   joints: Joints,
-  pose: Played,
+  { rotations }: Played,
   settings: Settings<typeof turnSettings>,
   seconds: number,
-): Played {
+): void {
   const before = joints.rotations;
-  joints.rotations = pose.rotations;
-  if (!before) return pose;
-  for (const [bone, kind] of LIMITED) {
+  for (let i = 0; i < LIMITED.length && !joints.isNew; i++) {
+    const [bone, kind] = LIMITED[i]!;
     const half = (settings[kind] * (Math.PI / 180) * seconds) / 2;
-    const from = before[bone]!;
-    const to = pose.rotations[bone]!;
+    const from = turnAt(before, bone);
+    const to = turnAt(rotations, bone);
     const cosine = from[0] * to[0] + from[1] * to[1] + from[2] * to[2] + from[3] * to[3];
     if (Math.abs(cosine) >= Math.cos(half)) continue;
-    if (joints.rotations === pose.rotations) joints.rotations = [...pose.rotations];
-    joints.rotations[bone] = turnedBy(from, to, cosine, half);
+    setTurn(rotations, bone, turnedBy(from, to, cosine, half));
   }
-  return { ...pose, rotations: joints.rotations };
+  before.set(rotations);
+  joints.isNew = false;
 }
 
 /** A rotation on the shorter way to another, by half an angle. cosine: of half the angle between them. */
