@@ -1,5 +1,6 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
 import { type footLockSettings, STEPPING } from "../generated.js";
+import { lengthOf } from "../motion/planar.js";
 import { LEG, SOLES } from "../figures/humanoid/bones.js";
 import { legOf, type Limb, reach } from "../figures/legs.js";
 import { about, plus, product, rotated, turnAt, type Vector, Y } from "../motion/rotations.js";
@@ -54,7 +55,8 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
     const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
     const moveX = foot.isNew ? 0 : soles[bears]![0] - foot.soles[3 * bears]!;
     const moveZ = foot.isNew ? 0 : soles[bears]![2] - foot.soles[3 * bears + 2]!;
-    for (let at = 0; at < foot.soles.length; at++) foot.soles[at] = soles[Math.floor(at / 3)]![at % 3]!;
+    for (let point = 0, at = 0; point < soles.length; point++)
+      for (let axis = 0; axis < 3; axis++, at++) foot.soles[at] = soles[point]![axis]!;
     foot.isNew = false;
     // the shift that keeps it where it was, or that fades once the foot swings; or a planned step
     const isHigh = pose.height > settings.low;
@@ -82,7 +84,7 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
 
 function footingOf(lock: Lock, side: 0 | 1, { contacts }: Played, settings: LockSettings): Footing {
   const { shift, clock } = lock[side];
-  const distance = Math.sqrt(shift[0] * shift[0] + shift[1] * shift[1]);
+  const distance = lengthOf(shift[0], shift[1]);
   return { distance, clock, stands: contacts[side] > settings.stands, isLeft: side === 0 };
 }
 
@@ -133,7 +135,7 @@ function free(
   const wasX = foot.shift[0] - x;
   const wasZ = foot.shift[1] - z;
   const stands = shift(foot, x, z, contact > settings.stands, settings, dt);
-  const moved = Math.hypot(foot.shift[0] - wasX, foot.shift[1] - wasZ);
+  const moved = lengthOf(foot.shift[0] - wasX, foot.shift[1] - wasZ);
   foot.anchor[0] = 0;
   foot.anchor[1] = 0;
   foot.clock = planned && stands ? 0 : STEPPING.FREE;
@@ -163,7 +165,7 @@ function shift(
 ): boolean {
   const toX = foot.shift[0] - x;
   const toZ = foot.shift[1] - z;
-  if (contact && Math.hypot(x, z) < settings.swings * dt && Math.hypot(toX, toZ) < settings.farthest) {
+  if (contact && lengthOf(x, z) < settings.swings * dt && lengthOf(toX, toZ) < settings.farthest) {
     foot.shift[0] = toX;
     foot.shift[1] = toZ;
     foot.drift[0] = 0;

@@ -1,7 +1,7 @@
 /* Figures that stand keep their place, and breathe: docs/reference/bundle.md, "Standing". */
 import { IDLE, type idleSettings } from "../generated.js";
 import type { Playback, Target } from "./matching.js";
-import type { Pose as Ground } from "../motion/planar.js";
+import { lengthOf, type Pose as Ground } from "../motion/planar.js";
 import {
   about,
   inverse,
@@ -45,7 +45,7 @@ export function kept(
   settings: Settings<typeof idleSettings>,
   dt: number,
 ): void {
-  const slow = Math.hypot(playback.spring[0], playback.spring[1]) < settings.slow;
+  const slow = lengthOf(playback.spring[0], playback.spring[1]) < settings.slow;
   const isDown = Math.min(pose.contacts[0], pose.contacts[1]) > settings.stands;
   const stands = !target[0] && !target[1] && !acts && slow && isDown;
   const goal = stands ? 1 : 0;

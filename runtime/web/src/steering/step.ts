@@ -2,7 +2,7 @@
 import { MATCHING } from "../generated.js";
 import { BONES } from "../figures/humanoid/bones.js";
 import { type Matcher, type Playback, type Target } from "./matching.js";
-import { moved, type Pose as Ground } from "../motion/planar.js";
+import { lengthOf, moved, type Pose as Ground } from "../motion/planar.js";
 import { normalised, type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
 import { clamp, damp, damped, dampingOf, wrapped } from "../motion/springs.js";
 import { strided, warped } from "./warping.js";
@@ -112,8 +112,7 @@ export class Steerer {
     const x = figure.spring[0];
     const z = figure.spring[1];
     const angle = wrapped(Math.atan2(x, z) - figure.root[2] - matcher.way(figure));
-    const warps =
-      Math.min(recorded, Math.sqrt(x * x + z * z)) > settings.idle && Math.abs(angle) <= Math.PI / 2;
+    const warps = Math.min(recorded, lengthOf(x, z)) > settings.idle && Math.abs(angle) <= Math.PI / 2;
     const target = warps ? clamp(angle, -settings.warp, settings.warp) : 0;
     const [off, rate] = damped(figure.warp - target, figure.warpRate, dampingOf(settings.blend), matcher.dt);
     figure.warp = target + off;
@@ -129,7 +128,7 @@ export class Steerer {
     const recorded = moves[3]!;
     const side = mirror ? -1 : 1;
     // how fast the springs go beside the recording
-    const pace = Math.sqrt(spring[0] * spring[0] + spring[1] * spring[1]);
+    const pace = lengthOf(spring[0], spring[1]);
     const moving = creeps || Math.min(recorded, pace) > settings.idle;
     const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : settings.idle);
     // stride: what the playback rate does not make up for of the speed

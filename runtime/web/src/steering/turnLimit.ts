@@ -1,5 +1,5 @@
 /* Joints that turn no faster than people's, as motet/steering/turn_limit.py says. */
-import { TURN_LIMIT, type turnSettings } from "../generated.js";
+import { TURN_LIMIT, turnSettings } from "../generated.js";
 import { BONES } from "../figures/humanoid/bones.js";
 import { type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
 import type { Settings } from "../settings.js";
@@ -7,10 +7,10 @@ import type { Played } from "./step.js";
 
 type Kind = keyof typeof turnSettings;
 
-/** Bones that are limited, and the setting of each. */
-const LIMITED = Object.entries(TURN_LIMIT.LIMITED).map(([bone, kind]): [number, Kind] => [
-  Number(bone),
-  kind as Kind,
+/** Of each setting the bones that it limits. */
+const LIMITED = (Object.keys(turnSettings) as Kind[]).map((kind): [Kind, number[]] => [
+  kind,
+  Object.entries(TURN_LIMIT.LIMITED).flatMap(([bone, name]) => (name === kind ? [Number(bone)] : [])),
 ]);
 
 /** The joints of a figure as they were shown in the last tick. */
@@ -33,16 +33,28 @@ export function limited(
 ): void {
   const before = joints.rotations;
   for (let i = 0; i < LIMITED.length && !joints.isNew; i++) {
-    const [bone, kind] = LIMITED[i]!;
+    const [kind, bones] = LIMITED[i]!;
     const half = (settings[kind] * (Math.PI / 180) * seconds) / 2;
-    const from = turnAt(before, bone);
-    const to = turnAt(rotations, bone);
-    const cosine = from[0] * to[0] + from[1] * to[1] + from[2] * to[2] + from[3] * to[3];
-    if (Math.abs(cosine) >= Math.cos(half)) continue;
-    setTurn(rotations, bone, turnedBy(from, to, cosine, half));
+    const least = Math.cos(half);
+    for (let j = 0; j < bones.length; j++) {
+      const bone = bones[j]!;
+      const cosine = cosineAt(before, rotations, 4 * bone);
+      if (Math.abs(cosine) >= least) continue;
+      setTurn(rotations, bone, turnedBy(turnAt(before, bone), turnAt(rotations, bone), cosine, half));
+    }
   }
   before.set(rotations);
   joints.isNew = false;
+}
+
+/** The cosine of half the angle between the quaternions at a place. */
+function cosineAt(from: Float64Array, to: Float64Array, at: number): number {
+  return (
+    from[at]! * to[at]! +
+    from[at + 1]! * to[at + 1]! +
+    from[at + 2]! * to[at + 2]! +
+    from[at + 3]! * to[at + 3]!
+  );
 }
 
 /** A rotation on the shorter way to another, by half an angle. cosine: of half the angle between them. */
