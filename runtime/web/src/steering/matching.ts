@@ -97,7 +97,6 @@ export class Matcher {
   private readonly ways: Float64Array;
   private readonly features: Int16Array;
   readonly goals: Goals[];
-  /** Which gaits are faster than a creep. */
   /** Of each gait whether it can go slower than its recordings. */
   readonly creeps: boolean[];
   private readonly query = new Int16Array(MATCHING.FEATURES);
