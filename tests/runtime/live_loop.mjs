@@ -9,6 +9,7 @@ const poses = controls.map((control) => {
   const start = performance.now();
   figure.tick(control);
   milliseconds.push(performance.now() - start);
-  return figure.shown(1);
+  const shown = figure.shown(1);
+  return { ...shown, rotations: [...shown.rotations] };
 });
 console.log(JSON.stringify({ poses, milliseconds }));

@@ -72,7 +72,7 @@ def test_the_script_of_the_page_does_what_python_does(steer_model: SteerModel) -
     for ours, pose in zip(poses, found["poses"], strict=True):
         np.testing.assert_allclose(pose["ground"], ours.ground[0], atol=1e-9)
         np.testing.assert_allclose(pose["places"], ours.positions()[0], atol=1e-5)
-        np.testing.assert_allclose(pose["rotations"], ours.rotations[0], atol=1e-5)
+        np.testing.assert_allclose(pose["rotations"], ours.rotations[0].ravel(), atol=1e-5)
         # those of planned steps are heights of feet over 4.5 cm, and rounded as these are
         np.testing.assert_allclose(pose["contacts"], ours.contacts[0], atol=1e-5)
 

@@ -63,12 +63,11 @@ function project(camera, point) {
   };
 }
 
-/** The place [x, z] on the ground that is seen at a pixel of the page; null above the horizon. */
-function onGround(camera, x, y) {
+/** What is seen at a pixel of the page: where the eye is, and where it looks. */
+function rayAt(camera, x, y) {
   const [aside, above] = [(x - camera.x) / camera.focal, (camera.y - y) / camera.focal];
   const ray = [0, 1, 2].map((n) => aside * camera.right[n] + above * camera.up[n] - camera.toward[n]);
-  const eye = camera.target.map((at, n) => at + camera.distance * camera.toward[n]), far = -eye[1] / ray[1];
-  return far > 0 && far < 200 ? [eye[0] + far * ray[0], eye[2] + far * ray[2]] : null;
+  return { eye: camera.target.map((at, n) => at + camera.distance * camera.toward[n]), ray };
 }
 
 const COLOURS = { left: [236, 122, 52], right: [58, 124, 226], middle: [176, 182, 196] };

@@ -236,6 +236,24 @@ test("settings and tables that are out of range are refused", () => {
   assert.throws(() => made({ speeds }), /config.speeds: must rise from the slowest/);
 });
 
+test("ground that fails, or gives no height, is refused with its place", () => {
+  const session = model.start({ places: [0.5, 2, 0] });
+  assert.throws(() => session.setGround(0 as never), /ground must be a function/);
+  session.setGround((x, z) => (z > 1 ? NaN : x));
+  assert.throws(() => session.tick(), /ground\(x, z\) gave NaN at x 0.5, z 2: a height is a number within/);
+  const cause = new RangeError("no such tile");
+  session.setGround(() => {
+    throw cause;
+  });
+  assert.throws(
+    () => session.tick(),
+    (error) =>
+      error instanceof ControlError &&
+      error.cause === cause &&
+      error.message === "ground(x, z) failed at x 0.5, z 2: RangeError: no such tile",
+  );
+});
+
 test("figures come and go, and each moves as it would alone", () => {
   for (const [holdFeet, step] of [
     [true, "tick"],

@@ -1,6 +1,16 @@
 /* The inverse kinematics of the humanoid's legs: an ankle brought to a place. */
 import { BONES, HUMANOID, LEG, SIDES } from "./humanoid/bones.js";
-import { inverse, plus, product, type Quaternion, rotated, type Vector, X } from "../motion/rotations.js";
+import {
+  inverse,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  setTurn,
+  turnAt,
+  type Vector,
+  X,
+} from "../motion/rotations.js";
 import { TwoBones } from "./twoBones.js";
 
 /** Of the left and the right leg the bones among the humanoid's. */
@@ -9,42 +19,44 @@ export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + p
 export const OFFSETS = LEGS.map((bones) =>
   bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset),
 );
+
+/** Of hip, knee, ankle and toes. */
 export interface Limb {
-  turned: Quaternion[];
-  places: Vector[];
+  turned: [thigh: Quaternion, shin: Quaternion, foot: Quaternion, toes: Quaternion];
+  places: [hip: Vector, knee: Vector, ankle: Vector, toes: Vector];
 }
 
 /** Rotations and places in the world of the joints of a leg. */
-export function legOf(rotations: Quaternion[], side: number, hips: Quaternion, root: Vector): Limb {
-  let above = hips;
-  let place = root;
-  const turned: Quaternion[] = [];
-  const places: Vector[] = [];
-  LEGS[side]!.forEach((bone, joint) => {
-    place = plus(place, rotated(above, OFFSETS[side]![joint]!));
-    above = product(above, rotations[bone]!);
-    turned.push(above);
-    places.push(place);
-  });
-  return { turned, places };
+export function legOf(rotations: Float64Array, side: number, hips: Quaternion, root: Vector): Limb {
+  const bones = LEGS[side]!;
+  const offsets = OFFSETS[side]!;
+  const hip = plus(root, rotated(hips, offsets[0]!));
+  const thigh = product(hips, turnAt(rotations, bones[0]!));
+  const knee = plus(hip, rotated(thigh, offsets[1]!));
+  const shin = product(thigh, turnAt(rotations, bones[1]!));
+  const ankle = plus(knee, rotated(shin, offsets[2]!));
+  const foot = product(shin, turnAt(rotations, bones[2]!));
+  const toes = plus(ankle, rotated(foot, offsets[3]!));
+  return {
+    turned: [thigh, shin, foot, product(foot, turnAt(rotations, bones[3]!))],
+    places: [hip, knee, ankle, toes],
+  };
 }
 
 /** Turn thigh, shin and foot of a leg so that the ankle is moved; the foot stays as it is in the world. */
 export function reach(
-  rotations: Quaternion[],
+  rotations: Float64Array,
   side: number,
   hips: Quaternion,
   { turned, places }: Limb,
   move: Vector,
 ): void {
-  const [hip, knee, ankle] = places as [Vector, Vector, Vector];
-  const [thigh, shin, foot] = turned as [Quaternion, Quaternion, Quaternion];
-  const leg = new TwoBones(hip, knee, ankle, rotated(shin, X));
-  const turns = leg.turns(leg.eased(plus(ankle, move)));
-  const above = product(turns.thigh, thigh);
-  const below = product(turns.shin, shin);
+  const leg = new TwoBones(places[0], places[1], places[2], rotated(turned[1], X));
+  const turns = leg.turns(leg.eased(plus(places[2], move)));
+  const above = product(turns.thigh, turned[0]);
+  const below = product(turns.shin, turned[1]);
   const bones = LEGS[side]!;
-  rotations[bones[0]!] = product(inverse(hips), above);
-  rotations[bones[1]!] = product(inverse(above), below);
-  rotations[bones[2]!] = product(inverse(below), foot);
+  setTurn(rotations, bones[0]!, product(inverse(hips), above));
+  setTurn(rotations, bones[1]!, product(inverse(above), below));
+  setTurn(rotations, bones[2]!, product(inverse(below), turned[2]));
 }

@@ -49,7 +49,8 @@ export class TwoBones {
     const longer =
       -TWO_BONES.EASED_SHARE * left * Math.expm1(-Math.max(wanted - now, 0) / (TWO_BONES.EASED_SHARE * left));
     const less = Math.max(now - wanted, 0);
-    const [give, fade] = TWO_BONES.GIVES.map((part) => part * this.longest) as [number, number];
+    const give = TWO_BONES.GIVES[0] * this.longest;
+    const fade = TWO_BONES.GIVES[1] * this.longest;
     const shorter = less ** 2 / Math.max(less + give * Math.exp(-left / fade), 1e-12);
     return plus(this.hip, times(away, (now + longer - shorter) / Math.max(wanted, 1e-12)));
   }

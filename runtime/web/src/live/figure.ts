@@ -13,7 +13,7 @@ import { damped, dampedPath, dampingOf, wrapped } from "../motion/springs.js";
 import { landscape } from "./landscape.js";
 import { type Packed, unpacked } from "../bundle/packing.js";
 import { standing, type Steered, tell, tick } from "../steering/steered.js";
-import { between, type Played } from "../steering/step.js";
+import { between, copyPose, newPose, type Played } from "../steering/step.js";
 
 export { motionOf };
 
@@ -41,8 +41,8 @@ export async function modelOf(embedded: Given): Promise<ControlModel> {
 /** A figure of the page, and the last two ticks, between which it is shown. */
 export class Figure {
   private readonly steered: Steered;
-  private before: Played;
-  private now: Played;
+  private before = newPose();
+  private now = newPose();
 
   /** With a phase it searches in its turn alone: a crowd costs the same in each tick. */
   constructor(
@@ -51,7 +51,9 @@ export class Figure {
     phase?: number,
   ) {
     this.steered = standing(model.steerer, 0, place, phase);
-    this.before = this.now = tick(model, this.steered, true, landscape);
+    const pose = tick(model, this.steered, true, landscape);
+    copyPose(this.before, pose);
+    copyPose(this.now, pose);
   }
 
   /** x and z in metres, and the facing in radians. */
@@ -84,8 +86,10 @@ export class Figure {
   tick(command: Asked | Going): void {
     if ("points" in command) this.lead(command);
     else this.tell(command);
-    this.before = this.now;
-    this.now = tick(this.model, this.steered, true, landscape);
+    const { before, now } = this;
+    this.before = now;
+    this.now = before;
+    copyPose(this.now, tick(this.model, this.steered, true, landscape));
   }
 
   private tell({ gait, x, z, facing }: Asked): void {

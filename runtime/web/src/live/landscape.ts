@@ -1,5 +1,5 @@
 /* What the page has beside its plane, some metres from where figures begin: a small hill, and a stair up and down. Metres. */
-import type { Vector } from "../motion/rotations.js";
+import { plus, times, unit, type Vector } from "../motion/rotations.js";
 import type { Drawn, Mesh, Painter, Primitive } from "./stage.js";
 
 /** The hill: where its middle is, how far it reaches, and how high it is. */
@@ -9,6 +9,10 @@ const STAIR = { x: 5.5, half: 1.2, begin: 5, steps: 5, tread: 0.29, rise: 0.17, 
 /** Of the hill's mesh. */
 const RINGS = 16;
 const SECTORS = 40;
+/** Metres from one look along a ray to the next, and to the last; and how often what lies between two looks is halved. */
+const LOOK = 0.05;
+const FARTHEST = 350;
+const HALVINGS = 20;
 /** It gets the theme's colour when it is drawn. */
 const COLOUR = [1, 1, 1, 1];
 const IDENTITY = Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
@@ -16,6 +20,25 @@ const IDENTITY = Float32Array.from([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0,
 /** The height of the ground at a place. */
 export function landscape(x: number, z: number): number {
   return Math.max(hill(x, z), stair(x, z));
+}
+
+/** x and z where a ray from an eye meets the ground first; null for the sky. */
+export function metBy(eye: Vector, ray: Vector): [x: number, z: number] | null {
+  const way = unit(ray);
+  const at = (far: number) => plus(eye, times(way, far));
+  const isUnder = (far: number) => at(far)[1] <= landscape(at(far)[0], at(far)[2]);
+  // march to a place that is under the ground
+  let far = LOOK;
+  while (far < FARTHEST && !isUnder(far)) far += LOOK;
+  if (far >= FARTHEST) return null;
+  // bisect between it and the place before it
+  let near = far - LOOK;
+  for (let n = 0; n < HALVINGS; n++) {
+    const middle = (near + far) / 2;
+    if (isUnder(middle)) far = middle;
+    else near = middle;
+  }
+  return [at(far)[0], at(far)[2]];
 }
 
 function hill(x: number, z: number): number {

@@ -1,6 +1,6 @@
 /* The last seconds of the steered figure as a file. */
 import { type Surface, toGLB, toVRMA } from "../formats/glb.js";
-import type { Played } from "../steering/step.js";
+import { copyPose, newPose, type Played } from "../steering/step.js";
 import { motionOf, shownOf } from "./figure.js";
 import { toGIF } from "./gif.js";
 import type { Scene } from "./scene.js";
@@ -21,7 +21,9 @@ export class Recorder {
   ) {}
 
   keep(pose: Played): void {
-    this.poses.push(pose);
+    const copy = newPose();
+    copyPose(copy, pose);
+    this.poses.push(copy);
     if (this.poses.length > KEPT * this.fps) this.poses.shift();
   }
 

@@ -1,9 +1,9 @@
 /* What is seen: figures as they are between two ticks, the ways they have gone and are asked to go, feet that stand. */
 import { SIDES } from "../figures/humanoid/bones.js";
-import type { Vector } from "../motion/rotations.js";
+import { times, type Vector } from "../motion/rotations.js";
 import { FEET, type Figure, type Shown } from "./figure.js";
 import type { Avatar } from "./avatar.js";
-import { drawnLandscape } from "./landscape.js";
+import { drawnLandscape, metBy } from "./landscape.js";
 import type { Body, Camera, Drawn, Painter, Spot, Stage, Strip } from "./stage.js";
 
 /** What a figure looks like: what is drawn of it in a pose. */
@@ -108,8 +108,9 @@ export class Scene {
 
   /** x and z in metres where a pixel of the canvas shows the ground. */
   groundAt(x: number, y: number): [x: number, z: number] | null {
-    const point = this.camera && this.stage.onGround(this.camera, x, y);
-    return point ? [point[0] * this.height, point[1] * this.height] : null;
+    if (!this.camera) return null;
+    const { eye, ray } = this.stage.rayAt(this.camera, x, y);
+    return metBy(times(eye, this.height), ray);
   }
 
   /** The camera comes after the first figure without its sway, at half of the height it takes, further away where there are many. */

@@ -105,7 +105,7 @@ export interface Stage {
     height: number,
     covered?: number,
   ): Camera;
-  onGround(camera: Camera, x: number, y: number): readonly [x: number, z: number] | null;
+  rayAt(camera: Camera, x: number, y: number): { eye: Vector; ray: Vector };
   listen(canvas: HTMLCanvasElement): void;
   turn(yaw: number, pitch: number): void;
   zoom(factor: number): void;

@@ -1,6 +1,11 @@
 /** Where a figure is on the ground and how it faces: x, z in metres, and radians about y, 0 along z. */
 export type Pose = [number, number, number];
 
+/** The length of a vector on the ground; Math.hypot takes ten times as long. */
+export function lengthOf(x: number, z: number): number {
+  return Math.sqrt(x * x + z * z);
+}
+
 /** The pose that a move leads to: forward and to the left in metres, and a turn to the left in radians. */
 export function moved([x, z, facing]: Pose, [forward, left, turn]: Pose): Pose {
   const sin = Math.sin(facing);

@@ -34,8 +34,32 @@ export function quaternionOf([x, y, z]: Rotation): Quaternion {
   return positive(normalised(scaled[diagonal.indexOf(Math.max(...diagonal))]!));
 }
 
+/** The turn of a bone, of numbers that hold four for each. */
+export function turnAt(turns: Float64Array, bone: number): Quaternion {
+  const at = 4 * bone;
+  return [turns[at]!, turns[at + 1]!, turns[at + 2]!, turns[at + 3]!];
+}
+
+export function setTurn(turns: Float64Array, bone: number, turn: Quaternion): void {
+  const at = 4 * bone;
+  turns[at] = turn[0];
+  turns[at + 1] = turn[1];
+  turns[at + 2] = turn[2];
+  turns[at + 3] = turn[3];
+}
+
+// what follows is called thousands of times in a tick: parts are taken by index, which iterates over nothing
+
 /** First the right turn, then the left. */
-export function product([ax, ay, az, aw]: Quaternion, [bx, by, bz, bw]: Quaternion): Quaternion {
+export function product(a: Quaternion, b: Quaternion): Quaternion {
+  const ax = a[0];
+  const ay = a[1];
+  const az = a[2];
+  const aw = a[3];
+  const bx = b[0];
+  const by = b[1];
+  const bz = b[2];
+  const bw = b[3];
   return [
     aw * bx + bw * ax + ay * bz - az * by,
     aw * by + bw * ay + az * bx - ax * bz,
@@ -53,7 +77,7 @@ export function cross(a: Vector, b: Vector): Vector {
 }
 
 export function unit(vector: Vector): Vector {
-  const length = Math.max(Math.hypot(...vector), 1e-12);
+  const length = Math.max(size(vector), 1e-12);
   return [vector[0] / length, vector[1] / length, vector[2] / length];
 }
 
@@ -70,7 +94,7 @@ export function times(a: Vector, factor: number): Vector {
 }
 
 export function size(a: Vector): number {
-  return Math.hypot(a[0], a[1], a[2]);
+  return Math.sqrt(dot(a, a));
 }
 
 export function mean(vectors: Vector[]): Vector {
@@ -87,25 +111,32 @@ export const [X, Y, Z]: Rotation = [
 ];
 
 export function normalised(q: Quaternion): Quaternion {
-  const length = Math.hypot(...q);
+  const length = Math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   return [q[0] / length, q[1] / length, q[2] / length, q[3] / length];
 }
 
 /** The same rotation, w not negative. */
-export function positive([x, y, z, w]: Quaternion): Quaternion {
-  return w < 0 ? [-x, -y, -z, -w] : [x, y, z, w];
+export function positive(q: Quaternion): Quaternion {
+  return q[3] < 0 ? [-q[0], -q[1], -q[2], -q[3]] : [q[0], q[1], q[2], q[3]];
 }
 
-export function inverse([x, y, z, w]: Quaternion): Quaternion {
-  return [-x, -y, -z, w];
+export function inverse(q: Quaternion): Quaternion {
+  return [-q[0], -q[1], -q[2], q[3]];
 }
 
 /** A vector turned by a rotation. */
-export function rotated([x, y, z, w]: Quaternion, [a, b, c]: Vector): Vector {
-  const p = 2 * (y * c - z * b);
-  const q = 2 * (z * a - x * c);
-  const r = 2 * (x * b - y * a);
-  return [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p];
+export function rotated(q: Quaternion, vector: Vector): Vector {
+  const x = q[0];
+  const y = q[1];
+  const z = q[2];
+  const w = q[3];
+  const a = vector[0];
+  const b = vector[1];
+  const c = vector[2];
+  const u = 2 * (y * c - z * b);
+  const v = 2 * (z * a - x * c);
+  const t = 2 * (x * b - y * a);
+  return [a + w * u + y * t - z * v, b + w * v + z * u - x * t, c + w * t + x * v - y * u];
 }
 
 /** The turn about a unit axis. */
@@ -116,9 +147,10 @@ export function about(axis: Vector, angle: number): Quaternion {
 
 /** The rotation vector of a turn, at most half a turn long. */
 export function vectorOf(q: Quaternion): Vector {
-  const [x, y, z, w] = positive(q);
-  const sine = Math.hypot(x, y, z);
-  return times([x, y, z], sine > 1e-12 ? (2 * Math.atan2(sine, w)) / sine : 2);
+  const side = q[3] < 0 ? -1 : 1;
+  const axis: Vector = [side * q[0], side * q[1], side * q[2]];
+  const sine = size(axis);
+  return times(axis, sine > 1e-12 ? (2 * Math.atan2(sine, side * q[3])) / sine : 2);
 }
 
 /** The same turn by the rotation vector that is nearest to another: by an angle about an axis it is also one by less a round. */

@@ -16,6 +16,16 @@ export function damped(
   return [(off + rise) * left, (rate - damping * rise) * left];
 }
 
+/** Distances from rest and their rates, some seconds later, in place. */
+export function damp(off: Float64Array, rate: Float64Array, damping: number, seconds: number): void {
+  const left = Math.exp(-damping * seconds);
+  for (let i = 0; i < off.length; i++) {
+    const rise = (rate[i]! + damping * off[i]!) * seconds;
+    off[i] = (off[i]! + rise) * left;
+    rate[i] = (rate[i]! - damping * rise) * left;
+  }
+}
+
 /** The integral of the distance over those seconds. */
 export function dampedPath(off: number, rate: number, damping: number, seconds: number): number {
   const rise = rate / damping + off;

@@ -9,13 +9,14 @@ import {
   nearestTurn,
   ofVector,
   product,
-  type Quaternion,
+  setTurn,
   size,
+  turnAt,
   type Vector,
   vectorOf,
 } from "../motion/rotations.js";
-import { clamp, damped, dampingOf, wrapped } from "../motion/springs.js";
-import type { Played, Steerer } from "./step.js";
+import { clamp, damp, dampingOf, wrapped } from "../motion/springs.js";
+import { type Body, newPose, place, type Played, type Steerer } from "./step.js";
 import type { Settings } from "../settings.js";
 
 const LOWER = ["hips", ...SIDES.flatMap((side) => LEG.map((part) => side + part))];
@@ -25,8 +26,8 @@ const SPINE = BONES.indexOf("spine");
 /** From this feature after the trajectory's on they tell of the hands: how the upper body is. */
 const HANDS = MATCHING.FEATURES - MATCHING.TRAJECTORY - 6;
 
-/** A pose in its frame of the facing. */
-type Body = Pick<Played, "rotations" | "height">;
+/** A rotation vector of each bone, and the height. */
+const WIDTH = 3 * BONES.length + 1;
 
 /** What is played. frame: that is shown. age: ticks since it was begun. yields: whether the legs go as soon as they are told to. */
 interface Playing {
@@ -50,8 +51,8 @@ export interface Acting {
   /** Whether the act led the whole body in the last tick. */
   led: boolean;
   /** What is added, rotation vectors in the parents' frames and height, how fast it changes, and by which damping it fades. */
-  offset: number[];
-  offsetRate: number[];
+  offset: Float64Array;
+  offsetRate: Float64Array;
   damping: number;
   /** Velocity over the ground, and the part of it that fades: m/s along x and z, rad/s. */
   going: Ground;
@@ -67,16 +68,20 @@ export interface ActingModel {
 
 /** Of a figure that does nothing but stand or go. */
 export function noAct(steerer: Steerer, playback: Playback): Acting {
-  const base = steerer.body(playback);
-  const none = () => Array<number>(3 * BONES.length + 1).fill(0);
-  const body = { base, shown: base, before: base };
+  const body = () => {
+    const pose = newPose();
+    steerer.body(playback, pose);
+    return pose;
+  };
   return {
     playing: null,
     request: null,
-    ...body,
+    base: body(),
+    shown: body(),
+    before: body(),
     led: false,
-    offset: none(),
-    offsetRate: none(),
+    offset: new Float64Array(WIDTH),
+    offsetRate: new Float64Array(WIDTH),
     damping: 0,
     going: [0, 0, 0],
     drift: [0, 0, 0],
@@ -113,7 +118,7 @@ export function begin(
   if (now?.whole && !after?.whole) {
     const { steerer } = model;
     steerer.matcher.follow(playback, target, gait, steerer.matcher.scaled(now.act.features[now.frame]!));
-    acting.base = steerer.body(playback);
+    steerer.body(playback, acting.base);
   }
   return !!request || !after || after.whole !== now?.whole;
 }
@@ -154,7 +159,7 @@ function entered(
   return { act, frame: best + 1, age: 0, whole, yields: upper === undefined && !stays };
 }
 
-/** After a tick: its pose with the act laid over it, and the figure where that leads. root: before the tick. */
+/** After a tick: lay the act over its pose, and put the figure where that leads. root: before the tick. */
 export function laid(
   { acts: settings, steerer: { matcher } }: ActingModel,
   acting: Acting,
@@ -162,113 +167,135 @@ export function laid(
   playback: Playback,
   root: Ground,
   changed: boolean,
-): Played {
+): void {
   const { dt } = matcher;
-  const { playing, base } = acting;
-  acting.base = { rotations: pose.rotations, height: pose.height };
+  const { playing, going, drift } = acting;
   // how the figure goes: as the act, or as its steps
   const step: Ground = playing?.whole
     ? stepOf(playing.act, playing.frame, root[2])
     : [playback.root[0] - root[0], playback.root[1] - root[1], wrapped(playback.root[2] - root[2])];
   // inertialization: a jump in the pose becomes an offset that fades
-  if (changed) lose(acting, settings, base, step, dt);
-  acting.before = acting.shown;
+  if (changed) lose(acting, settings, pose, step, dt);
   acting.led = !!playing?.whole;
-  if (!playing && !acting.offset.some((value) => value)) {
-    acting.shown = acting.base;
-    acting.going = each((i) => step[i]! / dt);
-    return pose;
+  // what was shown last is before what is shown now
+  const { shown, before } = acting;
+  acting.shown = before;
+  acting.before = shown;
+  copyBody(acting.base, pose);
+  if (!playing && !acting.offset.some((value) => value !== 0)) {
+    copyBody(acting.shown, pose);
+    for (let i = 0; i < 3; i++) going[i] = step[i]! / dt;
+    return;
   }
   // the pose is the act, or the steps, and what is left of the offset
   fade(acting, settings, dt);
-  acting.shown = plus(source(acting, acting.base, 0), acting.offset);
-  acting.going = each((i) => step[i]! / dt + acting.drift[i]!);
+  source(acting, acting.base, 0, pose);
+  add(pose, acting.offset);
+  copyBody(acting.shown, pose);
   // the figure goes where that leads
-  const to = playing?.whole ? each((i) => root[i]! + step[i]!) : playback.root;
-  playback.root = [
-    to[0] + acting.drift[0] * dt,
-    to[1] + acting.drift[1] * dt,
-    wrapped(to[2] + acting.drift[2] * dt),
-  ];
-  if (playing?.whole) {
-    playback.spring = [acting.going[0], acting.going[1], playback.root[2]];
-    playback.springRate = [0, 0, 0];
+  for (let i = 0; i < 3; i++) {
+    going[i] = step[i]! / dt + drift[i]!;
+    if (playing?.whole) playback.root[i] = root[i]! + step[i]!;
+    playback.root[i]! += drift[i]! * dt;
   }
-  return {
-    ...acting.shown,
-    ground: playback.root,
-    contacts: playing?.whole ? playing.act.contacts[playing.frame]! : pose.contacts,
-  };
+  playback.root[2] = wrapped(playback.root[2]);
+  place(pose, playback);
+  if (playing?.whole) {
+    playback.spring = [going[0], going[1], playback.root[2]];
+    playback.springRate = [0, 0, 0];
+    const [left, right] = playing.act.contacts[playing.frame]!;
+    pose.contacts[0] = left;
+    pose.contacts[1] = right;
+  }
 }
 
-function each(value: (i: number) => number): Ground {
-  return [value(0), value(1), value(2)];
+function copyBody(body: Body, other: Body): void {
+  body.rotations.set(other.rotations);
+  body.height = other.height;
 }
 
 /**
  * What is lost from the last tick to this one is added: of the upper body, and where an act leads the whole body, or led it, of
- * all of it and of the velocity. base: of the last tick without acts.
+ * all of it and of the velocity. pose: of this tick without acts.
  */
 function lose(
   acting: Acting,
   { blend, far, height_weight, longest }: Settings<typeof actSettings>,
-  base: Body,
+  pose: Body,
   step: Ground,
   dt: number,
 ): void {
-  const { shown, before } = acting;
-  const ahead = since(plus(shown, since(shown, before)), source(acting, acting.base, 0));
-  const off = since(shown, source(acting, base, 1));
-  BONES.forEach((_, bone) =>
-    off.splice(3 * bone, 3, ...nearestTurn(vectorAt(off, bone), vectorAt(ahead, bone))),
-  );
+  const { shown, before, base, offset, offsetRate } = acting;
+  // how it would go on, and how it was, beside what is played
+  const [next, last, going] = [newPose(), newPose(), newPose()];
+  source(acting, pose, 0, next);
+  source(acting, base, 1, last);
+  copyBody(going, shown);
+  add(going, since(shown, before));
+  const ahead = since(going, next);
+  const off = since(shown, last);
+  BONES.forEach((_, bone) => off.set(nearestTurn(vectorAt(off, bone), vectorAt(ahead, bone)), 3 * bone));
   const leads = acting.led || acting.playing?.whole;
-  const isNew = (i: number) => leads || UPPER[Math.floor(i / 3)];
-  acting.offsetRate = ahead.map((value, i) => (isNew(i) ? (value - off[i]!) / dt : acting.offsetRate[i]!));
-  acting.offset = off.map((value, i) => (isNew(i) ? value : acting.offset[i]!));
+  off.forEach((value, i) => {
+    if (!leads && !UPPER[Math.floor(i / 3)]) return;
+    offset[i] = value;
+    offsetRate[i] = (ahead[i]! - value) / dt;
+  });
   const farthest = Math.max(
-    ...BONES.map((_, bone) => size(vectorAt(acting.offset, bone))),
-    height_weight * Math.abs(acting.offset.at(-1)!),
+    ...BONES.map((_, bone) => size(vectorAt(offset, bone))),
+    height_weight * Math.abs(offset.at(-1)!),
   );
   acting.damping = dampingOf(blend) / clamp(farthest / far, 1, longest);
-  if (leads) acting.drift = each((i) => acting.going[i]! - step[i]! / dt);
+  for (let i = 0; i < 3 && leads; i++) acting.drift[i] = acting.going[i]! - step[i]! / dt;
 }
 
 /** What is added, a tick later; nothing once nothing is seen of it. */
 function fade(acting: Acting, { blend }: Settings<typeof actSettings>, dt: number): void {
-  const later = acting.offset.map((off, i) => damped(off, acting.offsetRate[i]!, acting.damping, dt));
-  const left = later.some(([off]) => Math.abs(off) > ACTION_LAYER.FADED) ? 1 : 0;
-  acting.offset = later.map(([off]) => left * off);
-  acting.offsetRate = later.map(([, rate]) => left * rate);
-  acting.drift = each((i) => acting.drift[i]! * left * 0.5 ** (dt / blend));
+  const { offset, offsetRate, drift } = acting;
+  damp(offset, offsetRate, acting.damping, dt);
+  for (let i = 0; i < 3; i++) drift[i]! *= 0.5 ** (dt / blend);
+  if (offset.some((off) => Math.abs(off) > ACTION_LAYER.FADED)) return;
+  offset.fill(0);
+  offsetRate.fill(0);
+  drift.fill(0);
 }
 
-/** What is played, over a base, so many frames before. */
-function source({ playing }: Acting, base: Body, back: number): Body {
-  if (!playing) return base;
+/** What is played, over a base, so many frames before, into a body. */
+function source({ playing }: Acting, base: Body, back: number, into: Body): void {
+  copyBody(into, base);
+  if (!playing) return;
   const { act, frame, whole } = playing;
   const rotations = act.rotations[frame - back]!;
-  if (whole) return { rotations, height: act.height[frame - back]! };
-  const blended = base.rotations.map((rotation, bone) => (UPPER[bone] ? rotations[bone]! : rotation));
-  blended[SPINE] = product(inverse(base.rotations[0]!), product(rotations[0]!, rotations[SPINE]!));
-  return { rotations: blended, height: base.height };
+  if (whole) {
+    into.rotations.set(rotations);
+    into.height = act.height[frame - back]!;
+    return;
+  }
+  for (let bone = 0; bone < BONES.length; bone++)
+    if (UPPER[bone]) setTurn(into.rotations, bone, turnAt(rotations, bone));
+  const spine = product(turnAt(rotations, 0), turnAt(rotations, SPINE));
+  setTurn(into.rotations, SPINE, product(inverse(turnAt(base.rotations, 0)), spine));
 }
 
-function vectorAt(more: number[], bone: number): Vector {
-  return more.slice(3 * bone, 3 * bone + 3) as Vector;
+function vectorAt(more: Float64Array, bone: number): Vector {
+  const at = 3 * bone;
+  return [more[at]!, more[at + 1]!, more[at + 2]!];
 }
 
 /** What is to be added to another body to make it this one. */
-function since(body: Body, other: Body): number[] {
-  const turns = body.rotations.map((rotation, bone) =>
-    vectorOf(product(rotation, inverse(other.rotations[bone]!))),
-  );
-  return [...turns.flat(), body.height - other.height];
+function since(body: Body, other: Body): Float64Array {
+  const more = new Float64Array(WIDTH);
+  BONES.forEach((_, bone) => {
+    const turn = product(turnAt(body.rotations, bone), inverse(turnAt(other.rotations, bone)));
+    more.set(vectorOf(turn), 3 * bone);
+  });
+  more[WIDTH - 1] = body.height - other.height;
+  return more;
 }
 
-function plus({ rotations, height }: Body, more: number[]): Body {
-  const turned = rotations.map((rotation, bone): Quaternion =>
-    product(ofVector(vectorAt(more, bone)), rotation),
-  );
-  return { rotations: turned, height: height + more.at(-1)! };
+function add(body: Body, more: Float64Array): void {
+  const { rotations } = body;
+  for (let bone = 0; bone < BONES.length; bone++)
+    setTurn(rotations, bone, product(ofVector(vectorAt(more, bone)), turnAt(rotations, bone)));
+  body.height += more[WIDTH - 1]!;
 }

@@ -18,6 +18,7 @@ import {
   rotationOf,
   size,
   STILL,
+  turnAt,
   type Vector,
   Y,
 } from "../motion/rotations.js";
@@ -28,8 +29,8 @@ import type { Played } from "./step.js";
 /** A motion that a steered figure can play, a frame in each tick; `actOf` makes it. */
 export interface Act {
   name: string;
-  /** Of the bones, in their order; the hips' in the frame of the facing. */
-  rotations: Quaternion[][];
+  /** By frame, four numbers of each bone, in their order; the hips' in the frame of the facing. */
+  rotations: Float64Array[];
   height: number[];
   ground: Ground[];
   contacts: [left: number, right: number][];
@@ -64,7 +65,9 @@ export function actOf({ fps, acts: settings }: ActModel, name: string, numbers: 
   );
   const poses = rows.map((row): Played => ({
     ground: [row[ACTS.WIDTH - 4]!, row[ACTS.WIDTH - 3]!, row[ACTS.WIDTH - 2]!],
-    rotations: BONES.map((_, bone) => unitOf(row.slice(4 * bone, 4 * bone + 4) as Quaternion)),
+    rotations: Float64Array.from(
+      BONES.flatMap((_, bone) => unitOf(row.slice(4 * bone, 4 * bone + 4) as Quaternion)),
+    ),
     height: row[ACTS.WIDTH - 1]!,
     contacts: [1, 1],
   }));
@@ -145,7 +148,10 @@ function chunks(values: number[], width: number): number[][] {
 /** Poses, a tick after each other, as a motion of the humanoid. */
 export function motionOf(poses: Pick<Played, "ground" | "rotations" | "height">[], fps = 30): Motion {
   const rotations = poses.map((pose) => {
-    const turns = HUMANOID.names.map((name): Quaternion => pose.rotations[BONES.indexOf(name)] ?? STILL);
+    const turns = HUMANOID.names.map((name): Quaternion => {
+      const bone = BONES.indexOf(name);
+      return bone < 0 ? STILL : turnAt(pose.rotations, bone);
+    });
     turns[0] = product(about(Y, pose.ground[2]), turns[0]!);
     return turns;
   });

@@ -1,8 +1,9 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
 import { type footLockSettings, STEPPING } from "../generated.js";
+import { lengthOf } from "../motion/planar.js";
 import { LEG, SOLES } from "../figures/humanoid/bones.js";
 import { legOf, type Limb, reach } from "../figures/legs.js";
-import { about, minus, plus, product, rotated, type Vector, Y } from "../motion/rotations.js";
+import { about, plus, product, rotated, turnAt, type Vector, Y } from "../motion/rotations.js";
 import { damped, dampingOf } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
@@ -14,10 +15,11 @@ const POINTS = LEG.flatMap((part, joint) =>
 );
 const BALL = 1;
 
-/** Of one foot, how high it steps and how fast that changes, and where the points of its sole were. */
+/** Of one foot, how high it steps and how fast that changes, and where the points of its sole were, if there was a tick. */
 interface Foot extends Step {
   height: [off: number, rate: number];
-  soles: Vector[] | null;
+  soles: Float64Array;
+  isNew: boolean;
 }
 
 /** The lock of one figure: a foot each, left and right. */
@@ -26,60 +28,76 @@ export type Lock = [Foot, Foot];
 type LockSettings = Settings<typeof footLockSettings>;
 
 export function newLock(): Lock {
-  const foot = (): Foot => ({ ...newStep(), height: [0, 0], soles: null });
+  const foot = (): Foot => ({
+    ...newStep(),
+    height: [0, 0],
+    soles: new Float64Array(3 * POINTS.length),
+    isNew: true,
+  });
   return [foot(), foot()];
 }
 
-/** The next pose, a tick later, with standing feet held in place and above the ground. plan: of its steps, null for none. */
-export function held(
-  lock: Lock,
-  pose: Played,
-  settings: LockSettings,
-  dt: number,
-  plan: Plan | null,
-): Played {
-  const [x, z, facing] = pose.ground;
-  const hips = product(about(Y, facing), pose.rotations[0]!);
-  const rotations = [...pose.rotations];
-  const footings = lock.map(({ shift, clock }, side): Footing => {
-    const stands = pose.contacts[side]! > settings.stands;
-    return { distance: Math.hypot(...shift), clock, stands, isLeft: side === 0 };
-  });
-  lock.forEach((foot, side) => {
+/** Hold standing feet of a pose in place and above the ground, a tick later. plan: of its steps, null for none. */
+export function held(lock: Lock, pose: Played, settings: LockSettings, dt: number, plan: Plan | null): void {
+  const { ground, rotations } = pose;
+  const hips = product(about(Y, ground[2]), turnAt(rotations, 0));
+  const place: Vector = [ground[0], pose.height, ground[1]];
+  const left = footingOf(lock, 0, pose, settings);
+  const right = footingOf(lock, 1, pose, settings);
+  for (let side = 0; side < 2; side++) {
+    const foot = lock[side]!;
     // where the leg and the points of its sole are played
-    const leg = legOf(pose.rotations, side, hips, [x, pose.height, z]);
+    const leg = legOf(rotations, side, hips, place);
     const soles = solePoints(leg);
-    const lowest = soles.reduce((least, point, at) => (point[1] < soles[least]![1] ? at : least), 0);
+    let lowest = 0;
+    for (let at = 1; at < soles.length; at++) if (soles[at]![1] < soles[lowest]![1]) lowest = at;
     // the point that bears the foot: the ball, or heel or tip if they are lower
     const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
-    const move = minus(soles[bears]!, (foot.soles ?? soles)[bears]!);
-    foot.soles = soles;
+    const moveX = foot.isNew ? 0 : soles[bears]![0] - foot.soles[3 * bears]!;
+    const moveZ = foot.isNew ? 0 : soles[bears]![2] - foot.soles[3 * bears + 2]!;
+    for (let point = 0, at = 0; point < soles.length; point++)
+      for (let axis = 0; axis < 3; axis++, at++) foot.soles[at] = soles[point]![axis]!;
+    foot.isNew = false;
     // the shift that keeps it where it was, or that fades once the foot swings; or a planned step
     const isHigh = pose.height > settings.low;
     const planned = isHigh && plan ? plan : null;
     const contact = isHigh ? pose.contacts[side]! : 0;
     const rises =
       planned && foot.clock >= 0
-        ? byPlan(foot, footings[side]!, footings[1 - side]!, move, planned, soles[lowest]![1], settings, dt)
-        : free(foot, contact, move, !!planned, soles[lowest]![1], settings, dt);
+        ? byPlan(
+            foot,
+            side ? right : left,
+            side ? left : right,
+            moveX,
+            moveZ,
+            planned,
+            soles[lowest]![1],
+            settings,
+            dt,
+          )
+        : free(foot, contact, moveX, moveZ, !!planned, soles[lowest]![1], settings, dt);
     if (foot.shift[0] || foot.shift[1] || rises)
       reach(rotations, side, hips, leg, [foot.shift[0], rises, foot.shift[1]]);
-  });
-  const contacts = plan ? shownContacts(lock, pose, plan) : pose.contacts;
-  return { ...pose, rotations, contacts };
+  }
+  if (plan) showContacts(lock, pose, plan);
+}
+
+function footingOf(lock: Lock, side: 0 | 1, { contacts }: Played, settings: LockSettings): Footing {
+  const { shift, clock } = lock[side];
+  const distance = lengthOf(shift[0], shift[1]);
+  return { distance, clock, stands: contacts[side] > settings.stands, isLeft: side === 0 };
 }
 
 /** Where heel, ball and tip of a leg's sole are. */
 export function solePoints({ turned, places }: Limb): Vector[] {
-  return POINTS.map(([joint, point]) => plus(places[joint]!, rotated(turned[joint]!, point)));
+  return POINTS.map((point) => plus(places[point[0]]!, rotated(turned[point[0]]!, point[1])));
 }
 
 /** Contacts as they are shown: a planned foot stands unless it is lifted. */
-function shownContacts(lock: Lock, { contacts }: Played, { settings }: Plan): [number, number] {
-  const [left, right] = lock.map(({ clock, height }, side) =>
-    clock === STEPPING.FREE ? contacts[side]! : Math.fround(1 - Math.min(height[0] / settings.lowest, 1)),
-  );
-  return [left!, right!];
+function showContacts(lock: Lock, { contacts }: Played, { settings }: Plan): void {
+  lock.forEach(({ clock, height }, side) => {
+    if (clock !== STEPPING.FREE) contacts[side] = Math.fround(1 - Math.min(height[0] / settings.lowest, 1));
+  });
 }
 
 /** Move a planned foot; by how much its ankle is lifted. lowest: the height of its sole as played. */
@@ -87,7 +105,8 @@ function byPlan(
   foot: Foot,
   footing: Footing,
   other: Footing,
-  [x, , z]: Vector,
+  x: number,
+  z: number,
   plan: Plan,
   lowest: number,
   settings: LockSettings,
@@ -106,14 +125,19 @@ function byPlan(
 function free(
   foot: Foot,
   contact: number,
-  move: Vector,
+  x: number,
+  z: number,
   planned: boolean,
   lowest: number,
   settings: LockSettings,
   dt: number,
 ): number {
-  const { stands, moved } = shift(foot, move, contact > settings.stands, settings, dt);
-  foot.anchor = [0, 0];
+  const wasX = foot.shift[0] - x;
+  const wasZ = foot.shift[1] - z;
+  const stands = shift(foot, x, z, contact > settings.stands, settings, dt);
+  const moved = lengthOf(foot.shift[0] - wasX, foot.shift[1] - wasZ);
+  foot.anchor[0] = 0;
+  foot.anchor[1] = 0;
   foot.clock = planned && stands ? 0 : STEPPING.FREE;
   // lift a foot that is moved back while its contact still is high, and any out of the ground
   const steps = contact * settings.steps * Math.min(1, moved / (settings.swings * dt));
@@ -126,27 +150,34 @@ function free(
 /** Lift a foot softly. */
 function rise(foot: Foot, goal: number, settings: LockSettings, dt: number): void {
   const [off, rate] = damped(foot.height[0] - goal, foot.height[1], dampingOf(settings.lifts), dt);
-  foot.height = [goal + off, rate];
+  foot.height[0] = goal + off;
+  foot.height[1] = rate;
 }
 
-/** Move a foot whose point that bears it was moved since the last tick; whether it stands, and how far it is then shown to move. */
+/** Move a foot whose point that bears it was moved since the last tick; whether it stands. */
 function shift(
   foot: Foot,
-  [x, , z]: Vector,
+  x: number,
+  z: number,
   contact: boolean,
   settings: LockSettings,
   dt: number,
-): { stands: boolean; moved: number } {
-  const stay: [number, number] = [foot.shift[0] - x, foot.shift[1] - z];
-  if (contact && Math.hypot(x, z) < settings.swings * dt && Math.hypot(...stay) < settings.farthest) {
-    foot.shift = stay;
-    foot.drift = [0, 0];
-    return { stands: true, moved: 0 };
+): boolean {
+  const toX = foot.shift[0] - x;
+  const toZ = foot.shift[1] - z;
+  if (contact && lengthOf(x, z) < settings.swings * dt && lengthOf(toX, toZ) < settings.farthest) {
+    foot.shift[0] = toX;
+    foot.shift[1] = toZ;
+    foot.drift[0] = 0;
+    foot.drift[1] = 0;
+    return true;
   }
   const damping = dampingOf(settings.fade);
   const [offX, rateX] = damped(foot.shift[0], foot.drift[0], damping, dt);
   const [offZ, rateZ] = damped(foot.shift[1], foot.drift[1], damping, dt);
-  foot.shift = [offX, offZ];
-  foot.drift = [rateX, rateZ];
-  return { stands: false, moved: Math.hypot(offX - stay[0], offZ - stay[1]) };
+  foot.shift[0] = offX;
+  foot.shift[1] = offZ;
+  foot.drift[0] = rateX;
+  foot.drift[1] = rateZ;
+  return false;
 }

@@ -1,11 +1,21 @@
 /* Figures that stand keep their place, and breathe: docs/reference/bundle.md, "Standing". */
 import { IDLE, type idleSettings } from "../generated.js";
 import type { Playback, Target } from "./matching.js";
-import type { Pose as Ground } from "../motion/planar.js";
-import { about, inverse, product, type Quaternion, rotated, STILL, X } from "../motion/rotations.js";
+import { lengthOf, type Pose as Ground } from "../motion/planar.js";
+import {
+  about,
+  inverse,
+  product,
+  type Quaternion,
+  rotated,
+  setTurn,
+  STILL,
+  turnAt,
+  X,
+} from "../motion/rotations.js";
 import { damped, dampingOf } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
-import type { Played } from "./step.js";
+import { place, type Played } from "./step.js";
 
 /** The bones that a breath turns about the x axis of the hips, and by how many times its depth. */
 const TURNS = Object.entries(IDLE.BREATH_TURNS).map(([bone, times]) => ({ bone: Number(bone), times }));
@@ -24,7 +34,7 @@ export function notYet(): Standing {
   return { ticks: 0, share: 0, rate: 0 };
 }
 
-/** A tick later; a figure that stands is kept where it was before it. root: before the tick. acts: whether an act leads the whole body. */
+/** A tick later; keep a figure that stands where it was before it. root: before the tick. acts: whether an act leads the whole body. */
 export function kept(
   standing: Standing,
   pose: Played,
@@ -34,27 +44,29 @@ export function kept(
   acts: boolean,
   settings: Settings<typeof idleSettings>,
   dt: number,
-): Played {
-  const slow = Math.hypot(playback.spring[0], playback.spring[1]) < settings.slow;
-  const stands =
-    !target[0] && !target[1] && !acts && slow && pose.contacts.every((contact) => contact > settings.stands);
+): void {
+  const slow = lengthOf(playback.spring[0], playback.spring[1]) < settings.slow;
+  const isDown = Math.min(pose.contacts[0], pose.contacts[1]) > settings.stands;
+  const stands = !target[0] && !target[1] && !acts && slow && isDown;
   const goal = stands ? 1 : 0;
   const [off, rate] = damped(standing.share - goal, standing.rate, dampingOf(settings.settles), dt);
-  Object.assign(standing, { ticks: standing.ticks + 1, share: goal + off, rate });
-  const [toX, toZ, facing] = playback.root;
+  standing.ticks++;
+  standing.share = goal + off;
+  standing.rate = rate;
   const rests = goal * standing.share;
-  playback.root = [toX - rests * (toX - x), toZ - rests * (toZ - z), facing];
-  return { ...pose, ground: playback.root };
+  playback.root[0] -= rests * (playback.root[0] - x);
+  playback.root[1] -= rests * (playback.root[1] - z);
+  place(pose, playback);
 }
 
-/** A pose with its breath. */
+/** Let a pose breathe. */
 export function breathed(
   { ticks, share }: Standing,
   pose: Played,
   settings: Settings<typeof idleSettings>,
   dt: number,
-): Played {
-  if (share <= IDLE.LEAST_BREATH) return pose;
+): void {
+  if (share <= IDLE.LEAST_BREATH) return;
   const [x, z] = pose.ground;
   const angle =
     settings.depth *
@@ -62,12 +74,11 @@ export function breathed(
     Math.sin(
       2 * Math.PI * (((ticks * dt) / settings.breath) % 1) + settings.wave_x * x + settings.wave_z * z,
     );
-  const rotations = [...pose.rotations];
+  const { rotations } = pose;
   let above: Quaternion = STILL;
   for (const { bone, times } of TURNS) {
-    const local = pose.rotations[bone]!;
-    if (times) rotations[bone] = product(about(rotated(inverse(above), X), times * angle), local);
+    const local = turnAt(rotations, bone);
+    if (times) setTurn(rotations, bone, product(about(rotated(inverse(above), X), times * angle), local));
     if (TRUNK.includes(bone)) above = product(above, local);
   }
-  return { ...pose, rotations };
 }

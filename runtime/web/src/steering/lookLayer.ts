@@ -10,8 +10,10 @@ import {
   product,
   type Quaternion,
   rotated,
+  setTurn,
   size,
   STILL,
+  turnAt,
   type Vector,
   Y,
   Z,
@@ -39,15 +41,14 @@ export function ahead(): Look {
   return { point: null, turn: followerAt([0, 0]) };
 }
 
-/** A pose with the head turned, a tick after the last; the look goes on. */
+/** Turn the head of a pose, a tick after the last; the look goes on. */
 export function looked(
   look: Look,
   pose: Played,
   settings: Settings<typeof lookSettings>,
   seconds: number,
-): Played {
-  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST_TURN))
-    return pose;
+): void {
+  if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST_TURN)) return;
   const seen = bonesOf(pose);
   const now = angles(rotated(seen.at(-1)!, Z));
   look.turn = followed(
@@ -57,13 +58,11 @@ export function looked(
     settings.half_life,
     seconds,
   );
-  const rotations = [...pose.rotations];
   let above: Quaternion = STILL;
   turned(seen, now[0], shownBy(look.turn)).forEach((bone, i) => {
-    rotations[SHARES[i]![0]] = product(inverse(above), bone);
+    setTurn(pose.rotations, SHARES[i]![0], product(inverse(above), bone));
     above = bone;
   });
-  return { ...pose, rotations };
 }
 
 /** The turn that is wanted, to the left and up, of bones in the frame of the lower spine, the last of which looks at angles. */
@@ -90,14 +89,14 @@ function wanted(
 /** Rotations of the bones that turn in the frame of the lower spine. */
 function bonesOf({ rotations }: Played): Quaternion[] {
   let above: Quaternion = STILL;
-  return SHARES.map(([bone]) => (above = product(above, rotations[bone]!)));
+  return SHARES.map(([bone]) => (above = product(above, turnAt(rotations, bone))));
 }
 
 /** A point in the frame of the lower spine. */
 function inSpine({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
-  const hips = product(about(Y, facing), rotations[0]!);
+  const hips = product(about(Y, facing), turnAt(rotations, 0));
   const place = plus([x, height, z], rotated(hips, OFFSETS[SPINE]!));
-  return rotated(inverse(product(hips, rotations[SPINE]!)), minus(point, place));
+  return rotated(inverse(product(hips, turnAt(rotations, SPINE))), minus(point, place));
 }
 
 /** Where the eyes are in the frame of the lower spine. */

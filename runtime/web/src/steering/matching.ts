@@ -1,7 +1,7 @@
 /* Motion matching, which recorded frame a figure plays next: docs/reference/bundle.md, the loop `matching`. Metres, seconds, radians. */
 import { MATCHING, STEERING, steeringSettings } from "../generated.js";
 import { Goals, UNIT } from "./goals.js";
-import type { Pose as Ground } from "../motion/planar.js";
+import { lengthOf, type Pose as Ground } from "../motion/planar.js";
 import { clamp, damped, dampedPath, dampingOf, wrapped } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
 
@@ -97,7 +97,6 @@ export class Matcher {
   private readonly ways: Float64Array;
   private readonly features: Int16Array;
   readonly goals: Goals[];
-  /** Which gaits are faster than a creep. */
   /** Of each gait whether it can go slower than its recordings. */
   readonly creeps: boolean[];
   private readonly query = new Int16Array(MATCHING.FEATURES);
@@ -149,14 +148,14 @@ export class Matcher {
 
   /** Whether a figure is to go slower than recordings do. */
   creeping([x, z]: Target, gait: number): boolean {
-    const pace = Math.hypot(x, z);
+    const pace = lengthOf(x, z);
     return this.creeps[gait]! && pace >= MATCHING.LEAST_PACE / 2 && pace < this.settings.creep;
   }
 
   /** What a velocity over the ground is multiplied by to be as fast as recordings. */
   private hurry(x: number, z: number): number {
     const { creep } = this.settings;
-    const pace = Math.hypot(x, z);
+    const pace = lengthOf(x, z);
     return pace < creep ? creep / Math.max(pace, Math.min(MATCHING.LEAST_PACE, creep)) : 1;
   }
 
@@ -267,7 +266,7 @@ export class Matcher {
       facings.push(Math.sin(angle), Math.cos(angle));
     }
     const soon = (horizon * 2) / 3;
-    const speed = Math.hypot(
+    const speed = lengthOf(
       toX + damped(offX, rateX, slow, soon)[0],
       toZ + damped(offZ, rateZ, slow, soon)[0],
     );

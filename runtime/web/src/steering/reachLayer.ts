@@ -12,8 +12,10 @@ import {
   product,
   type Quaternion,
   rotated,
+  setTurn,
   size,
   times,
+  turnAt,
   unit,
   type Vector,
   Y,
@@ -44,16 +46,16 @@ export function idle(): Reach {
   return { point: null, aim: followerAt([0, 0, 0]), weight: followerAt([0]), signs: [0, 0], beyond: false };
 }
 
-/** A pose with the hand of a side there, a tick after the last; the reach goes on. */
+/** Bring the hand of a side of a pose there, a tick after the last; the reach goes on. */
 export function reached(
   hand: Reach,
   side: number,
   pose: Played,
   settings: Settings<typeof reachSettings>,
   seconds: number,
-): Played {
-  const rests = shownBy(hand.weight)[0]! < REACH_LAYER.LEAST_WEIGHT;
-  if (!hand.point && rests) return pose;
+): void {
+  const rests = hand.weight.wanted[0]! + hand.weight.off[0]! < REACH_LAYER.LEAST_WEIGHT;
+  if (!hand.point && rests) return;
   // where the hand can be for its point, and whether that can be held
   const arm = armOf(pose, side);
   const goal = hand.point && withinReach(arm, inChest(pose, hand.point), side, settings);
@@ -69,11 +71,9 @@ export function reached(
   const before = rests ? [0, 0] : hand.signs;
   hand.signs = [sign(arm.upper, upper, before[0]!), sign(arm.lower, lower, before[1]!)];
   const share = shownBy(hand.weight)[0]!;
-  const rotations = [...pose.rotations];
   const bones = ARMS[side]!;
-  rotations[bones[1]!] = mixed(arm.upper, upper, share, hand.signs[0]);
-  rotations[bones[2]!] = mixed(arm.lower, lower, share, hand.signs[1]);
-  return { ...pose, rotations };
+  setTurn(pose.rotations, bones[1]!, mixed(arm.upper, upper, share, hand.signs[0]));
+  setTurn(pose.rotations, bones[2]!, mixed(arm.lower, lower, share, hand.signs[1]));
 }
 
 /** An arm as it is played: where its shoulder joint is in the frame of the upper chest; the rotations of collar bone, upper arm and
@@ -88,7 +88,7 @@ interface Arm {
 
 function armOf(pose: Played, side: number): Arm {
   const bones = ARMS[side]!;
-  const [shoulder, upper, lower, hand] = bones.map((bone) => pose.rotations[bone]!) as [
+  const [shoulder, upper, lower, hand] = bones.map((bone) => turnAt(pose.rotations, bone)) as [
     Quaternion,
     Quaternion,
     Quaternion,
@@ -138,10 +138,10 @@ function out(side: number): number {
 /** A point in the frame of the upper chest. */
 function inChest({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
   let place: Vector = [x, height, z];
-  let above: Quaternion = product(about(Y, facing), rotations[0]!);
+  let above: Quaternion = product(about(Y, facing), turnAt(rotations, 0));
   for (const bone of TRUNK) {
     place = plus(place, rotated(above, OFFSETS[bone]!));
-    above = product(above, rotations[bone]!);
+    above = product(above, turnAt(rotations, bone));
   }
   return rotated(inverse(above), minus(point, place));
 }

@@ -12,10 +12,10 @@ import { lead, type Point, restingPlace, sent } from "./paths.js";
 import type { Target } from "./matching.js";
 import type { Motion } from "../motion/motion.js";
 import type { Pose } from "../representation/poses.js";
-import { about, product, type Quaternion, type Vector, Y } from "../motion/rotations.js";
+import { about, product, type Quaternion, turnAt, type Vector, Y } from "../motion/rotations.js";
 import { wrapped } from "../motion/springs.js";
 import { hasten, standing, type Steered, tell, tick } from "./steered.js";
-import { between, type Played } from "./step.js";
+import { between, copyPose, newPose, type Played } from "./step.js";
 import { checkedGround, type GroundHeight, newTerrain } from "./terrain.js";
 
 const RADIANS = Math.PI / 180;
@@ -63,7 +63,8 @@ export interface Way {
 }
 
 /** Of a tick, and what has happened since the one before. */
-interface Ticked extends Played {
+interface Ticked {
+  pose: Played;
   events: FigureEvent[];
 }
 
@@ -316,15 +317,17 @@ export class ControlSession {
     return this.played(targets).map(poseOf);
   }
 
+  /** The next pose of each figure, which is the figure's, and what happened. */
   private played(targets?: Target[]): Ticked[] {
     const { figures, room } = this.state;
     if (!targets && (room || figures.some(({ going }) => going))) lead(this.model, figures, room);
-    return figures.map((figure, at) =>
-      this.happened(figure, tick(this.model, figure, this.holdFeet, this.ground, targets?.[at])),
-    );
+    return figures.map((figure, at) => {
+      const pose = tick(this.model, figure, this.holdFeet, this.ground, targets?.[at]);
+      return { pose, events: this.happened(figure, pose) };
+    });
   }
 
-  private happened(figure: Steered, pose: Played): Ticked {
+  private happened(figure: Steered, pose: Played): FigureEvent[] {
     const {
       gaits,
       steerer: { matcher },
@@ -340,7 +343,7 @@ export class ControlSession {
     const act = playing && { name: playing.act.name, age: playing.age };
     const now = after(before, pose.contacts, gait, shows, going?.arrived ?? false, act);
     figure.happenings = now;
-    return { ...pose, events: eventsOf(now, before, gaits) };
+    return eventsOf(now, before, gaits);
   }
 
   /** The poses `seconds` later, 0 to 1, for a display of any frame rate: between two ticks. A command shows within a tick. */
@@ -350,29 +353,36 @@ export class ControlSession {
     const { state } = this;
     const events = state.late;
     state.late = state.figures.map(() => []);
-    const pass = (poses: Ticked[]) => poses.forEach((pose, at) => events[at]!.push(...pose.events));
+    const pass = (ticked: Ticked[]) => ticked.forEach((figure, at) => events[at]!.push(...figure.events));
+    const kept = (into?: Ticked[]) =>
+      this.played().map(({ pose, events }, at): Ticked => {
+        const copy = into?.[at]!.pose ?? newPose();
+        copyPose(copy, pose);
+        return { pose: copy, events };
+      });
     if (!state.shown) {
-      state.shown = [this.played(), this.played()];
+      state.shown = [kept(), kept()];
       pass(state.shown[0]);
     }
     state.ahead += seconds * this.model.fps;
     for (; state.ahead >= 1; state.ahead--) {
-      pass(state.shown[1]);
-      state.shown = [state.shown[1], this.played()];
+      const [oldest, last]: [Ticked[], Ticked[]] = state.shown;
+      pass(last);
+      state.shown = [last, kept(oldest)];
     }
     const [before, next] = state.shown;
-    return before.map((pose, at) =>
-      poseOf({ ...between(pose, next[at]!, state.ahead), events: events[at]! }),
+    return before.map(({ pose }, at) =>
+      poseOf({ pose: between(pose, next[at]!.pose, state.ahead), events: events[at]! }),
     );
   }
 
   /**
    * Let the figures go over ground that is not flat, from the next tick on: its height in metres at places x and z; null: the
    * plane y = 0. Hips are then above y = 0, and uphill figures are slower. A session keeps it when it is restored. ControlError for
-   * what is no function; a height that is no number is one of the tick.
+   * what is no function; where it fails, or gives no height, it is one of the tick.
    */
   setGround(ground: GroundHeight | null): void {
-    this.ground = ground && checkedGround(ground);
+    this.ground = ground === null ? null : checkedGround(ground);
     for (const figure of this.state.figures) figure.terrain = newTerrain();
   }
 
@@ -541,9 +551,11 @@ function byVelocity(command: Command, changes: Partial<Command>, [x, z]: readonl
   return changes.facing === undefined ? { ...moving, facesWay: command.facesWay || speed > 0 } : moving;
 }
 
-function poseOf({ ground, rotations: local, height, contacts, events }: Ticked): SteeredPose {
+function poseOf({ pose: { ground, rotations: local, height, contacts }, events }: Ticked): SteeredPose {
   const rotations: Record<string, Quaternion> = {};
-  for (let at = 0; at < BONES.length; at++) rotations[BONES[at]!] = local[at]!;
-  rotations.hips = product(about(Y, ground[2]), local[0]!);
-  return { hips: [ground[0], height, ground[1]], rotations, ground: [...ground], contacts, events };
+  for (let bone = 0; bone < BONES.length; bone++) rotations[BONES[bone]!] = turnAt(local, bone);
+  rotations.hips = product(about(Y, ground[2]), rotations.hips!);
+  const [x, z, facing] = ground;
+  const [left, right] = contacts;
+  return { hips: [x, height, z], rotations, ground: [x, z, facing], contacts: [left, right], events };
 }

@@ -21,10 +21,10 @@ import type { Pose as Ground } from "../motion/planar.js";
 import { idle, type Reach, reached } from "./reachLayer.js";
 import { breathed, kept, notYet, type Standing } from "./idle.js";
 import type { Settings } from "../settings.js";
-import type { Played, Steerer } from "./step.js";
+import { newPose, type Played, type Steerer } from "./step.js";
 import { planOf } from "./stepping.js";
 import { grounded, type GroundHeight, newTerrain, slowed, type Terrain } from "./terrain.js";
-import { type Joints, limited } from "./turnLimit.js";
+import { type Joints, limited, newJoints } from "./turnLimit.js";
 
 /** What figures are steered with. */
 export interface SteeringModel extends ActingModel {
@@ -54,6 +54,8 @@ export interface Steered {
   /** Of the left and the right hand. */
   hands: [Reach, Reach];
   joints: Joints;
+  /** As it is shown, which the next tick changes. */
+  pose: Played;
   /** Of its last tick. */
   happenings: Happenings | null;
 }
@@ -78,7 +80,8 @@ export function standing(steerer: Steerer, gait: number, place?: Ground, phase?:
     command,
     target: [0, 0, facing],
     ...orders,
-    joints: { rotations: null },
+    joints: newJoints(),
+    pose: newPose(),
     happenings: null,
   };
 }
@@ -98,7 +101,7 @@ export function hasten(playback: Playback): void {
 }
 
 /**
- * The next pose, 1 / fps seconds later. ground: where it is not flat. raw: a target in place of the figure's own, gone for as it is.
+ * The next pose, 1 / fps seconds later, which is the figure's. ground: where it is not flat. raw: a target in place of the figure's own, gone for as it is.
  */
 export function tick(
   model: SteeringModel,
@@ -107,20 +110,22 @@ export function tick(
   ground: GroundHeight | null = null,
   raw?: Target,
 ): Played {
-  const { playback, acting, command } = figure;
+  const { playback, acting, command, pose } = figure;
+  // what it goes for, slower uphill
   const wanted = raw ?? model.abilities.curved(figure.target, command.gait, playback.root[2]);
   const target = ground ? slowed(wanted, playback.root, ground, model.terrain) : wanted;
   const { steerer, idle: settings, fps } = model;
-  const { root } = playback;
+  const [x, z, facing] = playback.root;
+  const root: Ground = [x, z, facing];
   const dt = 1 / fps;
+  // its steps, and what it does laid over them
   const changed = begin(model, acting, playback, target, command.gait);
   const whole = acting.playing?.whole ?? false;
-  const played = steerer.tick(playback, target, command.gait);
-  const stood = holdFeet
-    ? kept(figure.standing, played, playback, root, target, whole, settings, dt)
-    : played;
-  const pose = laid(model, acting, stood, playback, root, changed);
+  steerer.tick(playback, target, command.gait, pose);
+  if (holdFeet) kept(figure.standing, pose, playback, root, target, whole, settings, dt);
+  laid(model, acting, pose, playback, root, changed);
   if (whole && !command.speed) stand(figure);
+  // feet held and on the ground
   const plan = whole
     ? null
     : planOf(
@@ -132,19 +137,18 @@ export function tick(
         figure.standing.share,
         model.steps,
       );
-  const footed = holdFeet
-    ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt, plan)
-    : pose;
-  const stepped = ground ? grounded(figure.terrain, footed, ground, model.terrain, dt) : footed;
-  return limited(figure.joints, guided(model, figure, stepped, dt), model.turns, dt);
-}
-
-/** A pose with head and arms as the figure is told. */
-function guided(model: SteeringModel, { look, hands }: Steered, pose: Played, seconds: number): Played {
-  return hands.reduce(
-    (shown, hand, side) => reached(hand, side, shown, model.reach, seconds),
-    looked(look, pose, model.look, seconds),
-  );
+  if (holdFeet) {
+    breathed(figure.standing, pose, settings, dt);
+    held(figure.lock, pose, model.lock, dt, plan);
+  }
+  if (ground) grounded(figure.terrain, pose, ground, model.terrain, dt);
+  // head and arms as it is told
+  looked(figure.look, pose, model.look, dt);
+  reached(figure.hands[0], 0, pose, model.reach, dt);
+  reached(figure.hands[1], 1, pose, model.reach, dt);
+  // joints no faster than people's
+  limited(figure.joints, pose, model.turns, dt);
+  return pose;
 }
 
 /** Who acts with the whole body and is told to stand goes on standing as it does then. */

@@ -1,40 +1,56 @@
 /* The step of a steered figure: docs/reference/bundle.md, the loop `matching`. Metres, seconds and radians. */
 import { MATCHING } from "../generated.js";
+import { BONES } from "../figures/humanoid/bones.js";
 import { type Matcher, type Playback, type Target } from "./matching.js";
-import { moved, type Pose as Ground } from "../motion/planar.js";
-import type { Quaternion } from "../motion/rotations.js";
-import { clamp, damped, dampingOf, wrapped } from "../motion/springs.js";
+import { lengthOf, moved, type Pose as Ground } from "../motion/planar.js";
+import { normalised, type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
+import { clamp, damp, damped, dampingOf, wrapped } from "../motion/springs.js";
 import { strided, warped } from "./warping.js";
 
-/** A pose on the humanoid: the hips' rotation is in the frame of the facing. */
+/** A pose on the humanoid: the hips' rotation is in the frame of the facing. A figure has one, which each stage of a tick changes. */
 export interface Played {
   ground: Ground;
-  /** Of the humanoid's bones, in their order. */
-  rotations: Quaternion[];
+  /** Quaternions of the humanoid's bones, in their order, four numbers each. */
+  rotations: Float64Array;
   /** Metres of the hips above the ground. */
   height: number;
   /** From 0 to 1, how much the left and the right foot stand. */
   contacts: [left: number, right: number];
 }
 
+/** What of a pose is not where it is. */
+export type Body = Pick<Played, "rotations" | "height">;
+
+export function newPose(): Played {
+  return { ground: [0, 0, 0], rotations: new Float64Array(4 * BONES.length), height: 0, contacts: [0, 0] };
+}
+
+/** Make a pose the same as another. */
+export function copyPose(pose: Played, other: Played): void {
+  pose.rotations.set(other.rotations);
+  pose.height = other.height;
+  for (let i = 0; i < 3; i++) pose.ground[i] = other.ground[i]!;
+  pose.contacts[0] = other.contacts[0];
+  pose.contacts[1] = other.contacts[1];
+}
+
 /** The kernel: the numbers of a bundle, and what they are computed with. */
 export class Steerer {
   private readonly codes: Float64Array;
-  private readonly values: Float64Array;
   private readonly mean: Float64Array;
+  /** Of each bone what each code adds to its quaternion, and after all bones to the height. */
   private readonly basis: Float64Array;
+  /** Of the row that is played, as `recordedMoves` writes them. */
+  private readonly moves = new Float64Array(6);
 
   constructor(readonly matcher: Matcher) {
-    // four codes are added at once; there are 0 more of them where that leaves a rest
-    this.codes = new Float64Array(4 * Math.ceil(matcher.codes / 4));
+    this.codes = new Float64Array(matcher.codes);
     this.mean = Float64Array.from(matcher.tables.pose_mean);
-    this.basis = new Float64Array(this.codes.length * this.mean.length);
-    this.basis.set(matcher.tables.pose_basis);
-    this.values = new Float64Array(this.mean.length);
+    this.basis = byBone(matcher.tables.pose_basis, matcher.codes, this.mean.length);
   }
 
-  /** The next pose, 1 / fps seconds later. */
-  tick(figure: Playback, target: Target, gait: number): Played {
+  /** The next pose, 1 / fps seconds later, written into one. */
+  tick(figure: Playback, target: Target, gait: number, pose: Played): void {
     const { matcher } = this;
     const { settings, dt } = matcher;
     // search: jump to another row where one fits better
@@ -44,55 +60,59 @@ export class Steerer {
     figure.row += Math.floor(at);
     figure.part = at - Math.floor(at);
     // the springs approach the target, and the root follows them
-    const moves = this.moves(figure);
+    const { moves } = this;
+    this.recordedMoves(figure);
     approach(figure, target, dampingOf(settings.velocity), dampingOf(settings.facing), dt);
     this.warp(figure, moves[3]!);
-    this.move(figure, moves, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
+    this.move(figure, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
     // inertialization: the offset of the last jumps fades
-    this.fade(figure, dampingOf(settings.blend));
+    damp(figure.offset, figure.offsetRate, dampingOf(settings.blend), dt);
     const left = Math.fround(moves[4]!);
     const right = Math.fround(moves[5]!); // so bounds are passed in the same ticks as in Python
-    const contacts: [number, number] = figure.mirror ? [right, left] : [left, right];
-    return { ground: figure.root, ...this.body(figure), contacts };
+    pose.contacts[0] = figure.mirror ? right : left;
+    pose.contacts[1] = figure.mirror ? left : right;
+    place(pose, figure);
+    this.body(figure, pose);
   }
 
-  /** What a figure plays, with its offset and turned as it goes. */
-  body(figure: Playback): Pick<Played, "rotations" | "height"> {
+  /** What a figure plays, with its offset and turned as it goes: rotations and height of a pose. */
+  body(figure: Playback, pose: Body): void {
     this.matcher.played(figure, this.codes);
-    const { rotations, height } = this.pose();
-    const legs = strided(rotations, figure.stride);
-    return { rotations: warped(legs, figure.warp), height };
+    this.pose(pose);
+    strided(pose.rotations, figure.stride);
+    warped(pose.rotations, figure.warp);
   }
 
   /** So many rows from the first on, as `actOf` takes their frames. */
   recorded(first: number, count: number): number[] {
     const { tables, dt, codes } = this.matcher;
+    const pose = newPose();
     let ground: Ground = [0, 0, 0];
     return Array.from({ length: count }, (_, at) => {
       const row = first + at;
       const move = (i: number) => tables.moves[6 * (first + at) + i]! * dt;
       if (at) ground = moved(ground, [move(0), move(1), move(2)]);
       this.codes.set(tables.codes.subarray(row * codes, (row + 1) * codes));
-      const { rotations, height } = this.pose();
-      return [...rotations.flat(), ...ground, height];
+      this.pose(pose);
+      return [...pose.rotations, ...ground, pose.height];
     }).flat();
   }
 
   /** Velocity over the ground (forward, left, turn), speed, and how much each foot stands, of the row as recorded. */
-  private moves({ row, part }: Playback): number[] {
+  private recordedMoves({ row, part }: Playback): void {
     const { moves } = this.matcher.tables;
-    return [0, 1, 2, 3, 4, 5].map(
-      (i) => moves[6 * row + i]! + part * (moves[6 * row + 6 + i]! - moves[6 * row + i]!),
-    );
+    for (let i = 0, at = 6 * row; i < 6; i++, at++)
+      this.moves[i] = moves[at]! + part * (moves[at + 6]! - moves[at]!);
   }
 
   /** By how much hips and legs are turned towards where the springs go, a tick later; by nothing if the row stands or goes elsewhere. */
   private warp(figure: Playback, recorded: number): void {
     const { matcher } = this;
     const { settings } = matcher;
-    const [x, z] = figure.spring;
+    const x = figure.spring[0];
+    const z = figure.spring[1];
     const angle = wrapped(Math.atan2(x, z) - figure.root[2] - matcher.way(figure));
-    const warps = Math.min(recorded, Math.hypot(x, z)) > settings.idle && Math.abs(angle) <= Math.PI / 2;
+    const warps = Math.min(recorded, lengthOf(x, z)) > settings.idle && Math.abs(angle) <= Math.PI / 2;
     const target = warps ? clamp(angle, -settings.warp, settings.warp) : 0;
     const [off, rate] = damped(figure.warp - target, figure.warpRate, dampingOf(settings.blend), matcher.dt);
     figure.warp = target + off;
@@ -100,18 +120,15 @@ export class Steerer {
   }
 
   /** The next root, rate of playback and stride of the legs, of a figure that creeps or does not. */
-  private move(figure: Playback, moves: number[], creeps: boolean): void {
+  private move(figure: Playback, creeps: boolean): void {
+    const { moves } = this;
     const { settings, dt } = this.matcher;
-    const {
-      root: [x, z, facing],
-      rate,
-      spring,
-      mirror,
-    } = figure;
+    const { root, rate, spring, mirror } = figure;
+    const facing = root[2];
     const recorded = moves[3]!;
     const side = mirror ? -1 : 1;
     // how fast the springs go beside the recording
-    const pace = Math.hypot(spring[0], spring[1]);
+    const pace = lengthOf(spring[0], spring[1]);
     const moving = creeps || Math.min(recorded, pace) > settings.idle;
     const ratio = pace / Math.max(recorded, creeps ? MATCHING.LEAST_PACE : settings.idle);
     // stride: what the playback rate does not make up for of the speed
@@ -137,9 +154,9 @@ export class Steerer {
     const veers = moving && along > settings.veer_within * Math.abs(across);
     const angle = veers ? clamp(Math.atan(across / Math.max(along, 1e-6)), -settings.veer, settings.veer) : 0;
     // a slow walk goes exactly as the springs do, whose ways recordings lack
-    figure.root = creeps
-      ? [x + spring[0] * dt, z + spring[1] * dt, turned]
-      : [x + stepX + angle * stepZ, z + stepZ - angle * stepX, turned];
+    root[0] += creeps ? spring[0] * dt : stepX + angle * stepZ;
+    root[1] += creeps ? spring[1] * dt : stepZ - angle * stepX;
+    root[2] = turned;
     // the next playback rate; a slow walk shares the slowness between rate and stride
     const slowest = creeps ? settings.creep_slowest : settings.slowest;
     figure.rate = moving ? clamp(creeps ? Math.sqrt(ratio) : ratio, slowest, settings.fastest) : 1;
@@ -150,43 +167,47 @@ export class Steerer {
     figure.strideRate = slower;
   }
 
-  /** The inertialization offset, a tick later. */
-  private fade({ offset, offsetRate }: Playback, damping: number): void {
-    const { dt } = this.matcher;
-    const left = Math.exp(-damping * dt);
-    for (let k = 0; k < offset.length; k++) {
-      const rise = (offsetRate[k]! + damping * offset[k]!) * dt;
-      offset[k] = (offset[k]! + rise) * left;
-      offsetRate[k] = (offsetRate[k]! - damping * rise) * left;
-    }
-  }
-
   /** The pose of the codes: a linear map, then quaternions of unit length. */
-  private pose(): { rotations: Quaternion[]; height: number } {
-    const { values, mean, basis, codes } = this;
-    const count = values.length;
-    values.set(mean);
-    for (let k = 0; k < codes.length; k += 4) {
-      const a = codes[k]!;
-      const b = codes[k + 1]!;
-      const c = codes[k + 2]!;
-      const d = codes[k + 3]!;
-      for (let i = 0, at = k * count; i < count; i++, at++) {
-        values[i]! +=
-          a * basis[at]! + b * basis[at + count]! + c * basis[at + 2 * count]! + d * basis[at + 3 * count]!;
+  private pose(pose: Body): void {
+    const { codes, mean, basis } = this;
+    const { rotations } = pose;
+    const count = codes.length;
+    let at = 0;
+    for (let i = 0; i < rotations.length; i += 4) {
+      let x = mean[i]!;
+      let y = mean[i + 1]!;
+      let z = mean[i + 2]!;
+      let w = mean[i + 3]!;
+      for (let k = 0; k < count; k++, at += 4) {
+        const code = codes[k]!;
+        x += code * basis[at]!;
+        y += code * basis[at + 1]!;
+        z += code * basis[at + 2]!;
+        w += code * basis[at + 3]!;
       }
-    }
-    const rotations: Quaternion[] = [];
-    for (let at = 0; at < count - 1; at += 4) {
-      const x = values[at]!;
-      const y = values[at + 1]!;
-      const z = values[at + 2]!;
-      const w = values[at + 3]!;
       const size = Math.sqrt(Math.max(x * x + y * y + z * z + w * w, 1e-12));
-      rotations.push([x / size, y / size, z / size, w / size]);
+      rotations[i] = x / size;
+      rotations[i + 1] = y / size;
+      rotations[i + 2] = z / size;
+      rotations[i + 3] = w / size;
     }
-    return { rotations, height: values[count - 1]! };
+    pose.height = mean[rotations.length]!;
+    for (let k = 0; k < count; k++, at++) pose.height += codes[k]! * basis[at]!;
   }
+}
+
+/** A basis of codes by values, four values together. */
+function byBone(basis: Float32Array, codes: number, values: number): Float64Array {
+  const sorted = new Float64Array(basis.length);
+  for (let i = 0, at = 0; i < values; i += 4)
+    for (let k = 0; k < codes; k++)
+      for (let j = i; j < Math.min(i + 4, values); j++, at++) sorted[at] = basis[k * values + j]!;
+  return sorted;
+}
+
+/** Put a pose where its figure is. */
+export function place(pose: Played, { root }: Playback): void {
+  for (let i = 0; i < 3; i++) pose.ground[i] = root[i]!;
 }
 
 /** The springs of velocity and facing, a tick later. */
@@ -195,8 +216,12 @@ function approach(figure: Playback, [x, z, facing]: Target, slow: number, calm: 
   const [offX, rateX] = damped(spring[0] - x, springRate[0], slow, dt);
   const [offZ, rateZ] = damped(spring[1] - z, springRate[1], slow, dt);
   const [off, rate] = damped(wrapped(spring[2] - facing), springRate[2], calm, dt);
-  figure.spring = [x + offX, z + offZ, facing + off];
-  figure.springRate = [rateX, rateZ, rate];
+  spring[0] = x + offX;
+  spring[1] = z + offZ;
+  spring[2] = facing + off;
+  springRate[0] = rateX;
+  springRate[1] = rateZ;
+  springRate[2] = rate;
 }
 
 /** The pose part of the way to another, which is near. */
@@ -204,18 +229,19 @@ export function between(pose: Played, other: Played, part: number): Played {
   const mixed = (a: number, b: number) => a + part * (b - a);
   const [x, z, facing] = pose.ground;
   const [toX, toZ, toFacing] = other.ground;
-  const rotations = pose.rotations.map(([a, b, c, d], at): Quaternion => {
-    const [e, f, g, h] = other.rotations[at]!;
-    const side = a * e + b * f + c * g + d * h < 0 ? -1 : 1;
-    const quaternion: Quaternion = [
-      mixed(a, side * e),
-      mixed(b, side * f),
-      mixed(c, side * g),
-      mixed(d, side * h),
+  const rotations = new Float64Array(pose.rotations.length);
+  for (let bone = 0; bone < BONES.length; bone++) {
+    const from = turnAt(pose.rotations, bone);
+    const to = turnAt(other.rotations, bone);
+    const side = from[0] * to[0] + from[1] * to[1] + from[2] * to[2] + from[3] * to[3] < 0 ? -1 : 1;
+    const turn: Quaternion = [
+      mixed(from[0], side * to[0]),
+      mixed(from[1], side * to[1]),
+      mixed(from[2], side * to[2]),
+      mixed(from[3], side * to[3]),
     ];
-    const size = Math.hypot(...quaternion);
-    return [quaternion[0] / size, quaternion[1] / size, quaternion[2] / size, quaternion[3] / size];
-  });
+    setTurn(rotations, bone, normalised(turn));
+  }
   return {
     ground: [mixed(x, toX), mixed(z, toZ), facing + part * wrapped(toFacing - facing)],
     rotations,

@@ -1,5 +1,6 @@
 /* Steps that are planned, of figures that go slowly, turn on the spot or have just stopped, as motet/steering/stepping.py says. */
 import { STEPPING, type stepSettings } from "../generated.js";
+import { lengthOf } from "../motion/planar.js";
 import type { Matcher, Playback, Target } from "./matching.js";
 import type { Settings } from "../settings.js";
 
@@ -43,7 +44,7 @@ export function planOf(
   share: number,
   settings: Settings<typeof stepSettings>,
 ): Plan | null {
-  const pace = Math.hypot(spring[0], spring[1]);
+  const pace = lengthOf(spring[0], spring[1]);
   const creeps = matcher.creeping(target, gait) && pace < matcher.settings.creep;
   const stops = !target[0] && !target[1] && pace < slow && matcher.creeps[gait]!;
   return creeps || stops ? { settings, settled: stops && share > settings.rests } : null;
@@ -88,7 +89,7 @@ export function liftOf(step: Step, plan: Plan): number {
   if (step.clock <= 0) return 0;
   const { lowest, highest, longest } = plan.settings;
   const goal = goalOf(step, plan);
-  const distance = Math.hypot(step.anchor[0] - goal[0], step.anchor[1] - goal[1]);
+  const distance = lengthOf(step.anchor[0] - goal[0], step.anchor[1] - goal[1]);
   return lowest + Math.min(distance / longest, 1) * (highest - lowest);
 }
 
@@ -104,7 +105,7 @@ function isLifted(footing: Footing, other: Footing, { settings, settled }: Plan)
 /** The offset that a foot is led to: ahead, against its drift. */
 function goalOf({ drift }: Step, { settings, settled }: Plan): [number, number] {
   if (settled) return [0, 0];
-  const length = Math.hypot(...drift) * settings.leads;
+  const length = lengthOf(drift[0], drift[1]) * settings.leads;
   const ahead = -settings.leads * Math.min(settings.lead / Math.max(length, settings.lead), 1);
   return [ahead * drift[0], ahead * drift[1]];
 }

@@ -2,7 +2,18 @@
 import { TERRAIN, type terrainSettings } from "../generated.js";
 import { ControlError } from "../errors.js";
 import { type Limb, legOf, reach } from "../figures/legs.js";
-import { about, minus, plus, product, rotated, size, swing, type Vector, Y } from "../motion/rotations.js";
+import {
+  about,
+  minus,
+  plus,
+  product,
+  rotated,
+  size,
+  swing,
+  turnAt,
+  type Vector,
+  Y,
+} from "../motion/rotations.js";
 import { clamp, damped, dampingOf } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
 import { solePoints } from "./footLock.js";
@@ -60,13 +71,22 @@ export function checkedGround(ground: GroundHeight): GroundHeight {
   if (typeof ground !== "function")
     throw new ControlError("ground must be a function of x and z that gives a height in metres");
   return (x, z) => {
-    const height = ground(x, z);
+    const height = heightAt(ground, x, z);
     if (!(typeof height === "number" && Math.abs(height) <= TERRAIN.HIGHEST_GROUND))
       throw new ControlError(
         `ground(x, z) gave ${height} at x ${x}, z ${z}: a height is a number within ${TERRAIN.HIGHEST_GROUND} m of 0`,
       );
     return height;
   };
+}
+
+/** What a function gives for a place; an error of its own names the place. */
+function heightAt(ground: GroundHeight, x: number, z: number): number {
+  try {
+    return ground(x, z);
+  } catch (error) {
+    throw new ControlError(`ground(x, z) failed at x ${x}, z ${z}: ${String(error)}`, { cause: error });
+  }
 }
 
 /** A target, slower where it leads uphill from a place. */
@@ -82,17 +102,17 @@ export function slowed(
   return [x / slower, z / slower, facing];
 }
 
-/** The next pose, a tick later, on the ground. */
+/** Put a pose on the ground, a tick later. */
 export function grounded(
   terrain: Terrain,
   pose: Played,
   ground: GroundHeight,
   settings: Numbers,
   seconds: number,
-): Played {
+): void {
   const [x, z, facing] = pose.ground;
   const place: Vector = [x, pose.height, z];
-  const hipsTurn = product(about(Y, facing), pose.rotations[0]!);
+  const hipsTurn = product(about(Y, facing), turnAt(pose.rotations, 0));
   const isNew = !terrain.place;
   const before = terrain.place ?? [x, z];
   const velocity: [number, number] = [(x - before[0]) / seconds, (z - before[1]) / seconds];
@@ -108,12 +128,11 @@ export function grounded(
   const goal = Math.min(...legs.map((leg) => hipsGoal(leg, lowerFoot, settings)));
   terrain.hips = followed(terrain.hips, goal, isNew, settings.hips, seconds);
   // legs: reach from the raised hips for the raised ankles
-  const rotations = [...pose.rotations];
   legs.forEach(({ limb, ankle, height }, side) => {
-    const move = minus(plus(ankle, [0, height - terrain.hips[0], 0]), limb.places[2]!);
-    reach(rotations, side, hipsTurn, limb, move);
+    const move = minus(plus(ankle, [0, height - terrain.hips[0], 0]), limb.places[2]);
+    reach(pose.rotations, side, hipsTurn, limb, move);
   });
-  return { ...pose, rotations, height: pose.height + terrain.hips[0] };
+  pose.height += terrain.hips[0];
 }
 
 /** A foot a tick later. */
@@ -130,7 +149,7 @@ function stepped(
 ): Leg {
   const flat = solePoints(limb);
   const ball = flat[1]!;
-  const ankle = limb.places[2]!;
+  const ankle = limb.places[2];
   // tilt: it turns about its ball
   const under = slopeUnder(flat, ground, settings);
   foot.slope = foot.slope.map((slope, axis) =>
@@ -157,9 +176,9 @@ function stepped(
   const along = (ankle[0] - hips[0]) * x + (ankle[2] - hips[2]) * z;
   const ahead = along / Math.max(x * x + z * z, TERRAIN.LEAST_SQUARED_SPEED);
   const swung = clamp(0.5 + ahead / (2 * settings.half_step), 0, 1);
-  const turned = [limb.turned[0]!, limb.turned[1]!, product(tilt, limb.turned[2]!), limb.turned[3]!];
+  const [thigh, shin, flatFoot, toes] = limb.turned;
   return {
-    limb: { turned, places: limb.places },
+    limb: { turned: [thigh, shin, product(tilt, flatFoot), toes], places: limb.places },
     stands,
     swung,
     ankle: tilted(ankle),
@@ -201,7 +220,7 @@ function hipsGoal(
   // hips sink to where a swinging foot lands, as far as it has swung
   if (!stands) return lowerFoot + swung * Math.min(landing - lowerFoot, 0);
   // a foot that stands lets them be as high as its leg reaches, straight at most or as it is on the plane
-  const [hip, knee, flat] = limb.places as [Vector, Vector, Vector];
+  const [hip, knee, flat] = limb.places;
   const longest = settings.straight * (size(minus(knee, hip)) + size(minus(flat, knee)));
   const longestReach = Math.max(longest, size(minus(flat, hip)));
   const [x, y, z] = minus(ankle, hip);

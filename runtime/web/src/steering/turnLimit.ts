@@ -1,42 +1,60 @@
 /* Joints that turn no faster than people's, as motet/steering/turn_limit.py says. */
-import { TURN_LIMIT, type turnSettings } from "../generated.js";
-import type { Quaternion } from "../motion/rotations.js";
+import { TURN_LIMIT, turnSettings } from "../generated.js";
+import { BONES } from "../figures/humanoid/bones.js";
+import { type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
 import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
 
 type Kind = keyof typeof turnSettings;
 
-/** Bones that are limited, and the setting of each. */
-const LIMITED = Object.entries(TURN_LIMIT.LIMITED).map(([bone, kind]): [number, Kind] => [
-  Number(bone),
-  kind as Kind,
+/** Of each setting the bones that it limits. */
+const LIMITED = (Object.keys(turnSettings) as Kind[]).map((kind): [Kind, number[]] => [
+  kind,
+  Object.entries(TURN_LIMIT.LIMITED).flatMap(([bone, name]) => (name === kind ? [Number(bone)] : [])),
 ]);
 
-/** The joints of a figure as they were shown in the last tick, null before the first. */
+/** The joints of a figure as they were shown in the last tick. */
 export interface Joints {
-  rotations: Quaternion[] | null;
+  rotations: Float64Array;
+  /** Whether there was no tick yet. */
+  isNew: boolean;
 }
 
-/** A pose with joints that are on their way, a tick after the last. */
+export function newJoints(): Joints {
+  return { rotations: new Float64Array(4 * BONES.length), isNew: true };
+}
+
+/** Keep the joints of a pose on their way, a tick after the last. */
 export function limited(
   joints: Joints,
-  pose: Played,
+  { rotations }: Played,
   settings: Settings<typeof turnSettings>,
   seconds: number,
-): Played {
+): void {
   const before = joints.rotations;
-  joints.rotations = pose.rotations;
-  if (!before) return pose;
-  for (const [bone, kind] of LIMITED) {
+  for (let i = 0; i < LIMITED.length && !joints.isNew; i++) {
+    const [kind, bones] = LIMITED[i]!;
     const half = (settings[kind] * (Math.PI / 180) * seconds) / 2;
-    const from = before[bone]!;
-    const to = pose.rotations[bone]!;
-    const cosine = from[0] * to[0] + from[1] * to[1] + from[2] * to[2] + from[3] * to[3];
-    if (Math.abs(cosine) >= Math.cos(half)) continue;
-    if (joints.rotations === pose.rotations) joints.rotations = [...pose.rotations];
-    joints.rotations[bone] = turnedBy(from, to, cosine, half);
+    const least = Math.cos(half);
+    for (let j = 0; j < bones.length; j++) {
+      const bone = bones[j]!;
+      const cosine = cosineAt(before, rotations, 4 * bone);
+      if (Math.abs(cosine) >= least) continue;
+      setTurn(rotations, bone, turnedBy(turnAt(before, bone), turnAt(rotations, bone), cosine, half));
+    }
   }
-  return { ...pose, rotations: joints.rotations };
+  before.set(rotations);
+  joints.isNew = false;
+}
+
+/** The cosine of half the angle between the quaternions at a place. */
+function cosineAt(from: Float64Array, to: Float64Array, at: number): number {
+  return (
+    from[at]! * to[at]! +
+    from[at + 1]! * to[at + 1]! +
+    from[at + 2]! * to[at + 2]! +
+    from[at + 3]! * to[at + 3]!
+  );
 }
 
 /** A rotation on the shorter way to another, by half an angle. cosine: of half the angle between them. */

@@ -2,23 +2,22 @@
 import { WARPING } from "../generated.js";
 import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "../figures/humanoid/bones.js";
 import { legOf, OFFSETS, reach } from "../figures/legs.js";
-import { about, inverse, plus, product, type Quaternion, rotated, Y } from "../motion/rotations.js";
+import { about, inverse, plus, product, rotated, setTurn, turnAt, Y } from "../motion/rotations.js";
 
 /** Which bones turn back, each by the same share. */
 const BACK = SPINE.map((name) => BONES.indexOf(name));
 
-/** Local rotations with hips and legs turned to the left by an angle; all that the spine carries stays as it is. */
-export function warped(rotations: Quaternion[], angle: number): Quaternion[] {
-  if (Math.abs(angle) <= WARPING.LEAST_CHANGE) return rotations;
-  const turned = [...rotations];
-  let above = rotations[0]!;
-  turned[0] = product(about(Y, angle), above);
+/** Turn hips and legs of local rotations to the left by an angle; all that the spine carries stays as it is. */
+export function warped(rotations: Float64Array, angle: number): void {
+  if (Math.abs(angle) <= WARPING.LEAST_CHANGE) return;
+  let above = turnAt(rotations, 0);
+  setTurn(rotations, 0, product(about(Y, angle), above));
   for (const bone of BACK) {
+    const local = turnAt(rotations, bone);
     // about the vertical, as the parent has it
-    turned[bone] = product(about(rotated(inverse(above), Y), -angle / BACK.length), rotations[bone]!);
-    above = product(above, rotations[bone]!);
+    setTurn(rotations, bone, product(about(rotated(inverse(above), Y), -angle / BACK.length), local));
+    above = product(above, local);
   }
-  return turned;
 }
 
 /** Of the sole, in the frame of the foot. */
@@ -27,21 +26,20 @@ const BALL = SOLES.Foot!.at(-1)!;
 const UNDER = HUMANOID.rest[HUMANOID.index("leftFoot")]![2] + BALL[2];
 
 /**
- * Local rotations with the balls of the feet led so far that strides are this times as long, in whichever direction they
+ * Lead the balls of the feet of local rotations so far that strides are this times as long, in whichever direction they
  * go: one that changed with the row that is played would make feet leap.
  */
-export function strided(rotations: Quaternion[], stride: number): Quaternion[] {
-  if (Math.abs(stride - 1) <= WARPING.LEAST_CHANGE) return rotations;
-  const turned = [...rotations];
-  SIDES.forEach((_, side) => {
-    const leg = legOf(rotations, side, rotations[0]!, [0, 0, 0]);
+export function strided(rotations: Float64Array, stride: number): void {
+  if (Math.abs(stride - 1) <= WARPING.LEAST_CHANGE) return;
+  const hips = turnAt(rotations, 0);
+  for (let side = 0; side < SIDES.length; side++) {
+    const leg = legOf(rotations, side, hips, [0, 0, 0]);
     const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
     const led: [number, number, number] = [
       (x - OFFSETS[side]![0]![0]) * (stride - 1),
       0,
       (z - UNDER) * (stride - 1),
     ];
-    reach(turned, side, rotations[0]!, leg, led);
-  });
-  return turned;
+    reach(rotations, side, hips, leg, led);
+  }
 }
