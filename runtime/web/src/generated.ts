@@ -365,7 +365,8 @@ export const avoidanceSettings = {
   dodges: { default: 0.6, low: 0, high: 100, whole: false },
   waits: { default: 0.02, low: 0, high: 100, whole: false },
   rejoins: { default: 0.1, low: 0, high: 100, whole: false },
-  standing: { default: 0.9, low: 0, high: 1, whole: false },
+  standing: { default: 0.7, low: 0, high: 1, whole: false },
+  gives_way: { default: 0.5, low: 0, high: 3.15, whole: false },
 } as const;
 
 // motet.steering.events

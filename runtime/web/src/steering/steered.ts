@@ -123,15 +123,7 @@ export function tick(
   if (whole && !command.speed) stand(figure);
   const plan = whole
     ? null
-    : planOf(
-        steerer.matcher,
-        playback,
-        target,
-        command.gait,
-        settings.slow,
-        figure.standing.share,
-        model.steps,
-      );
+    : planOf(steerer.matcher, playback, target, command.gait, figure.standing.share, model.steps);
   const footed = holdFeet
     ? held(figure.lock, breathed(figure.standing, pose, settings, dt), model.lock, dt, plan)
     : pose;

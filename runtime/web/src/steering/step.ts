@@ -47,7 +47,11 @@ export class Steerer {
     const moves = this.moves(figure);
     approach(figure, target, dampingOf(settings.velocity), dampingOf(settings.facing), dt);
     this.warp(figure, moves[3]!);
-    this.move(figure, moves, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
+    // what has no speed, a jump, has its own rate; who comes to rest goes no faster than the springs
+    const creeps = matcher.creeping(target, gait) && moves[3]! > 0;
+    const rests =
+      matcher.resting(figure, target, gait) && moves[3]! > Math.hypot(figure.spring[0], figure.spring[1]);
+    this.move(figure, moves, creeps || rests);
     // inertialization: the offset of the last jumps fades
     this.fade(figure, dampingOf(settings.blend));
     const left = Math.fround(moves[4]!);
