@@ -97,7 +97,7 @@ CEILINGS = {
     "motet.representation": 9_400,
     "motet.search": 3_600,
     "motet.serve": 16_800,
-    "motet.steering": 57_400,
+    "motet.steering": 57_700,
     "motet.text": 5_400,
     "motet_export": 12_200,
     "motet_train": 9_300,

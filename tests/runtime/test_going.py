@@ -230,6 +230,17 @@ def test_what_is_matched_costs_what_features_differ_and_leads_where_is_asked(mod
     np.testing.assert_allclose(found.path[:, -1] - play.root[:, :2], session.target[:, :2], atol=0.1)
 
 
+def test_what_is_matched_leads_as_slowly_uphill_as_the_figure_goes(model: SteerModel) -> None:
+    session = model.start()
+    session.set_ground(lambda x, z: 0.4 * z)
+    session.control(speed=1.4, direction=0)
+    for _ in range(60):
+        session.tick()
+    (x, z), *_ = session.matched.path[:, -1] - session.snapshot().playback.root[:, :2]
+    # a slope of .4 slows by 1 / (1 + .7 x .4)
+    np.testing.assert_allclose([x, z], [0, 1.4 / 1.28], atol=0.1)
+
+
 @pytest.mark.parametrize(
     ("told", "said"),
     [

@@ -18,8 +18,11 @@ from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
 from motet.text.numeric_phrases import PACE_PHRASES
 
-BASE_SENTENCES = {"stand": "a person stands still", "walk": "a person walks forward"}
-"""The sentences of what they are laid over."""
+STANDS = "a person stands still"
+"""The sentence of a figure that stands."""
+
+BASE_SENTENCES = {"stand": STANDS, "walk": "a person walks forward"}
+"""The sentences of what acts are laid over."""
 
 WALKED_SECONDS = 4.0
 """How long an act that is laid over anything but a figure that stands lasts at least."""
@@ -73,7 +76,7 @@ class NamedAct:
     @property
     def goes(self) -> bool:
         """Whether it is laid over anything but a figure that stands."""
-        return self.base != BASE_SENTENCES["stand"]
+        return self.base != STANDS
 
     @property
     def is_of_upper_body(self) -> bool:

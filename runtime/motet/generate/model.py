@@ -30,7 +30,7 @@ from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_code
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
 from motet.generate.keyed_acts import (
-    BASE_SENTENCES,
+    STANDS,
     TOGETHER,
     NamedAct,
     act_named,
@@ -711,9 +711,9 @@ class CodesModel(GenerateModel):
         # Texts in the order in which they are shown, and what each is read as.
         timed = self._timed_texts(sentences, seconds, whole)
         if stand in ("start", "both"):
-            timed.insert(0, (BASE_SENTENCES["stand"], STANDING_SECONDS))
+            timed.insert(0, (STANDS, STANDING_SECONDS))
         if stand in ("end", "both"):
-            timed.append((BASE_SENTENCES["stand"], STANDING_SECONDS))
+            timed.append((STANDS, STANDING_SECONDS))
         requests, noise, chosen = self._requests(timed, numbers, seed, strict, loop_settings)
 
         # They are drawn after the end of the motion before.

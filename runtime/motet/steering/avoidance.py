@@ -4,7 +4,8 @@ A place and a velocity are those of where a figure would come to rest, which cha
 that could meet within the next seconds there is a smallest change of their relative velocity by which they do not.
 Each makes half of it, or one that passes somebody who stands makes all of it; so each pair leaves a figure half of the
 plane of velocities. It takes the velocity nearest to the one wanted in all these half-planes, or as nearly in them as
-it can. Two that meet head on both pass on the same side.
+it can. Two that meet head on both pass on the same side. Who is held up wishes to go
+round to the left, so that a jam turns, and dissolves.
 
 Letters in shapes: B figures, n pairs, S pairs of a figure at most.
 """
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from motet.motion.rotations import Array
 from motet.settings import Settings
 from motet.steering.matching import Flags
-from motet.steering.settings import Count, Metres, Seconds, Share, Speed
+from motet.steering.settings import Count, Metres, Radians, Seconds, Share, Speed
 
 Numbers = NDArray[np.intp]
 
@@ -49,8 +50,10 @@ class AvoidanceSettings(Settings):
     """If the detour is slower than this, wait instead."""
     rejoins: Metres = 0.1
     """How far from its path a figure among others goes straight on to the next corner."""
-    standing: Share = 0.9
+    standing: Share = 0.7
     """Share of the room that is kept from those who stand."""
+    gives_way: Radians = 0.5
+    """How far to the left of where it wants to go a figure goes that is held up, and less if it only slows down."""
 
 
 def kept_apart(
@@ -73,11 +76,12 @@ def kept_apart(
     least = (velocities[figure] * way).sum(axis=1) + share * change
     # half-planes that exclude each other yield, the more the farther off the other is
     distance = np.hypot(*gap.T)
-    yields = settings.yields * (distance / room - 1).clip(0.1, None)
+    yields = settings.yields * (distance / room - 1).clip(0.25, None)
     planes = np.column_stack([way, least, yields])
     most = np.maximum(np.hypot(*wanted.T), settings.dodges)
     by_figure = _by_figure(figure, distance, planes, len(places), settings.heeds)
-    allowed = _nearest_allowed(wanted, by_figure, most, settings.sweeps)
+    wish = _wish(wanted, velocities, settings.gives_way)
+    allowed = _nearest_allowed(wish, by_figure, most, settings.sweeps)
     heeds = np.isin(np.arange(len(places)), figure)
     return np.where(heeds[:, None], allowed, wanted)
 
@@ -127,6 +131,15 @@ def _changes(gap: Array, closing: Array, room: Array, settings: AvoidanceSetting
     away = _unit(-gap)
     change = np.where(too_near, (room - apart) / settings.parts - (closing * away).sum(axis=1), change)
     return change, np.where(too_near[:, None], away, way)
+
+
+def _wish(wanted: Array, velocities: Array, gives_way: float) -> Array:
+    """Velocities (B, 2) as fast as those that are wanted (B, 2), the farther to the left the less of them is in the
+    velocities (B, 2) of figures."""
+    squared_pace = np.maximum((wanted * wanted).sum(axis=1), 1e-9)
+    angle = gives_way * (1 - (velocities * wanted).sum(axis=1) / squared_pace).clip(0, 1)
+    x, z = wanted.T
+    return np.stack([x * np.cos(angle) + z * np.sin(angle), z * np.cos(angle) - x * np.sin(angle)], axis=1)
 
 
 def _by_figure(figure: Numbers, distance: Array, planes: Array, figures: int, most: int) -> Array:

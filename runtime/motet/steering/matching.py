@@ -398,6 +398,13 @@ class Matcher:
         slow: Flags = self.stretched[gait] & (pace >= LEAST_PACE / 2) & (pace < self.settings.creep)
         return slow
 
+    def comes_to_rest(self, playback: Playback, target: Array, gait: Rows) -> Flags:
+        """Which figures (B,) with targets (B, 3) in gaits (B,) are to stand, and go no faster than a slow walk."""
+        pace = np.hypot(playback.spring[:, 0], playback.spring[:, 1])
+        stops = (target[:, :2] == 0).all(axis=1) & (pace < self.settings.creep)
+        rests: Flags = self.stretched[gait] & stops
+        return rests
+
     def desired_trajectory(
         self, playback: Playback, target: Array, slow_walk: Flags, figures: Rows | slice = ALL
     ) -> Array:

@@ -267,6 +267,12 @@ class SteerSession:
         state = self._state
         return self.model.abilities.curved(self._target, state.command.gait, state.playback.root[:, 2])
 
+    def _slowed(self, target: Array) -> Array:
+        """Targets (characters, 3), slower where they lead uphill."""
+        if self._terrain is None:
+            return target
+        return self._terrain.slowed(target, self._state.playback.root, self.model.settings(TerrainSettings))
+
     def tick_to(self, target: Array) -> Pose:
         """A tick with a raw target (characters, 3): velocity along x and z in m/s, facing in radians; not checked."""
         model = self.model
@@ -278,8 +284,7 @@ class SteerSession:
         playback = state.playback
         gait = state.command.gait
         root_before = playback.root
-        if self._terrain is not None:
-            target = self._terrain.slowed(target, root_before, settings(TerrainSettings))
+        target = self._slowed(target)
         # acts go on, begin and end; legs that an act has led so far get a row to continue from
         changed = state.actions.begin(matcher, codes, settings(ActSettings), playback, target, gait)
         # search, playback, springs, warping: the pose of the recordings, and the root
@@ -312,8 +317,7 @@ class SteerSession:
         """Whose steps are planned in a tick, None for nobody's. acts: (characters,) whether an act leads the body."""
         state = self._state
         settings = self.model.settings(StepSettings)
-        slow = self.model.settings(IdleSettings).slow
-        creeps, stops = planned(self.model.matcher, state.playback, target, gait, slow)
+        creeps, stops = planned(self.model.matcher, state.playback, target, gait)
         plans = (creeps | stops) & ~acts
         if not plans.any():
             return None
@@ -344,7 +348,7 @@ class SteerSession:
     def matched(self) -> Matched:
         """The rows that are played, what they cost, and the desired path."""
         state = self._state
-        return self.model.matcher.matched(state.playback, self._way, state.command.gait)
+        return self.model.matcher.matched(state.playback, self._slowed(self._way), state.command.gait)
 
     def go_to(
         self,

@@ -127,9 +127,9 @@ def tick(matcher: Matcher, poses: PoseCodes, playback: Playback, target: Array, 
     # playback: go on by the playback rate
     _advance(playback)
     played, _ = matcher.table.at(playback)
-    recorded = _recorded(matcher, playback, played, target, gait)
     # the springs approach the target, and the root follows them
     spring = _spring_update(playback, parts(target), matcher.settings, dt)
+    recorded = _recorded(matcher, playback, played, target, gait)
     _follow(playback, recorded, spring, matcher.settings, dt)
     # inertialization: the offset of the last jumps fades
     playback.offset, playback.offset_rate = matcher.inertializer.update(playback.offset, playback.offset_rate, dt)
@@ -149,6 +149,9 @@ def _recorded(matcher: Matcher, playback: Playback, played: Array, target: Array
     way = matcher.table.way[playback.mirror, playback.row]
     forward, left, turn, speed = parts(played[:, -6:-2])
     slow_walk = single(matcher.is_slow_walk(target, gait)) & (speed > 0)  # what has no speed has its own rate
+    # who comes to rest goes no faster than the springs, or would lurch as recorded
+    pace = np.hypot(playback.spring[:, 0], playback.spring[:, 1])
+    slow_walk = slow_walk | (single(matcher.comes_to_rest(playback, target, gait)) & (speed > single(pace)))
     return Recorded(forward, left, turn, speed, single(way), slow_walk)
 
 

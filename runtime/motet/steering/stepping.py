@@ -90,16 +90,15 @@ class Footing(NamedTuple):
     is_left: Part
 
 
-def planned(matcher: Matcher, playback: Playback, target: Array, gait: Rows, slow: float) -> tuple[Flags, Flags]:
-    """Whether figures (B,) walk so slowly that their steps are planned, and whether they stand or turn on the spot:
-    without a target speed, and slower than ``slow``, m/s.
+def planned(matcher: Matcher, playback: Playback, target: Array, gait: Rows) -> tuple[Flags, Flags]:
+    """Whether figures (B,) walk so slowly that their steps are planned, and whether they come to rest, stand or turn on
+    the spot.
 
     target: (B, 3) velocity along x and z, and facing. gait: (B,).
     """
     pace = np.hypot(playback.spring[:, 0], playback.spring[:, 1])
     creeps = matcher.is_slow_walk(target, gait) & (pace < matcher.settings.creep)
-    stops = (target[:, :2] == 0).all(axis=1) & (pace < slow) & matcher.stretched[gait]
-    return creeps, stops
+    return creeps, matcher.comes_to_rest(playback, target, gait)
 
 
 def stepped(before: Step, footing: Footing, other: Footing, move: Move, plan: Plan, seconds: float) -> Step:

@@ -195,10 +195,10 @@ export const memorySettings = {
 
 // motet.generate.model
 export const GENERATE = {
-  BASE_SENTENCE: "a person stands still",
   FAR_LESS: -100,
   NEVER: -1000000000,
   STANDING_SECONDS: 0.8,
+  STANDS: "a person stands still",
 } as const;
 
 // motet.generate.model.FamiliaritySettings
@@ -365,7 +365,8 @@ export const avoidanceSettings = {
   dodges: { default: 0.6, low: 0, high: 100, whole: false },
   waits: { default: 0.02, low: 0, high: 100, whole: false },
   rejoins: { default: 0.1, low: 0, high: 100, whole: false },
-  standing: { default: 0.9, low: 0, high: 1, whole: false },
+  standing: { default: 0.7, low: 0, high: 1, whole: false },
+  gives_way: { default: 0.5, low: 0, high: 3.15, whole: false },
 } as const;
 
 // motet.steering.events

@@ -358,7 +358,7 @@ export class GenerateModel extends LanguageModel {
     const seconds = each.map((length) => (length === null ? 0 : this.setting("seconds", length)));
     for (const end of ["start", "end"] as const) {
       if (settings.stand !== end && settings.stand !== "both") continue;
-      texts[end === "start" ? "unshift" : "push"](GENERATE.BASE_SENTENCE);
+      texts[end === "start" ? "unshift" : "push"](GENERATE.STANDS);
       seconds[end === "start" ? "unshift" : "push"](GENERATE.STANDING_SECONDS);
     }
     texts.forEach((text) => this.words(text));

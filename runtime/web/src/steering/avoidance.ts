@@ -44,13 +44,25 @@ export function keptApart(
       x: wayX,
       z: wayZ,
       least: figure.velocity[0]! * wayX + figure.velocity[1]! * wayZ + (other.moves ? 0.5 : 1) * change,
-      yields: settings.yields * Math.max(distance / room - 1, 0.1),
+      yields: settings.yields * Math.max(distance / room - 1, 0.25),
       distance,
       push: 0,
     });
   }
   planes.sort((a, b) => a.distance - b.distance);
-  return nearestAllowed(figure.wanted, planes.slice(0, settings.heeds).reverse(), settings);
+  if (!planes.length) return [figure.wanted[0]!, figure.wanted[1]!];
+  return nearestAllowed(wish(figure, settings), planes.slice(0, settings.heeds).reverse(), settings);
+}
+
+/** A velocity as fast as the one wanted, the farther to the left the less of it is in the figure's velocity. */
+function wish({ wanted, velocity }: Walker, settings: Avoidance): [x: number, z: number] {
+  const x = wanted[0]!;
+  const z = wanted[1]!;
+  const gone = (velocity[0]! * x + velocity[1]! * z) / Math.max(x * x + z * z, 1e-9);
+  const angle = settings.gives_way * Math.min(Math.max(1 - gone, 0), 1);
+  const sin = Math.sin(angle);
+  const cos = Math.cos(angle);
+  return [x * cos + z * sin, z * cos - x * sin];
 }
 
 /** The smallest change of a velocity (u, v) towards (x, z), and its direction, by which the two keep `room` soon; those that are
@@ -89,7 +101,6 @@ function nearestAllowed(
 ): [x: number, z: number] {
   let x = wanted[0]!;
   let z = wanted[1]!;
-  if (!planes.length) return [x, z];
   const most = Math.max(Math.hypot(x, z), settings.dodges);
   let slowedX = 0;
   let slowedZ = 0;

@@ -152,6 +152,11 @@ export class Matcher {
     return this.creeps[gait]! && pace >= MATCHING.LEAST_PACE / 2 && pace < this.settings.creep;
   }
 
+  /** Whether a figure is to stand, and goes no faster than a slow walk. */
+  resting({ spring }: Playback, [x, z]: Target, gait: number): boolean {
+    return this.creeps[gait]! && !x && !z && lengthOf(spring[0], spring[1]) < this.settings.creep;
+  }
+
   /** What a velocity over the ground is multiplied by to be as fast as recordings. */
   private hurry(x: number, z: number): number {
     const { creep } = this.settings;

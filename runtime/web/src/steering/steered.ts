@@ -128,15 +128,7 @@ export function tick(
   // feet held and on the ground
   const plan = whole
     ? null
-    : planOf(
-        steerer.matcher,
-        playback,
-        target,
-        command.gait,
-        settings.slow,
-        figure.standing.share,
-        model.steps,
-      );
+    : planOf(steerer.matcher, playback, target, command.gait, figure.standing.share, model.steps);
   if (holdFeet) {
     breathed(figure.standing, pose, settings, dt);
     held(figure.lock, pose, model.lock, dt, plan);

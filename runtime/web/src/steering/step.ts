@@ -64,7 +64,11 @@ export class Steerer {
     this.recordedMoves(figure);
     approach(figure, target, dampingOf(settings.velocity), dampingOf(settings.facing), dt);
     this.warp(figure, moves[3]!);
-    this.move(figure, matcher.creeping(target, gait) && moves[3]! > 0); // what has no speed, a jump, has its own rate
+    // what has no speed, a jump, has its own rate; who comes to rest goes no faster than the springs
+    const creeps = matcher.creeping(target, gait) && moves[3]! > 0;
+    const rests =
+      matcher.resting(figure, target, gait) && moves[3]! > lengthOf(figure.spring[0], figure.spring[1]);
+    this.move(figure, creeps || rests);
     // inertialization: the offset of the last jumps fades
     damp(figure.offset, figure.offsetRate, dampingOf(settings.blend), dt);
     const left = Math.fround(moves[4]!);

@@ -34,19 +34,18 @@ export function newStep(): Step {
   return { shift: [0, 0], drift: [0, 0], anchor: [0, 0], clock: STEPPING.FREE };
 }
 
-/** The plan of a figure, null for none. slow: m/s below which one without a target speed stands. share: of its rest. */
+/** The plan of a figure, null for none. share: of its rest. */
 export function planOf(
   matcher: Matcher,
-  { spring }: Playback,
+  figure: Playback,
   target: Target,
   gait: number,
-  slow: number,
   share: number,
   settings: Settings<typeof stepSettings>,
 ): Plan | null {
-  const pace = lengthOf(spring[0], spring[1]);
+  const pace = lengthOf(figure.spring[0], figure.spring[1]);
   const creeps = matcher.creeping(target, gait) && pace < matcher.settings.creep;
-  const stops = !target[0] && !target[1] && pace < slow && matcher.creeps[gait]!;
+  const stops = matcher.resting(figure, target, gait);
   return creeps || stops ? { settings, settled: stops && share > settings.rests } : null;
 }
 
