@@ -116,7 +116,7 @@ class NamedAct:
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
         """Frames (T, D) of a figure that stands, in the contract's channels, that do the act."""
         base = contract.motion(frames, plant=False)
-        acted = self.act.motion(base, seed)
+        acted = self.act.motion(base, seed, strict=False)
         shown = frames.copy()
         # what the act changes is added: the frames of a motion are not quite those that it was made of
         shown[: len(acted)] += contract.frames(acted) - contract.frames(base)[: len(acted)]
@@ -155,7 +155,9 @@ def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | N
     """The act of which a sentence, in lower-case words without its subject, has an order beside other words, the first
     of them its verb; that which leaves out the fewest of these. None where there is none."""
     stems = stems_of(words)
-    orders = list(_orders_in(words, stems_of(words[:1])))
+    # "gives a big thumbs up" has its act in the words after a verb that names none
+    names_none = bool(words) and stem(words[0]) in FILLER_VERBS
+    orders = list(_orders_in(words, stems if names_none else stems_of(words[:1])))
     if not orders:
         return None
     lacking = {}
@@ -192,14 +194,15 @@ def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedA
 def without_subject(words: Sequence[str]) -> list[str]:
     """Lower-case words without who acts and in which manner: of "the elf claps its hands happily" claps its hands.
 
-    A subject has up to :data:`LONGEST_SUBJECT` words, before the verb of an act in the third person; without an article
-    none of them is a word of acts. A manner is an adverb that is neither a pace nor a word of acts.
+    A subject has up to :data:`LONGEST_SUBJECT` words, before a verb that ends in -s or -ing; without an article none of
+    them is a word of acts. A manner is an adverb that is neither a pace nor a word of acts.
     """
     of_acts = _stems_of_acts()
     kept = list(words)
     for count in range(1, min(LONGEST_SUBJECT, len(words) - 1) + 1):
         is_subject = words[0] in ARTICLES or stems_of(words[:count]).isdisjoint(of_acts)
-        if is_subject and stem(words[count]) in verbs() and words[count].endswith("s"):
+        is_verb = stem(words[count]) in verbs() | FILLER_VERBS and words[count].endswith(("s", "ing"))
+        if is_subject and is_verb:
             kept = kept[count:]
             break
     return [word for word in kept if not word.endswith("ly") or PACE_PHRASES.search(word) or stem(word) in of_acts]

@@ -285,8 +285,8 @@ class CodesModel(GenerateModel):
             return None
         if self._leaves_out(sentence):
             return act
-        recorded = self._sentences[int(self._context(sentence).argmax())]
-        return None if stems_of(act.sentence.split()) <= stems_of(recorded.split()) else act
+        recorded = self.vocabulary.rules.words(self._sentences[int(self._context(sentence).argmax())])
+        return None if stems_of(act.sentence.split()) <= stems_of(recorded) else act
 
     def _keyed_over(self, sentence: str) -> NamedAct | None:
         """The act of the upper body that a sentence names beside what is done at the same time, "waves while walking",
@@ -295,7 +295,8 @@ class CodesModel(GenerateModel):
         if len(clauses) != 2 or not all(clauses) or not self._leaves_out(sentence):
             return None
         for act_clause, below in (clauses, clauses[::-1]):
-            act = act_named(without_subject(act_clause.split()))
+            words = without_subject(act_clause.split())
+            act = act_named(words) or act_within(words)
             has_verb = any(stem(word) in self._verbs for word in below.split())
             if act and act.is_of_upper_body and not act.goes and has_verb and not self._leaves_out(below):
                 return replace(act, below=below)

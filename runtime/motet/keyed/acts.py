@@ -40,17 +40,18 @@ class KeyedAct:
     over: str = "stand"
     pace: float = 1.0
 
-    def motion(self, base: Motion, seed: Seed = 0) -> Motion:
+    def motion(self, base: Motion, seed: Seed = 0, strict: bool = True) -> Motion:
         """The act laid over the begin of a base, such as a person who stands.
 
         base: of any human figure; it must last as long as the act. The result is on the humanoid, at 30 frames a
             second, and ends when the act does.
         seed: of times, sizes and counts.
+        strict: refuse a place that a hand does not reach on this base; else the hand comes as near as it can.
         MotionError for a base that is too short or not of a human, and for a key that no body can take. DecodingError
         for a negative seed.
         """
         (number,) = seeds_of(seed, 1, DecodingError)
-        return laid_over(base, drawn(self, np.random.default_rng(number), ACT_FPS), self.name)
+        return laid_over(base, drawn(self, np.random.default_rng(number), ACT_FPS), self.name, strict)
 
     def seconds(self, seed: Seed = 0) -> float:
         """How long the motion of a seed lasts."""
@@ -58,7 +59,7 @@ class KeyedAct:
         return drawn(self, np.random.default_rng(number), ACT_FPS).frames / ACT_FPS
 
 
-def laid_over(base: Motion, act: Drawn, name: str) -> Motion:
+def laid_over(base: Motion, act: Drawn, name: str, strict: bool = True) -> Motion:
     """A drawn act over the begin of a base; MotionError as of :meth:`KeyedAct.motion`."""
     motion = on_humanoid(base).continuous().resample(ACT_FPS)
     if len(motion) < act.frames:
@@ -73,7 +74,7 @@ def laid_over(base: Motion, act: Drawn, name: str) -> Motion:
     figure = with_feet(figure, act)
     figure = with_trunk(figure, act)
     if any(act.hands.values()):
-        figure = with_hands(figure, act, name)
+        figure = with_hands(figure, act, name if strict else "")
     rotations = {bone: figure.local[:, index] for index, bone in enumerate(BONES)}
     return posed(motion, rotations, {BONES[0]: figure.root})
 

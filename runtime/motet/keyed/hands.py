@@ -56,14 +56,17 @@ class Arm(NamedTuple):
 
 
 def with_hands(figure: Figure, act: Drawn, name: str) -> Figure:
-    """The figure with its hands where keys want them; MotionError for a place that no hand reaches."""
+    """The figure with its hands where keys want them, or as near as they can.
+
+    name: of the act, for the MotionError for a place that no hand reaches; "" for none.
+    """
     # a hand that goes to the other one comes after it
     order = sorted(act.hands, key=lambda hand: any(pose.place == OTHER_HAND for pose in act.hands[hand].poses))
     for hand in order:
         side = hand.removesuffix("_hand")
         sign = SIDE_OF_HAND[hand]
         figure = _with_shoulder(figure, act.hands[hand], side, sign)
-        figure = _with_hand(figure, act.hands[hand], side, sign, f"{name}, {hand}")
+        figure = _with_hand(figure, act.hands[hand], side, sign, f"{name}, {hand}" if name else "")
     return figure
 
 
@@ -86,7 +89,8 @@ def _with_hand(figure: Figure, track: HandTrack, side: str, sign: float, name: s
     shoulder = places[:, 5]
 
     wrists = np.stack([_wrist(figure, pose, side, sign, shoulder, chest) for pose in track.poses])
-    _check_reach(wrists, shoulder, track, name)
+    if name:
+        _check_reach(wrists, shoulder, track, name)
     elbows = np.array([np.full(len(chest), pose.elbow) for pose in track.poses])
     upper, lower = _arm_to(track.mixed(wrists), shoulder, track.mixed(elbows), chest, sign)
 
