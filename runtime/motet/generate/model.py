@@ -265,7 +265,7 @@ class CodesModel(GenerateModel):
 
     def _keyed(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
-        sentence is a command or a recorded action has all its words, those of the act in its own sentence.
+        sentence is a command, or the sentence of a recorded action has the words of the act.
 
         A sentence may say more than the act, where the likeliest recorded action leaves out more of it.
         """
@@ -283,7 +283,7 @@ class CodesModel(GenerateModel):
             return act
         if self._commands.act(sentence) is not None and not self._commands.is_instead(sentence):
             return None
-        if self._leaves_out(sentence):
+        if not any(map(self.vocabulary.meant, words)):
             return act
         recorded = self.vocabulary.rules.words(self._sentences[int(self._context(sentence).argmax())])
         return None if stems_of(act.sentence.split()) <= stems_of(recorded) else act
