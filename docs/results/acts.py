@@ -13,21 +13,22 @@ from motet_train.evaluate.figures import bodies, panels, save
 FOLDER = Path(__file__).parents[1] / "figures"
 SOME = (
     *("salute", "wave", "shrug", "phone", "think", "clap"),
-    *("drink", "hammer", "play guitar", "shoot a bow", "facepalm", "squat"),
+    *("drink", "hammer", "play guitar", "shoot a bow", "facepalm", "walk like a zombie"),
 )
 """Those of the picture in the README."""
 
 COLUMNS, PER_SHEET, POSES = 3, 48, 5
 
 
-def sheet(names: list[str], standing: motet.Motion) -> Figure:
-    """Acts by name, three a row."""
+def sheet(names: list[str], bases: dict[str, motet.Motion]) -> Figure:
+    """Acts by name, three a row. bases: what they are laid over, by its name."""
     rows = -(-len(names) // COLUMNS)
     picture, axes = panels(rows, COLUMNS, (2.4 * COLUMNS, 1.35 * rows))
     for place in axes:
         place.axis("off")
     for name, place in zip(names, axes, strict=False):
-        motion = motet.keyed.ours()[name].motion(standing)
+        act = motet.keyed.ours()[name]
+        motion = act.motion(bases[act.over])
         place.set_title(f"{name}, {motion.duration:.1f} s", fontsize=8, loc="left")
         bodies(place, motion, POSES)
     return picture
@@ -35,12 +36,13 @@ def sheet(names: list[str], standing: motet.Motion) -> Figure:
 
 def main() -> None:
     """Write the sheets."""
-    standing = motet.load_as(motet.SteerModel, "control").run("stop 14s")
+    model = motet.load_as(motet.SteerModel, "control")
+    bases = {"stand": model.run("stop 14s"), "walk": model.run("walk speed 1.1 14s")}
     names = list(motet.keyed.ours())
     sheets = {"acts": list(SOME)}
     for start in range(0, len(names), PER_SHEET):
         sheets[f"acts-{1 + start // PER_SHEET}"] = names[start : start + PER_SHEET]
-    drawn = {name: partial(sheet, acts, standing) for name, acts in sheets.items()}
+    drawn = {name: partial(sheet, acts, bases) for name, acts in sheets.items()}
     for path in save(drawn, FOLDER):
         Image.open(path).quantize(48).save(path, optimize=True)
 

@@ -168,7 +168,7 @@ def test_a_snapshot_has_acts(model: SteerModel) -> None:
 
 
 def test_a_motion_is_an_act_without_its_rest(model: SteerModel) -> None:
-    motion = model.run("stop 1s, walk 2s, stop 2s")
+    motion = model.run("stop 1s, walk 2s, stop 3s")
     act = model.act_of(motion, "walks")
     assert 45 < len(act) < len(motion) - 20
     assert same_turns(model.act_of(motion).rotations[-1], act.rotations[-1], 1e-6)

@@ -79,9 +79,9 @@ def test_seconds_are_those_of_all_parts(model: CodesModel) -> None:
 
 
 def test_strict_refuses_the_part_that_is_unknown(model: CodesModel) -> None:
-    with pytest.raises(TextError, match="plays the cello"):
-        model.check("he drinks. he plays the cello.")
-    with pytest.warns(TextWarning, match="plays the cello"):
-        model.generate("he drinks. he plays the cello.")
+    with pytest.raises(TextError, match="plays the theremin"):
+        model.check("he drinks. he plays the theremin.")
+    with pytest.warns(TextWarning, match="plays the theremin"):
+        model.generate("he drinks. he plays the theremin.")
     with pytest.raises(TextError, match="knows no word of 'xyzzy'"):
         model.generate("he drinks. xyzzy.")

@@ -168,7 +168,7 @@ class Said:
         return self.shown(sentence)[0]
 
     def shown(self, sentence: str, strict: bool = False) -> tuple[Act, Shown]:
-        if sentence != "wave a flag":
+        if sentence != "wave a kite":
             raise TextError(f"the model knows no word of {sentence!r}")
         time.sleep(0.05)
         return self.made, Shown("a person waves")
@@ -180,7 +180,7 @@ def test_acts_are_told_in_words_and_what_is_not_known_is_said(steer_model: Steer
         async with client(server) as connection:
             await told(connection, "act", motion="fly to Mars")
             assert "knows no word of 'fly to Mars'" in (await next_of(connection, "note"))["message"]
-            await told(connection, "act", motion="wave a flag", upper=True)
+            await told(connection, "act", motion="wave a kite", upper=True)
             seen = await frames(connection, 30, lambda frame: frame["heard"] == 2)
         session = steer_model.start()
         for _ in range(seen[0]["tick"] - 1):
@@ -196,13 +196,13 @@ def test_acts_are_told_in_words_and_what_is_not_known_is_said(steer_model: Steer
 
 def test_a_client_ends_an_act(steer_model: SteerModel) -> None:
     one = ClientSession(steer_model, 2, cast(Any, Said(steer_model)))
-    assert one.handle('{"type": "act", "motion": ["wave a flag", null]}') == []
+    assert one.handle('{"type": "act", "motion": ["wave a kite", null]}') == []
     one.tick()
     assert [act and act[0] for act in one.session.acting] == ["wave", None]
     one.handle('{"type": "act"}')
     assert ["act ended", 0, "wave"] in json.loads(one.frame(one.tick()))["events"]
     one.handle('{"type": "start", "characters": 1}')
-    one.handle('{"type": "act", "motion": "wave a flag"}')
+    one.handle('{"type": "act", "motion": "wave a kite"}')
     one.handle('{"type": "act"}')
     assert one.session.acting == [None]
     assert sentences('{"type": "act", "motion": ["wave", null, "bow"]}') == ["wave", "bow"]

@@ -252,7 +252,7 @@ def test_the_command_line_tells_a_story(tmp_path: Path, clips: Path, model: Code
     result = run("generate", WALK, "--after", clips / "39_14.amc", "--stand", "end", "-o", out)
     assert result.exit_code == 0, result.stderr
     assert run("generate", WALK, "--story", "--bundle", "language-to-motion", "-o", out).exit_code == 2
-    assert run("generate", "a cello", "--strict", "-o", out).exit_code == 1
+    assert run("generate", "a theremin", "--strict", "-o", out).exit_code == 1
 
 
 @pytest.mark.parametrize("seed", range(8))

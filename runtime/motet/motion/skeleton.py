@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from motet.errors import MotionError, UnitError
-from motet.files import Json
 from motet.motion.rotations import Array, Indices, euler_to_rotmat
 
 END_SUFFIX = "_end"
@@ -180,14 +179,14 @@ class Skeleton:
             raise UnitError("the length unit of this skeleton is unknown: set it, as in motion.with_unit(0.01)")
         return self.metres_per_unit / metres_per_unit
 
-    def to_json(self) -> Json:
+    def to_json(self) -> dict[str, Any]:
         """A JSON object that :meth:`from_json` reads back without loss."""
         joints = self.outline()
         for row, joint in zip(joints, self.joints, strict=True):
             row |= {"order": joint.order, "axis": list(joint.axis)}
         return {"metres_per_unit": self.metres_per_unit, "joints": joints}
 
-    def outline(self) -> list[Json]:
+    def outline(self) -> list[dict[str, Any]]:
         """Of each joint its name, its parent's index, -1 for none, and its offset, for JSON."""
         return [{"name": joint.name, "parent": joint.parent, "offset": list(joint.offset)} for joint in self.joints]
 

@@ -15,11 +15,11 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
 from motet.errors import MotionError
-from motet.files import Json
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, rotated
 from motet.motion.skeleton import END_SUFFIX, Joint, Names, Skeleton, Triple
@@ -78,9 +78,9 @@ def _joints(trunk: Places, left: Places, sides: tuple[str, str], scale: float = 
     return tuple(joints)
 
 
-def _table(*path: str) -> Json:
+def _table(*path: str) -> dict[str, Any]:
     """A JSON object of this folder."""
-    table: Json = json.loads(files("motet.figures.humanoid").joinpath(*path).read_text("utf-8"))
+    table: dict[str, Any] = json.loads(files("motet.figures.humanoid").joinpath(*path).read_text("utf-8"))
     return table
 
 
@@ -203,7 +203,7 @@ Tree = dict[str, tuple[str, Array]]
 """Joint -> its parent, "" for none, and its position (3,) in metres, parents first."""
 
 
-def _rig_tree(content: Json) -> Tree:
+def _rig_tree(content: dict[str, Any]) -> Tree:
     """The joints of a rig with the humanoid's proportions, from its convention's table."""
     tree = {}
     parent = ""
@@ -233,7 +233,7 @@ def _rig_trunk(names: dict[str, list[str]]) -> list[tuple[str, Array]]:
     return list(zip(joints, [T_POSE[0], *back, *neck], strict=True))
 
 
-def _rig_names(content: Json) -> dict[str, str]:
+def _rig_names(content: dict[str, Any]) -> dict[str, str]:
     """For bones of the humanoid, and for tips, the names of a rig's joints."""
     known = content["joints"]
     names = {

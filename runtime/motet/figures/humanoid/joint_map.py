@@ -38,7 +38,6 @@ from motet.figures.humanoid.bones import (
     limb_of,
     sided,
 )
-from motet.files import Json
 from motet.motion.rotations import Array, unit
 from motet.motion.skeleton import END_SUFFIX, Names, Skeleton, Triple, repeated
 
@@ -326,7 +325,7 @@ def _entries(path: Path) -> dict[str, list[str]]:
     return entries
 
 
-def _unique_keys(pairs: list[tuple[str, Any]]) -> Json:
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """A JSON object; ValueError where a key appears twice, which json takes silently."""
     twice = repeated(key for key, _ in pairs)
     if twice:
@@ -386,7 +385,7 @@ def conventions() -> tuple[Convention, ...]:
     return tuple(all_conventions)
 
 
-def _convention(content: Json, sides: Sequence[str]) -> Convention:
+def _convention(content: dict[str, Any], sides: Sequence[str]) -> Convention:
     names, spelled, optional = _bones(content, sides)
     return Convention(
         content["title"],
@@ -411,7 +410,7 @@ def _of_both_sides(names: Sequence[str], sides: Sequence[str]) -> frozenset[str]
     return frozenset(plain)
 
 
-def _bones(content: Json, sides: Sequence[str]) -> tuple[dict[str, Names], frozenset[str], frozenset[str]]:
+def _bones(content: dict[str, Any], sides: Sequence[str]) -> tuple[dict[str, Names], frozenset[str], frozenset[str]]:
     """For each bone the plain names, all names as they are written, and the bones that only some files have."""
     names = {}
     spelled = set()
