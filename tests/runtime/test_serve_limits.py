@@ -40,7 +40,7 @@ from motet.serve.limits import Gate, Limits
 from motet.serve.protocol import OPTIONS, BoundedProtocol, most_connections, quieter
 from motet.serve.routes import DOORS
 
-WALK = "/generate.npz?text=a+person+walks&seconds=1&seed="
+WALK = "/generate.npz?text=a+person+strolls+along&seconds=1&seed="
 
 
 class Process:
