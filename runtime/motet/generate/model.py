@@ -219,12 +219,12 @@ class CodesModel(GenerateModel):
     def _meant(self, text: str, context: Floats) -> Floats:
         """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions.
 
-        It is that of a command alone, which a text is but for its subject, or of the nearest one where it leaves out
-        less than the likeliest action. For this a word more counts where it is not confident, and another one where it
-        lacks a word of the command.
+        It is that of a command alone, which a text is but for its subject if it is recorded, or of the nearest one where
+        it leaves out less than the likeliest action. For this a word more counts where it is not confident, and another
+        one where it lacks a word of the command.
         """
         order = SUBJECT.sub("", text, count=1)
-        act = self._commands.act(order)
+        act = None if order != text and self._commands.is_instead(order) else self._commands.act(order)
         nearest = None if act is not None else self._commands.nearest(order)
         if nearest is not None:
             lacking = self.lacking(text, int(context.argmax()))
@@ -265,7 +265,7 @@ class CodesModel(GenerateModel):
 
     def _keyed(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
-        sentence is a command, or the sentence of a recorded action has the words of the act.
+        sentence is a command or a recorded action has all its words, those of the act in its own sentence.
 
         A sentence may say more than the act, where the likeliest recorded action leaves out more of it.
         """
@@ -283,7 +283,7 @@ class CodesModel(GenerateModel):
             return act
         if self._commands.act(sentence) is not None and not self._commands.is_instead(sentence):
             return None
-        if not any(map(self.vocabulary.meant, words)):
+        if self._leaves_out(sentence):
             return act
         recorded = self.vocabulary.rules.words(self._sentences[int(self._context(sentence).argmax())])
         return None if stems_of(act.sentence.split()) <= stems_of(recorded) else act

@@ -313,7 +313,8 @@ export class GenerateModel extends LanguageModel {
   /** That of a command alone, or of the nearest one where it leaves out less than the likeliest action. */
   private meant(text: string, context: Float32Array): Float32Array {
     const order = text.replace(SUBJECT, "");
-    let act = this.commands.act(order);
+    const isInstead = order !== text && this.commands.isInstead(order);
+    let act = isInstead ? undefined : this.commands.act(order);
     const nearest = act === undefined ? this.commands.nearest(order) : undefined;
     if (nearest !== undefined) {
       // a word more where the likeliest action is not confident, and where it lacks a word of the command
