@@ -1,5 +1,5 @@
 """Acts by key poses (:mod:`motet.keyed`) as generated motions: which sentences name one, and how it is laid over a
-figure that stands."""
+figure that stands, walks, or does anything else."""
 
 import math
 import re
@@ -33,13 +33,12 @@ TOGETHER = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it)|with)\b")
 FILLER_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
 """Stems of verbs that name no act."""
 
-FILLER_WORDS = (
-    FUNCTION_WORDS
-    | {"human", "humans", "subject", "subjects", "persons", "please"}
-    | {
-        *("across", "like", "quite", "really", "some", "through", "very"),
-    }
-)
+# fmt: off
+FILLER_WORDS = FUNCTION_WORDS | {
+    "across", "human", "humans", "like", "persons", "please", "quite", "really", "some", "subject", "subjects",
+    "through", "very",
+}
+# fmt: on
 """Words that name no act; not their stems, as that of toes is to."""
 
 BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
@@ -114,7 +113,7 @@ class NamedAct:
         return replace(self, act=replace(self.act, speed=(slowest, fastest)))
 
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
-        """Frames (T, D) of a figure that stands, in the contract's channels, that do the act."""
+        """Frames (T, D) of what is below the act, in the contract's channels, that do the act, too."""
         base = contract.motion(frames, plant=False)
         acted = self.act.motion(base, seed, strict=False)
         shown = frames.copy()
