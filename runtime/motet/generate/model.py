@@ -219,11 +219,12 @@ class CodesModel(GenerateModel):
     def _meant(self, text: str, context: Floats) -> Floats:
         """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions.
 
-        It is that of a command alone, which a text is but for its subject if it is recorded, or of the nearest one
-        where it leaves out less than the likeliest action. For this a word more counts where it is not confident, and
-        another one where it lacks a word of the command.
+        It is that of a command alone, which a text is but for its subject, unless it is the sentence of an action or
+        the command is not recorded; or of the nearest one where it leaves out less than the likeliest action. For this
+        a word more counts where it is not confident, and another one where it lacks a word of the command.
         """
-        order = SUBJECT.sub("", text, count=1)
+        is_recorded = text in self._sentences[: self.sizes["A"]]
+        order = text if is_recorded else SUBJECT.sub("", text, count=1)
         act = None if order != text and self._commands.is_instead(order) else self._commands.act(order)
         nearest = None if act is not None else self._commands.nearest(order)
         if nearest is not None:

@@ -312,7 +312,8 @@ export class GenerateModel extends LanguageModel {
 
   /** That of a command alone, or of the nearest one where it leaves out less than the likeliest action. */
   private meant(text: string, context: Float32Array): Float32Array {
-    const order = text.replace(SUBJECT, "");
+    const isRecorded = this.manifest.actions!.some(({ sentence }) => sentence === text);
+    const order = isRecorded ? text : text.replace(SUBJECT, "");
     const isInstead = order !== text && this.commands.isInstead(order);
     let act = isInstead ? undefined : this.commands.act(order);
     const nearest = act === undefined ? this.commands.nearest(order) : undefined;
