@@ -87,7 +87,7 @@ CEILINGS = {
     "motet.draw": 11_300,
     "motet.figures": 32_100,
     "motet.formats": 35_900,
-    "motet.generate": 31_800,
+    "motet.generate": 31_900,
     "motet.keyed": 9_700,
     "motet.live": 4_900,
     "motet.models": 10_200,

@@ -217,22 +217,9 @@ class CodesModel(GenerateModel):
         return contexts[0] if isinstance(sentences, str) else contexts
 
     def _meant(self, text: str, context: Floats) -> Floats:
-        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions.
-
-        It is that of a command alone, which a text is but for its subject, unless it is the sentence of an action or
-        the command is not recorded; or of the nearest one where it leaves out less than the likeliest action. For this
-        a word more counts where it is not confident, and another one where it lacks a word of the command.
-        """
-        is_recorded = text in self._sentences[: self.sizes["A"]]
-        order = text if is_recorded else SUBJECT.sub("", text, count=1)
-        act = None if order != text and self._commands.is_instead(order) else self._commands.act(order)
-        nearest = None if act is not None else self._commands.nearest(order)
-        if nearest is not None:
-            lacking = self.lacking(text, int(context.argmax()))
-            limit = len(lacking) + (not self._understood(text, context).confident)
-            limit += not nearest.isdisjoint(map(stem, lacking))
-            if len(self.lacking(text, self._commands.action(nearest))) < limit:
-                act = self._commands.action(nearest)
+        """The context (A + 1 + C,) of a text, from the log-probabilities (A,) of actions: that of its command alone,
+        where it has one."""
+        act = self._command(text, context)
         meant = np.full(self._commands.first + len(self._commands.acts), NEVER, dtype=np.float32)
         if act is None:
             meant[: len(context)] = context
@@ -240,6 +227,24 @@ class CodesModel(GenerateModel):
             meant[: len(context)] = context + np.float32(FAR_LESS)
             meant[act] = 0.0
         return meant
+
+    def _command(self, text: str, context: Floats) -> int | None:
+        """The command that a text is but for its subject, unless it is the sentence of an action or the command is not
+        recorded; or the nearest one where it leaves out less than the likeliest action. For this a word more counts
+        where it is not confident, and another one where it lacks a word of the command."""
+        is_recorded = text in self._sentences[: self.sizes["A"]]
+        order = text if is_recorded else SUBJECT.sub("", text, count=1)
+        act = self._commands.act(order)
+        if act is not None and (order == text or not self._commands.is_instead(order)):
+            return act
+        nearest = self._commands.nearest(order)
+        if nearest is None:
+            return None
+        lacking = self.lacking(text, int(context.argmax()))
+        limit = len(lacking) + (not self._understood(text, context).confident)
+        limit += not nearest.isdisjoint(map(stem, lacking))
+        command = self._commands.action(nearest)
+        return command if len(self.lacking(text, command)) < limit else None
 
     def _read_actions(self, entries: Sequence[Fields]) -> None:
         """The known actions: a sentence and the words of each, and the weights of words, more of one that describes few
