@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from motet.errors import TextError
 from motet.keyed.acts import ACT_FPS, KeyedAct
 from motet.keyed.keys import mirrored_keys
 from motet.keyed.shipped import says, shipped
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
-from motet.text.numeric_phrases import PACE_PHRASES
+from motet.text.numeric_phrases import PACE_PHRASES, quantities_of
 
 STANDS = "a person stands still"
 """The sentence of a figure that stands."""
@@ -188,6 +189,18 @@ def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedA
     if times is not None and act.repeat is not None:
         act = replace(act, repeat=replace(act.repeat, times=(int(times),) * 2))
     return NamedAct(act, order.sentence, times is not None)
+
+
+def counted(sentence: str) -> tuple[str, float | None]:
+    """A sentence without how often it says that something is done, and that number; itself and None where it says none,
+    or another number, too."""
+    try:
+        quantities = quantities_of(sentence)
+    except TextError:  # it is said when the sentence is read
+        return sentence, None
+    if quantities.amounts.keys() != {"times"}:
+        return sentence, None
+    return quantities.text, quantities.amounts["times"]
 
 
 def without_subject(words: Sequence[str]) -> list[str]:

@@ -35,6 +35,7 @@ from motet.generate.keyed_acts import (
     NamedAct,
     act_named,
     act_within,
+    counted,
     stems_of,
     without_subject,
 )
@@ -316,7 +317,7 @@ class CodesModel(GenerateModel):
     def _keyed_within(self, sentence: str) -> NamedAct | None:
         """The act whose order a sentence without its subject holds beside other words, unless the likeliest recorded
         action or command leaves out no more of it, which counts a word more where it lacks a word of the order."""
-        text, times = _counted(sentence)
+        text, times = counted(sentence)
         words = self.vocabulary.rules.words(text)
         act = act_within(words, times) if words else None
         if act is None:
@@ -328,7 +329,7 @@ class CodesModel(GenerateModel):
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
-        text, times = _counted(sentence)
+        text, times = counted(sentence)
         if times is None:
             return None
         words = self.vocabulary.rules.words(text)
@@ -776,18 +777,6 @@ class CodesModel(GenerateModel):
             raise MotionError(f"a motion of {len(frames)} frames is too short to continue: {2 * hop} are needed")
         frames = frames[len(frames) % hop :]
         return Context(frames, self.codec.codes_of(frames))
-
-
-def _counted(sentence: str) -> tuple[str, float | None]:
-    """A sentence without how often it says that something is done, and that number; itself and None where it says none,
-    or another number, too."""
-    try:
-        quantities = quantities_of(sentence)
-    except TextError:  # it is said when the sentence is read
-        return sentence, None
-    if quantities.amounts.keys() != {"times"}:
-        return sentence, None
-    return quantities.text, quantities.amounts["times"]
 
 
 def _check_story(sentences: Sequence[str], stand: object, hypotheses: float | None) -> None:
