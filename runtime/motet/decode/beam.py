@@ -25,13 +25,11 @@ class Limits(NamedTuple):
     longest: int
     banned: Sequence[int] = ()
 
-    def possible(self, log_probabilities: NDArray[Any], length: int) -> NDArray[Any]:
-        """A copy (N, V) where what cannot follow ``length`` words is -inf: after the longest, all but the end."""
-        left = np.array(log_probabilities)
-        left[:, list(self.banned)] = -np.inf
+    def exclude(self, log_probabilities: NDArray[Any], length: int) -> None:
+        """Set to -inf, in place, what cannot follow ``length`` words (N, V): after the longest, all but the end."""
+        log_probabilities[:, list(self.banned)] = -np.inf
         if length == self.longest:
-            left[:, np.arange(left.shape[1]) != self.end] = -np.inf
-        return left
+            log_probabilities[:, np.arange(log_probabilities.shape[1]) != self.end] = -np.inf
 
 
 class Hypothesis(NamedTuple):
@@ -79,10 +77,11 @@ def beam_search(step: Graph, contexts: Arrays, limits: Limits, beams: int) -> li
         # the graph: the words that may follow those that have not ended
         inputs: Arrays = {"word": last.ravel()[alive], **taken(contexts, alive // beams)}
         outputs, state = advance(step, taken(state, places[alive]), inputs)
-        possible = limits.possible(outputs["log_probabilities"], length)
+        log_probabilities = outputs["log_probabilities"]
+        limits.exclude(log_probabilities, length)
 
         # the best of each row, each behind its parent's words
-        scores, parents, chosen = _best(scores, alive, possible, limits.end)
+        scores, parents, chosen = _best(scores, alive, log_probabilities, limits.end)
         words = np.concatenate([words[row, parents], chosen[:, :, None]], axis=2)
 
         # where the states of the parents are; one that has ended gets that of some other, which is never used
@@ -192,7 +191,8 @@ class _Draws:
         inputs: Arrays = {"word": self.last, **taken(self.contexts, self.row)}
         outputs, following = advance(self.step, self.state, inputs)
         log_probabilities = outputs["log_probabilities"]
-        possible = self.limits.possible(log_probabilities.astype(np.float64), length)
+        possible = log_probabilities.astype(np.float64)
+        self.limits.exclude(possible, length)
 
         # the word of each draw
         relative = np.exp((possible - possible.max(axis=1, keepdims=True)) / temperature)
