@@ -21,9 +21,10 @@ from unittest.mock import patch
 
 import numpy as np
 from fuzzing import Files, Generator, Mutant, altered, damaged, fuzz, options
+from wire import field
 
 import motet
-from motet.bundle.bundle import Bundle, list_bundles
+from motet.bundle.bundle import Bundle, archive_bytes, list_bundles
 from motet.bundle.graph import SessionOptions
 from motet.bundle.graph_safety import Value, fields
 from motet.generate.model import CodesModel
@@ -77,12 +78,7 @@ def _zipped(manifest: dict[str, Any], files: Files) -> bytes:
     for name, data in files.items():
         if isinstance(listed, dict) and isinstance(listed.get(name), dict):
             listed[name].update(size=len(data), sha256=hashlib.sha256(data).hexdigest())
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr("manifest.json", json.dumps(manifest))
-        for name, data in files.items():
-            archive.writestr(name, data)
-    return buffer.getvalue()
+    return archive_bytes({"manifest.json": json.dumps(manifest).encode(), **files})
 
 
 def _in_manifest(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
@@ -100,9 +96,9 @@ def _outside(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
     """A graph with one tensor more, at its start or end, whose data is in some file of the machine."""
     name = str(rng.choice([file for file in files if file.endswith(".onnx")]))
     place = str(rng.choice(["/etc/passwd", "weights.bin", "../weights.bin", "manifest.json"]))
-    entry = _field(13, _field(1, b"location") + _field(2, place.encode()))
-    tensor = b"\x08\x01\x10\x01" + _field(8, b"w") + b"\x70\x01" + entry
-    graph = _field(7, _field(5, tensor))
+    entry = field(13, field(1, "location") + field(2, place))
+    tensor = field(1, 1) + field(2, 1) + field(8, "w") + field(14, 1) + entry
+    graph = field(7, field(5, tensor))
     files[name] = files[name] + graph if rng.random() < 0.5 else graph + files[name]
     return f"{name} reads {place}"
 
@@ -125,11 +121,11 @@ def lying(model: bytes, output: str, dtype: np.dtype[Any], factor: float, more: 
         return true if tensor == name else tensor
 
     def constant(called: bytes, value: float) -> bytes:
-        kind = b"\x10\x01" if dtype.kind == "f" else b"\x10\x07"
-        return _field(5, kind + _field(8, called) + _field(9, np.array(value, dtype).tobytes()))
+        kind = field(2, 1 if dtype.kind == "f" else 7)
+        return field(5, kind + field(8, called) + field(9, np.array(value, dtype).tobytes()))
 
     def node(operator: bytes, one: bytes, other: bytes, found: bytes) -> bytes:
-        return _field(1, _field(1, one) + _field(1, other) + _field(2, found) + _field(4, operator))
+        return field(1, field(1, one) + field(1, other) + field(2, found) + field(4, operator))
 
     def of_graph(graph: bytes) -> bytes:
         more_nodes = node(b"Mul", true, b"fuzz.factor", b"fuzz.scaled") + node(
@@ -145,22 +141,9 @@ def _changed(message: bytes, number: int, change: Callable[[bytes], bytes]) -> b
     """A message of protocol buffers, without numbers of fixed size, in which fields of one number are changed."""
     parts: list[tuple[int, Value]] = list(fields(memoryview(message)))
     return b"".join(
-        _varint(at << 3) + _varint(value)
-        if isinstance(value, int)
-        else _field(at, change(bytes(value)) if at == number else bytes(value))
+        field(at, change(bytes(value)) if at == number else value if isinstance(value, int) else bytes(value))
         for at, value in parts
     )
-
-
-def _field(number: int, data: bytes) -> bytes:
-    return _varint(number << 3 | 2) + _varint(len(data)) + data
-
-
-def _varint(value: int) -> bytes:
-    head = b""
-    while value > 127:
-        head, value = head + bytes([value & 127 | 128]), value >> 7
-    return head + bytes([value])
 
 
 def _in_golden(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
@@ -174,11 +157,7 @@ def _in_golden(rng: Generator, manifest: dict[str, Any], files: Files) -> str:
     arrays[name] = damaged(rng, arrays[name])
     if rng.random() < 0.2:
         del arrays[str(rng.choice(sorted(arrays)))]
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        for member, data in arrays.items():
-            archive.writestr(member, data)
-    files["golden.npz"] = buffer.getvalue()
+    files["golden.npz"] = archive_bytes(arrays)
     return name
 
 

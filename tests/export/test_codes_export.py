@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from small_runs import check_parity, check_rows_alone
 from torch import nn
 
 import motet
@@ -21,8 +22,8 @@ from motet.motion.skeleton import END_SUFFIX
 from motet.representation.contract import MotionContract
 from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
-from motet_export.bundles import export_run, parity_of
-from motet_export.parity import example, walks
+from motet_export.bundles import export_run
+from motet_export.parity import walks
 from motet_train.models.action_net import ActionsConfig, stems_of
 from motet_train.models.codec import CodecConfig
 from motet_train.models.kinematics import tree_of
@@ -81,39 +82,25 @@ def remembered() -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("bundles") / "codes.zip"
-    export_run(run(), place)
-    return place
+def bundle(folder: Path) -> Path:
+    export_run(run(), folder / "codes.zip")
+    return folder / "codes.zip"
 
 
 def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> None:
     opened = Bundle.open(bundle)
-    found = verify(opened)
     roles = CodesModel.ROLES
     tables = ("body.npy", "memory.npy", "moves.npy")
-    assert found.files == tuple(sorted(("golden.npz", *tables, *(f"{role}.onnx" for role in roles))))
-    assert max(found.errors.values()) < 1e-4
-    report = opened.manifest.parity
-    rungs = {name: rung for name, rung in report.items() if isinstance(rung, dict) and "bound" in rung}
-    assert {f"{role}.one_step" for role in roles} | {"runs"} <= set(rungs)
-    assert all(rung["error"] < rung["bound"] / 2 for rung in rungs.values())
-    again = parity_of(run(), opened)
-    assert {name: again[name] for name in rungs} == rungs
+    assert verify(opened).files == tuple(sorted(("golden.npz", *tables, *(f"{role}.onnx" for role in roles))))
+    rungs = {name for name, rung in opened.manifest.parity.items() if isinstance(rung, dict) and "bound" in rung}
+    assert {f"{role}.one_step" for role in roles} | {"runs"} <= rungs
+    check_parity(opened, run(), rungs, golden=1e-4)
 
 
 @pytest.mark.parametrize("role", CodesModel.ROLES)
 def test_a_row_of_a_batch_gets_what_it_gets_alone(bundle: Path, role: str) -> None:
-    graph = Bundle.open(bundle).graph(role)
     below = {"words": len(WORDS), "codes": MOVES, "action": 4, "age": 16}
-    feeds = example(graph.spec, np.random.default_rng(0), batch=5, below=below)
-    together = graph(feeds)
-    for row in range(5):
-        single = {name: array[row : row + 1] for name, array in feeds.items()}
-        if role == "encoder":  # padded on the right
-            single["words"] = single["words"][:, : int(feeds["lengths"][row])]
-        for name, array in graph(single).items():
-            np.testing.assert_allclose(array, together[name][row : row + 1], atol=1e-5, err_msg=name)
+    check_rows_alone(Bundle.open(bundle).graph(role), below, 1e-5)
 
 
 def test_a_loaded_bundle_computes_what_the_net_computes(bundle: Path) -> None:

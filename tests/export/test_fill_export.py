@@ -40,10 +40,9 @@ def run() -> Run:
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("bundles") / "fill.zip"
-    export_run(run(), place)
-    return place
+def bundle(folder: Path) -> Path:
+    export_run(run(), folder / "fill.zip")
+    return folder / "fill.zip"
 
 
 def test_the_bundle_computes_what_torch_does(bundle: Path) -> None:

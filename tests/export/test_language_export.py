@@ -1,112 +1,56 @@
 """Both directions between motion and language as ONNX bundles: what torch computes, for sequences of any length."""
 
-from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from small_runs import MOTION, WORDS, check_parity, check_rows_alone, language_bundles, language_run
 
 from motet.bundle.bundle import Bundle
 from motet.generate.base import GenerateModel
 from motet.models.describe import DescribeModel
 from motet.models.load import load, verify
 from motet.representation.contract import Z_LIMIT
-from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
 from motet_export.bundles import export_run, parity_of
 from motet_export.exporter import ExportError
 from motet_export.parity import example
-from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
-from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
 
-D = 3
-WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
-MOTION = {
-    "representation": "angles",
-    "channels": ["hip", "knee", "ankle"],
-    "units": ["rad"] * D,
-    "fps": 10.0,
-    "mean": [0.1, 0.2, 0.3],
-    "std": [0.5, 1.0, 2.0],
-    "skeleton": None,
-}
-SIZES: dict[str, Any] = {"channels": D, "words": len(WORDS), "embedding": 4}
-SMALL: dict[str, Any] = {**SIZES, "encoder_units": (5,), "decoder_units": (6, 7)}
+D = len(MOTION["channels"])
+BELOW = {"words": len(WORDS), "word": len(WORDS)}
 
 
 def run(verb: str) -> Run:
-    torch.manual_seed(0)
-    # the describing net never saw its last channel move
+    """Of which the describing net never saw its last channel move."""
     motion = MOTION | {"std": [0.5, 1.0, 0.0]} if verb == "describe" else MOTION
-    net: MotionToLanguage | LanguageToMotion
-    if verb == "describe":
-        net = MotionToLanguage(MotionToLanguageConfig(**SMALL))
-        model, config = "motion-to-language", asdict(net.config)
-        defaults: Mapping[str, float] = {"beams": 5, "max_words": 40}
-    else:
-        net = LanguageToMotion(LanguageToMotionConfig(**SMALL, components=2))
-        model, config = "language-to-motion", asdict(net.config)
-        defaults = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
-    net.mean.copy_(torch.tensor(MOTION["mean"]))
-    net.scale.copy_(torch.tensor(motion["std"]))
-    loop = {"describe": "beam", "generate": "mixture"}[verb]
-    manifest = {"name": f"small-{verb}", "verb": verb, "model": model, "loop": loop, "motion": motion}
-    return Run(
-        {
-            **manifest,
-            "text": NEW_MODEL_RULES.to_json(),
-            "vocabulary": WORDS,
-            "config": config,
-            "defaults": defaults,
-            "licence": {},
-            "training": {},
-        },
-        net.train(),
-    )
+    return language_run(verb, motion, embedding=4, encoder_units=(5,), decoder_units=(6, 7))
 
 
 @pytest.fixture(scope="module")
-def bundles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("bundles")
-    for verb in ("describe", "generate"):
-        export_run(run(verb), folder / f"{verb}.zip")
-    return {verb: folder / f"{verb}.zip" for verb in ("describe", "generate")}
+def bundles(folder: Path) -> dict[str, Path]:
+    return language_bundles(run, folder)
 
 
 @pytest.mark.parametrize("verb", ["describe", "generate"])
 def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundles: dict[str, Path], verb: str) -> None:
     bundle = Bundle.open(bundles[verb])
-    found = verify(bundle)
-    assert found.files == ("encoder.onnx", "golden.npz", "step.onnx")
-    assert max(found.errors.values()) < 1e-5
-    report = bundle.manifest.parity
-    rungs = {"encoder.one_step", "step.one_step", "step.carried", "runs"}
-    assert rungs <= report.keys()
-    assert all(report[rung]["error"] < report[rung]["bound"] / 2 for rung in rungs)
+    assert verify(bundle).files == ("encoder.onnx", "golden.npz", "step.onnx")
+    check_parity(bundle, run(verb), {"encoder.one_step", "step.one_step", "step.carried", "runs"})
     names = {"describe": {"greedy", "beam", "scores"}, "generate": {"samples", "beam", "scores"}}[verb]
-    assert names < report["runs"].keys()
-    again = parity_of(run(verb), bundle)
-    assert {rung: again[rung] for rung in rungs} == {rung: report[rung] for rung in rungs}
+    assert names < bundle.manifest.parity["runs"].keys()
 
 
 @pytest.mark.parametrize("verb", ["describe", "generate"])
 def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundles: dict[str, Path], verb: str) -> None:
     graph = Bundle.open(bundles[verb]).graph("encoder")
-    rng = np.random.default_rng(0)
-    feeds = example(graph.spec, rng, batch=6, below={"words": len(WORDS), "word": len(WORDS)})
+    check_rows_alone(graph, BELOW)
+    feeds = example(graph.spec, np.random.default_rng(0), batch=6, below=BELOW)
     padded, output = graph.spec.inputs[0].name, graph.spec.outputs[0].name
-    together = graph(feeds)[output]
-    for row, length in enumerate(feeds["lengths"]):
-        single = {name: array[row : row + 1] for name, array in feeds.items()}
-        single[padded] = single[padded][:, :length]
-        np.testing.assert_allclose(graph(single)[output], together[row : row + 1], atol=1e-6)
     longer = {**feeds, padded: np.concatenate([feeds[padded], np.zeros_like(feeds[padded])], axis=1)}
-    np.testing.assert_allclose(graph(longer)[output], together, atol=1e-6)
+    np.testing.assert_allclose(graph(longer)[output], graph(feeds)[output], atol=1e-6)
 
 
 def test_normalisation_is_inside_the_encoder_of_motions(bundles: dict[str, Path]) -> None:

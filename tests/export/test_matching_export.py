@@ -46,10 +46,9 @@ def run() -> Run:
 
 
 @pytest.fixture(scope="module")
-def bundle(run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("bundles") / "walk.zip"
-    export_run(run, place)
-    return place
+def bundle(run: Run, folder: Path) -> Path:
+    export_run(run, folder / "walk.zip")
+    return folder / "walk.zip"
 
 
 def test_it_holds_plain_arrays_and_no_graph(run: Run, bundle: Path) -> None:

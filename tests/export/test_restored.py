@@ -36,10 +36,9 @@ def given() -> Run:
 
 
 @pytest.fixture(scope="module")
-def bundle(given: Run, tmp_path_factory: pytest.TempPathFactory) -> Bundle:
-    place = tmp_path_factory.mktemp("exported") / "codes.zip"
-    export_run(given, place)
-    return Bundle.open(place)
+def bundle(given: Run, folder: Path) -> Bundle:
+    export_run(given, folder / "codes.zip")
+    return Bundle.open(folder / "codes.zip")
 
 
 @pytest.fixture(scope="module")

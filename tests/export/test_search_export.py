@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from small_runs import WORDS, check_parity, check_rows_alone
 
 from motet.bundle.bundle import Bundle
 from motet.figures.humanoid.bones import HUMANOID
@@ -13,16 +14,14 @@ from motet.models.load import load, verify
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
 from motet.search.model import SearchModel
-from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
-from motet_export.bundles import export_run, parity_of
-from motet_export.parity import example, walks
+from motet.text.vocabulary import NEW_MODEL_RULES
+from motet_export.bundles import export_run
+from motet_export.parity import walks
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.kinematics import figure_of
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
-
-WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
 CHANNELS = (
     *ROOT_BLOCK,
     *(f"{joint}.r{axis}" for joint in ("spine", "leftUpperLeg", "rightUpperLeg") for axis in "xyz"),
@@ -50,35 +49,22 @@ def run() -> Run:
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    place = tmp_path_factory.mktemp("bundles") / "search.zip"
-    export_run(run(), place)
-    return place
+def bundle(folder: Path) -> Path:
+    export_run(run(), folder / "search.zip")
+    return folder / "search.zip"
 
 
 def test_a_bundle_keeps_its_contracts_and_carries_its_parity(bundle: Path) -> None:
     opened = Bundle.open(bundle)
-    found = verify(opened)
-    assert found.files == ("golden.npz", "motion.onnx", "text.onnx")
-    assert max(found.errors.values()) < 1e-5
-    report = opened.manifest.parity
+    assert verify(opened).files == ("golden.npz", "motion.onnx", "text.onnx")
     rungs = {"motion.one_step", "text.one_step", "motion.far", "text.far", "runs"}
-    assert {name for name in report if "." in name or name == "runs"} == rungs
-    assert all(report[rung]["error"] < report[rung]["bound"] for rung in rungs)
-    again = parity_of(run(), opened)
-    assert {rung: again[rung] for rung in rungs} == {rung: report[rung] for rung in rungs}
+    assert {name for name in opened.manifest.parity if "." in name or name == "runs"} == rungs
+    check_parity(opened, run(), rungs, share=1.0)
 
 
 @pytest.mark.parametrize("role", ["motion", "text"])
 def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundle: Path, role: str) -> None:
-    graph = Bundle.open(bundle).graph(role)
-    feeds = example(graph.spec, np.random.default_rng(0), batch=6, below={"words": len(WORDS), "word": len(WORDS)})
-    padded = graph.spec.inputs[0].name
-    together = graph(feeds)["vector"]
-    for row, length in enumerate(feeds["lengths"]):
-        single = {name: array[row : row + 1] for name, array in feeds.items()}
-        single[padded] = single[padded][:, :length]
-        np.testing.assert_allclose(graph(single)["vector"], together[row : row + 1], atol=1e-6)
+    check_rows_alone(Bundle.open(bundle).graph(role), {"words": len(WORDS), "word": len(WORDS)})
 
 
 def test_a_loaded_bundle_gives_what_the_net_gives(bundle: Path) -> None:

@@ -1,7 +1,6 @@
 """Exports that are wrong in one place: parity and the golden vectors notice each that changes an answer."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +10,16 @@ import pytest
 import torch
 from language_models import CHANNELS, FPS, SKELETON, UNITS
 from onnx import numpy_helper
+from small_runs import WORDS, language_bundles, language_run
 
 from motet.bundle.bundle import Bundle, write_bundle
 from motet.errors import BundleError
 from motet.models.load import verify
-from motet.text.vocabulary import NEW_MODEL_RULES, SPECIALS
-from motet_export.bundles import export_run, parity_of
+from motet_export.bundles import parity_of
 from motet_export.exporter import ExportError
-from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
-from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
-
-WORDS = [*SPECIALS, "a", "person", "walks", "runs", "left", "right", "slowly"]
 MOTION = {
     "representation": "root_angles",
     "channels": list(CHANNELS),
@@ -34,43 +29,22 @@ MOTION = {
     "std": [0.6, 0.1, 0.7, 0.05, 0.1, 0.1, 8.0, 9.0],
     "skeleton": SKELETON.to_json(),
 }
-SIZES: dict[str, Any] = {
-    "channels": len(CHANNELS),
-    "words": len(WORDS),
-    "embedding": 8,
-    "encoder_units": (6,),
-    "decoder_units": (8, 8),
-}
 
 Model = onnx.ModelProto
 Fault = Callable[[Model], None]
 
 
 def run(verb: str) -> Run:
-    torch.manual_seed(0)
-    net: MotionToLanguage | LanguageToMotion
-    if verb == "describe":
-        net = MotionToLanguage(MotionToLanguageConfig(**SIZES))
-        model, loop, defaults = "motion-to-language", "beam", {"beams": 5, "max_words": 40}
-    else:
-        net = LanguageToMotion(LanguageToMotionConfig(**SIZES, components=2))
-        model, loop = "language-to-motion", "mixture"
-        defaults = {"hypotheses": 5, "candidates": 4, "temperature": 1.0, "max_seconds": 15}
+    made = language_run(verb, MOTION, embedding=8, encoder_units=(6,), decoder_units=(8, 8))
     with torch.no_grad():
-        for parameter in net.parameters():
+        for parameter in made.model.parameters():
             parameter.mul_(2.0)  # as far from linear as a trained net
-    net.measure_by(np.array(MOTION["mean"]), np.array(MOTION["std"]))
-    manifest = {"name": f"small-{verb}", "verb": verb, "model": model, "loop": loop, "motion": MOTION}
-    known = {"text": NEW_MODEL_RULES.to_json(), "vocabulary": WORDS, "config": asdict(net.config), "defaults": defaults}
-    return Run({**manifest, **known, "licence": {}, "training": {}}, net.eval())
+    return made
 
 
 @pytest.fixture(scope="module")
-def bundles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    folder = tmp_path_factory.mktemp("bundles")
-    for verb in ("describe", "generate"):
-        export_run(run(verb), folder / f"{verb}.zip")
-    return {verb: folder / f"{verb}.zip" for verb in ("describe", "generate")}
+def bundles(folder: Path) -> dict[str, Path]:
+    return language_bundles(run, folder)
 
 
 def written(good: Bundle, path: Path, role: str | None, fault: Fault | None, **manifest: Any) -> Bundle:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run
+from command_line import check_refused, run
+from figures import WRITTEN
 
 import motet
 from motet.cli import COMMANDS, NEEDS, main
@@ -67,6 +68,32 @@ def test_each_file_is_tried_and_each_failure_is_named(tmp_path: Path, clips: Pat
     assert [line.split(": ")[1] for line in result.stderr.splitlines()] == [f"{files[1]}, line 1", f"{files[2]}"]
     assert len(result.stdout.splitlines()) == 2
     assert {path.name for path in tmp_path.glob("*.html")} == {"09_07.html", "39_14.html"}
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("control", "--bundle", "tdbn", "walk .5s", "--in-place"),
+        ("predict", "{clips}/39_14.amc", "--frames", "5"),
+        ("fill", "{clips}/39_14.amc", "--gap", "1:1.5"),
+    ],
+)
+def test_commands_write_every_format(tmp_path: Path, clips: Path, command: tuple[str, ...]) -> None:
+    for extension in WRITTEN:
+        out = tmp_path / f"out{extension}"
+        assert run(*(word.format(clips=clips) for word in command), "-o", out).exit_code == 0
+        assert out.stat().st_size > 500
+
+
+@pytest.mark.parametrize(
+    ("extra", "command"), [("live", ("live", "--port", 8765)), ("mmcp", ("serve", "--mmcp")), ("serve", ("serve",))]
+)
+def test_an_extra_is_named_where_it_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, extra: str, command: tuple[object, ...]
+) -> None:
+    monkeypatch.setattr("motet.cli.NEEDS", {extra: ("no_such_package",)})
+    said = f"needs no_such_package: install the extra with  pip install 'motet[{extra}]'"
+    check_refused(run(*command), said, tmp_path)
 
 
 def test_results_are_numbered_where_no_name_is_asked_for(tmp_path: Path, clips: Path) -> None:

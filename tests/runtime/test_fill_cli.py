@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refused, run
-from figures import WRITTEN
 
 import motet
 from motet.formats import read_motion
@@ -57,13 +56,6 @@ def test_the_command_gives_what_the_library_gives(model: FillModel, walk: Motion
     np.testing.assert_array_equal(read_motion(out).values, model.looped(walk).values)
     assert run("join", clips / WALK, clips / WALK, "-o", out).exit_code == 0
     np.testing.assert_array_equal(read_motion(out).values, model.join(walk, walk).values)
-
-
-@pytest.mark.parametrize("extension", WRITTEN)
-def test_fill_writes_every_format(tmp_path: Path, clips: Path, extension: str) -> None:
-    out = tmp_path / f"out{extension}"
-    assert run("fill", clips / WALK, "--gap", "1:1.5", "-o", out).exit_code == 0
-    assert out.stat().st_size > 500
 
 
 def test_several_files_are_filled_and_what_fails_is_named(tmp_path: Path, clips: Path) -> None:

@@ -72,6 +72,8 @@ BAD_NPZ = {
     "a deep skeleton": savez(**{**WHOLE, "skeleton": "[" * 100_000}),
     "an unknown method": with_byte(savez(**WHOLE), 10, 99),
     "an encrypted array": with_byte(savez(**WHOLE), 8, 1),
+    "a newer version": with_byte(savez(**WHOLE), 6, 0xFF),
+    "a name that is not the UTF-8 that it is said to be": with_byte(with_byte(savez(**WHOLE), 9, 8), 46, 0xFF),
     "a shape of 10^14 rows": savez(**WHOLE).replace(
         b"'shape': (2, 1), }" + b" " * 13, b"'shape': (200000000000000, 1), }"
     ),

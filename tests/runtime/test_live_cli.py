@@ -40,9 +40,3 @@ def test_refusals(tmp_path: Path, arguments: tuple[object, ...], said: str) -> N
         pytest.skip("the extra live is not installed")
     told = [str(argument).replace("{out}", str(tmp_path)) for argument in arguments]
     check_refused(run("live", *told), said.replace("{out}", str(tmp_path)), tmp_path)
-
-
-def test_the_extra_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motet.cli.NEEDS", {"live": ("no_such_package",)})
-    said = "needs no_such_package: install the extra with  pip install 'motet[live]'"
-    check_refused(run("live", "--port", 8765), said, tmp_path)

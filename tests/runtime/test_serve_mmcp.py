@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import run
 
 import motet
 from motet.motion import HUMANOID, Motion, from_humanoid, global_transforms, rig
@@ -225,13 +224,6 @@ def test_unknown_words_are_noted(url: str, skeleton: Any) -> None:
     request = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": segments}
     notes = client.generate(url, request)["extensions"]["MMCP_motion"]["notes"]
     assert any(note["code"] == "unknown_words" and "zorbs" in note["message"] for note in notes)
-
-
-def test_a_missing_sdk_is_named_with_the_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("motet.cli.NEEDS", {"mmcp": ("no_such_package",)})
-    refused = run("serve", "--mmcp")
-    assert refused.exit_code == 2
-    assert "--mmcp needs no_such_package: install the extra with  pip install 'motet[mmcp]'" in refused.stderr
 
 
 def key(frame: int = 0, **fields: Any) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-import { integers } from "../bundle/arrays.js";
+import { integers, rows } from "../bundle/arrays.js";
 import { type Arrays, type Graph, taken } from "../bundle/graph.js";
 
 /** A finished sequence of ids, without its end, and the sum of its log-probabilities, with it. score: its rank. */
@@ -37,14 +37,7 @@ export async function beamSearch(
   let states = step.zeroState(1);
   for (let length = 0; length <= longest && kept.some((hypothesis) => !hypothesis.ended); length++) {
     const open = kept.filter((hypothesis) => !hypothesis.ended);
-    const word = integers(open.map((hypothesis) => hypothesis.ids.at(-1) ?? start));
-    const repeated = taken(
-      contexts,
-      open.map(() => 0),
-    );
-    const { outputs, states: next } = await step.step({ word, ...repeated }, states);
-    const { data, shape } = outputs.log_probabilities!;
-    const words = shape[1]!;
+    const following = await nextWords(step, contexts, open, start, states);
     const grown: (Open & { parent: number })[] = [];
     for (const hypothesis of kept) {
       if (hypothesis.ended) {
@@ -52,7 +45,7 @@ export async function beamSearch(
         continue;
       }
       const parent = open.indexOf(hypothesis);
-      const gains = data.subarray(parent * words, (parent + 1) * words);
+      const gains = following.gains[parent]!;
       const chosen = length === longest ? [end] : best(gains, beams, banned);
       for (const id of chosen) {
         const ids = id === end ? hypothesis.ids : [...hypothesis.ids, id];
@@ -62,10 +55,27 @@ export async function beamSearch(
     const order = grown.map((_, at) => at).sort((a, b) => grown[b]!.score - grown[a]!.score || a - b);
     const winners = order.slice(0, beams).map((at) => grown[at]!);
     const parents = winners.filter((winner) => !winner.ended).map((winner) => winner.parent);
-    states = taken(next, parents);
+    states = taken(following.states, parents);
     kept = winners;
   }
   return kept.map(({ ids, score }) => ({ ids, logProbability: score, score }));
+}
+
+/** Of open sequences the log-probabilities of all words that may follow, a row each, and the states then. */
+export async function nextWords(
+  step: Graph,
+  contexts: Arrays,
+  open: { ids: number[] }[],
+  start: number,
+  states: Arrays,
+) {
+  const word = integers(open.map(({ ids }) => ids.at(-1) ?? start));
+  const repeated = taken(
+    contexts,
+    open.map(() => 0),
+  );
+  const next = await step.step({ word, ...repeated }, states);
+  return { gains: rows(next.outputs.log_probabilities!), states: next.states };
 }
 
 /** The log-probability of a sequence of ids, and of its end, for contexts as {@link beamSearch} takes them. */

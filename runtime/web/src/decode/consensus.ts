@@ -1,6 +1,5 @@
 /* The sentence that agrees best with many drawn ones: docs/reference/bundle.md, the loop `consensus`. */
-import { integers } from "../bundle/arrays.js";
-import type { Hypothesis, Limits } from "./beam.js";
+import { type Hypothesis, type Limits, nextWords } from "./beam.js";
 import { type Arrays, type Graph, taken } from "../bundle/graph.js";
 import type { Noise } from "./random.js";
 
@@ -56,20 +55,13 @@ async function drawSequences(
   let states = step.zeroState(1);
   const ended: Beginning[] = [];
   for (let length = 0; open.length; length++) {
-    const word = integers(open.map((beginning) => beginning.ids.at(-1) ?? limits.start));
-    const repeated = taken(
-      contexts,
-      open.map(() => 0),
-    );
-    const { outputs, states: next } = await step.step({ word, ...repeated }, states);
-    const { data, shape } = outputs.log_probabilities!;
-    const grown = open.flatMap((beginning, row) => {
-      const gains = data.subarray(row * shape[1]!, (row + 1) * shape[1]!);
-      return spread(beginning, gains, limits, length, temperature, uniform[length]!).map((share) => ({
+    const { gains, states: next } = await nextWords(step, contexts, open, limits.start, states);
+    const grown = open.flatMap((beginning, row) =>
+      spread(beginning, gains[row]!, limits, length, temperature, uniform[length]!).map((share) => ({
         ...share,
         row,
-      }));
-    });
+      })),
+    );
     ended.push(...grown.filter((beginning) => beginning.ended));
     const going = grown.filter((beginning) => !beginning.ended);
     states = taken(

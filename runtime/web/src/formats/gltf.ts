@@ -5,7 +5,7 @@ import { type Animation, Gltf, type Local, type Placed } from "./gltfData.js";
 import { BONES } from "../figures/humanoid/bones.js";
 import { mapOf } from "../figures/humanoid/jointMap.js";
 import { checked, type Motion, motionFrom } from "../motion/motion.js";
-import { median, rounded } from "../motion/numbers.js";
+import { hermite, median, rounded } from "../motion/numbers.js";
 import {
   cross,
   dot,
@@ -19,6 +19,7 @@ import {
   rotated,
   size,
   STILL,
+  towards,
   unit,
   type Vector,
 } from "../motion/rotations.js";
@@ -427,30 +428,12 @@ function sampled({ times: at, values, kind, path }: Keys, time: number): number[
     const out = values[3 * before + 2]!;
     const arrive = values[3 * next]!;
     const q = values[3 * next + 1]!;
-    const u = 1 - t;
-    return p.map(
-      (value, i) =>
-        (1 + 2 * t) * u * u * value +
-        t * u * u * span * out[i]! +
-        t * t * (3 - 2 * t) * q[i]! -
-        t * t * u * span * arrive[i]!,
-    );
+    return p.map((value, i) => hermite(value, span * out[i]!, q[i]!, span * arrive[i]!, t));
   }
   const low = values[before]!;
   const high = values[next]!;
   if (kind === "STEP") return t < 1 - 1e-4 ? low : high;
   return path === "rotation"
-    ? slerp(low as Quaternion, high as Quaternion, t)
+    ? towards(normalised(low as Quaternion), normalised(high as Quaternion), t)
     : low.map((value, i) => value + t * (high[i]! - value));
-}
-
-function slerp(from: Quaternion, to: Quaternion, share: number): Quaternion {
-  const low = normalised(from);
-  const high = normalised(to);
-  const cosine = low.reduce((sum, value, at) => sum + value * high[at]!, 0);
-  const angle = Math.acos(Math.min(1, Math.abs(cosine)));
-  const weight = (part: number) => (angle < 1e-4 ? part : Math.sin(part * angle) / Math.sin(angle));
-  return low.map(
-    (value, at) => weight(1 - share) * value + weight(share) * Math.sign(cosine || 1) * high[at]!,
-  ) as Quaternion;
 }

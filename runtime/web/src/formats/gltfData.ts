@@ -323,7 +323,8 @@ export class Gltf {
   }
 }
 
-function mapped(linear: Placed["linear"], [x, y, z]: Vector): Vector {
+/** A vector by a linear map. */
+export function mapped(linear: Placed["linear"], [x, y, z]: Vector): Vector {
   return plus(plus(times(linear[0], x), times(linear[1], y)), times(linear[2], z));
 }
 

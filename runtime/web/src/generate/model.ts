@@ -104,16 +104,8 @@ function leftOut(sentence: string, { action, lacking }: Shown): string {
 
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
-  private readonly familiarity = settingsOf(
-    "familiarity",
-    familiaritySettings,
-    this.manifest.settings.familiarity,
-  );
-  private readonly continuation = settingsOf(
-    "continuation",
-    continuationSettings,
-    this.manifest.settings.continuation,
-  );
+  private readonly familiarity = this.tuned("familiarity", familiaritySettings);
+  private readonly continuation = this.tuned("continuation", continuationSettings);
   private readonly verbs: ReturnType<typeof verbsOf>;
   private readonly commands: Commands;
 

@@ -1,6 +1,6 @@
 /* Avatars: the mesh of a .vrm or .glb file, and its joints in the poses of the humanoid. */
 import { FormatError, MotionError } from "../errors.js";
-import { Gltf, inlined, type MeshPart, type Placed } from "../formats/gltfData.js";
+import { Gltf, inlined, mapped, type MeshPart, type Placed } from "../formats/gltfData.js";
 import { restOf } from "../formats/gltf.js";
 import { LEG_LENGTH } from "../figures/humanoid/bones.js";
 import { worldOf } from "../motion/motion.js";
@@ -104,14 +104,12 @@ class Slots {
   /** A slot of a node: its place at rest, after the matrix that brings a vertex to it. */
   add(node: number, bind?: readonly number[]): number {
     const { linear, place } = this.rest.get(node)!;
-    const apply = ([x, y, z]: Vector): Vector =>
-      [0, 1, 2].map((i) => linear[0][i]! * x + linear[1][i]! * y + linear[2][i]! * z) as Vector;
     const column = (at: number) =>
       bind ? (bind.slice(at, at + 3) as Vector) : (AXES[at / 4] ?? ([0, 0, 0] as Vector));
     this.binds.push(
       columns(
-        [0, 4, 8].map((at) => apply(column(at))),
-        plus(place, apply(column(12))),
+        [0, 4, 8].map((at) => mapped(linear, column(at))),
+        plus(place, mapped(linear, column(12))),
       ),
     );
     let above = node;

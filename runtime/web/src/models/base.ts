@@ -10,8 +10,9 @@ import {
 } from "../generated.js";
 import { integers, stacked } from "../bundle/arrays.js";
 import type { Manifest } from "../bundle/bundle.js";
+import type { Graph } from "../bundle/graph.js";
 import { BundleError, DecodingError } from "../errors.js";
-import { fits, type Range } from "../settings.js";
+import { fits, type Range, type Settings, settingsOf } from "../settings.js";
 import { Vocabulary } from "../text/vocabulary.js";
 
 /** Frames in the channels and units of a model's contract (`manifest.motion`), one row each. */
@@ -30,11 +31,19 @@ const RANGES: Record<string, Range> = {
 };
 
 export abstract class Model {
-  constructor(readonly manifest: Manifest) {}
+  constructor(
+    readonly manifest: Manifest,
+    protected readonly graphs: Record<string, Graph> = {},
+  ) {}
 
   /** Frames a second of all that goes in and comes out. */
   get fps(): number {
     return this.manifest.motion.fps;
+  }
+
+  /** The tuned numbers of a feature. */
+  protected tuned<Ranges extends Record<string, Range>>(feature: string, ranges: Ranges): Settings<Ranges> {
+    return settingsOf(feature, ranges, this.manifest.settings[feature]);
   }
 
   protected checked(frames: Frames, width: number, least = 1): Frames {
@@ -60,8 +69,8 @@ export abstract class Model {
 export abstract class LanguageModel extends Model {
   readonly vocabulary: Vocabulary;
 
-  constructor(manifest: Manifest) {
-    super(manifest);
+  constructor(manifest: Manifest, graphs?: Record<string, Graph>) {
+    super(manifest, graphs);
     if (!manifest.vocabulary || !manifest.text)
       throw new BundleError(`the bundle ${manifest.name} has no words`);
     this.vocabulary = new Vocabulary(manifest.vocabulary, manifest.text, manifest.common);

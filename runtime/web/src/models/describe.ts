@@ -7,7 +7,6 @@ import type { Arrays, Graph } from "../bundle/graph.js";
 import { type Known, pathOf } from "./nearestNeighbour.js";
 import { type Frames, LanguageModel } from "./base.js";
 import { type Noise, Pcg64 } from "../decode/random.js";
-import { settingsOf } from "../settings.js";
 import { Vocabulary } from "../text/vocabulary.js";
 
 /** How descriptions are found: by default as the bundle says. */
@@ -38,18 +37,14 @@ export interface Description {
 
 /** Sentences for a motion. */
 export class DescribeModel extends LanguageModel {
-  private readonly confidence = settingsOf(
-    "confidence",
-    confidenceSettings,
-    this.manifest.settings.confidence,
-  );
+  private readonly confidence = this.tuned("confidence", confidenceSettings);
 
   constructor(
     manifest: Manifest,
-    private readonly graphs: Record<string, Graph>,
+    graphs: Record<string, Graph>,
     private readonly known?: Known,
   ) {
-    super(manifest);
+    super(manifest, graphs);
   }
 
   /** Sentences that describe frames (T, D), best first. */

@@ -33,6 +33,17 @@ export function rise(value: number, start: number, end: number): number {
   return part ** 3 * (10 - 15 * part + 6 * part ** 2);
 }
 
+/** The cubic Hermite curve from one value to another, at a part of the way: with slopes there and here, over the whole way. */
+export function hermite(start: number, leaves: number, end: number, arrives: number, part: number): number {
+  const left = 1 - part;
+  return (
+    (1 + 2 * part) * left ** 2 * start +
+    part * left ** 2 * leaves +
+    part ** 2 * (3 - 2 * part) * end -
+    part ** 2 * left * arrives
+  );
+}
+
 /** Numbers by row smoothed by a Gaussian window of so many rows' deviation; at both ends their mirror images in them go on. */
 export function smoothed(rows: number[][], deviation: number): number[][] {
   const reach = rounded(3 * deviation);

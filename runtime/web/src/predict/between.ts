@@ -2,7 +2,8 @@
 import { PLACED } from "../generated.js";
 import { stacked } from "../bundle/arrays.js";
 import type { Graph } from "../bundle/graph.js";
-import { cross, dot, type Rotation, rotationOf, unit, type Vector } from "../motion/rotations.js";
+import { hermite } from "../motion/numbers.js";
+import { quaternionOf, rotated, rotationOf, towards, type Vector, X, Y } from "../motion/rotations.js";
 
 /** Steps over which the velocities next to a gap are taken. */
 const STEPS = 3;
@@ -68,16 +69,13 @@ function bridge(past: Float64Array[], after: Float64Array[], frames: number): Fl
     const s = (at + 1) / (frames + 1);
     const frame = new Float64Array(start.length);
     for (let i = 0; i < PLACED.ROOT_PLACE; i++) {
-      frame[i] =
-        (1 + 2 * s) * (1 - s) ** 2 * start[i]! +
-        s * (1 - s) ** 2 * (frames + 1) * leaves[i]! +
-        s ** 2 * (3 - 2 * s) * end[i]! -
-        s ** 2 * (1 - s) * (frames + 1) * arrives[i]!;
+      frame[i] = hermite(start[i]!, (frames + 1) * leaves[i]!, end[i]!, (frames + 1) * arrives[i]!, s);
     }
     for (let bone = PLACED.ROOT_PLACE; bone < start.length; bone += 6) {
-      const [x, y] = partOfTheWay(rotationOf(start, bone), rotationOf(end, bone), s);
-      frame.set(x, bone);
-      frame.set(y, bone + 3);
+      const [from, to] = [start, end].map((pose) => quaternionOf(rotationOf(pose, bone)));
+      const turn = towards(from!, to!, s);
+      frame.set(rotated(turn, X), bone);
+      frame.set(rotated(turn, Y), bone + 3);
     }
     return frame;
   });
@@ -87,29 +85,4 @@ function bridge(past: Float64Array[], after: Float64Array[], frames: number): Fl
 function velocity(frames: Float64Array[]): number[] {
   const steps = Math.max(1, frames.length - 1);
   return [0, 1, 2].map((i) => (frames.at(-1)![i]! - frames[0]![i]!) / steps);
-}
-
-/** The rotation from which a share of the shortest turn to another is done. */
-function partOfTheWay(from: Rotation, to: Rotation, share: number): Rotation {
-  // the turn in the frame of `from`: element [i][j] is the j-th component of the i-th column
-  const turn = to.map((column) => from.map((axis) => dot(axis, column))) as Rotation;
-  const axis: Vector = [turn[1][2] - turn[2][1], turn[2][0] - turn[0][2], turn[0][1] - turn[1][0]];
-  const sine = Math.hypot(...axis) / 2;
-  const angle = Math.atan2(sine, (turn[0][0] + turn[1][1] + turn[2][2] - 1) / 2);
-  const about: Vector = sine > 1e-9 ? unit(axis) : [1, 0, 0];
-  const done = [0, 1, 2].map((i) =>
-    rotated([+(i === 0), +(i === 1), +(i === 2)], about, share * angle),
-  ) as Rotation;
-  return done.map((column) =>
-    [0, 1, 2].map((i) => from[0][i]! * column[0] + from[1][i]! * column[1] + from[2][i]! * column[2]),
-  ) as Rotation;
-}
-
-/** A vector turned about a unit axis (Rodrigues). */
-function rotated(vector: Vector, axis: Vector, angle: number): Vector {
-  const sin = Math.sin(angle);
-  const cos = Math.cos(angle);
-  const aside = cross(axis, vector);
-  const along = dot(axis, vector) * (1 - cos);
-  return [0, 1, 2].map((i) => vector[i]! * cos + aside[i]! * sin + axis[i]! * along) as Vector;
 }

@@ -1,18 +1,9 @@
 import { between } from "./between.js";
-import type { Manifest } from "../bundle/bundle.js";
 import { DecodingError } from "../errors.js";
-import type { Graph } from "../bundle/graph.js";
 import { type Frames, Model } from "../models/base.js";
 
 /** The frames of a gap. */
 export class FillModel extends Model {
-  constructor(
-    manifest: Manifest,
-    private readonly graphs: Record<string, Graph>,
-  ) {
-    super(manifest);
-  }
-
   /** The frames between those before a gap (P, E) and those after it (A, E), all placed (docs/reference/bundle.md, Fill). */
   async fill(past: Frames, after: Frames, count: number): Promise<Float64Array[]> {
     const width = Number(this.graphs.filler!.spec.inputs[0]!.shape[2]);

@@ -1,19 +1,10 @@
 import { stacked } from "../bundle/arrays.js";
-import type { Manifest } from "../bundle/bundle.js";
 import { DecodingError } from "../errors.js";
 import { freeRun } from "./freeRun.js";
-import type { Graph } from "../bundle/graph.js";
 import { type Frames, Model } from "../models/base.js";
 
 /** The frames that follow a motion. */
 export class PredictModel extends Model {
-  constructor(
-    manifest: Manifest,
-    private readonly graphs: Record<string, Graph>,
-  ) {
-    super(manifest);
-  }
-
   /** The next frames after the last ones of (T, D); by default one horizon. */
   async predict(frames: Frames, count = this.setting("horizon")): Promise<Float32Array[]> {
     const seed = this.seed(frames);

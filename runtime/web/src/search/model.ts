@@ -1,8 +1,6 @@
 import { indexSettings } from "../generated.js";
-import type { Manifest } from "../bundle/bundle.js";
-import type { Graph } from "../bundle/graph.js";
 import { type Frames, LanguageModel } from "../models/base.js";
-import { settingsOf } from "../settings.js";
+import { rounded } from "../motion/numbers.js";
 
 /** The index of a vector, how near it is (1 is the same), and whether it is like what was asked for at all, and not only nearer than others. */
 export interface Hit {
@@ -13,20 +11,13 @@ export interface Hit {
 
 /** Motions and sentences as vectors of length 1, near where they mean the same. */
 export class SearchModel extends LanguageModel {
-  private readonly index = settingsOf("index", indexSettings, this.manifest.settings.index);
-
-  constructor(
-    manifest: Manifest,
-    private readonly graphs: Record<string, Graph>,
-  ) {
-    super(manifest);
-  }
+  private readonly index = this.tuned("index", indexSettings);
 
   /** The vector (E) of frames (T, D); one of more than ten seconds has the direction of the sum of its windows' vectors. */
   async embedMotion(frames: Frames): Promise<Float32Array> {
     const most = Math.floor(this.index.window * this.fps + 1e-9);
     const count = Math.max(1, Math.ceil(frames.length / most));
-    const edges = Array.from({ length: count + 1 }, (_, at) => toEven((at * frames.length) / count));
+    const edges = Array.from({ length: count + 1 }, (_, at) => rounded((at * frames.length) / count));
     const vectors: Float32Array[] = [];
     for (const [at, edge] of edges.slice(1).entries()) {
       vectors.push((await this.graphs.motion!.run(this.motion(frames.slice(edges[at]!, edge)))).vector!.data);
@@ -67,9 +58,4 @@ export class SearchModel extends LanguageModel {
       .sort((a, b) => b.score - a.score || a.index - b.index)
       .slice(0, this.setting("count", count));
   }
-}
-
-/** Rounded, a half to the even number. */
-function toEven(value: number): number {
-  return value % 1 === 0.5 ? 2 * Math.round(value / 2) : Math.round(value);
 }
