@@ -130,6 +130,15 @@ def test_figures_that_meet_go_around_each_other(model: SteerModel) -> None:
     assert nearest[0.8] > 0.5
 
 
+def test_a_figure_goes_around_two_that_stand_side_by_side(model: SteerModel) -> None:
+    session = model.start(characters=3, places=[(-0.41, 0, 0), (0.41, 0, 0), (0, -2, 0)])
+    session.keep_apart(0.8)
+    session.go_to((0, 1.5), ids=[2])
+    ground = np.array([session.tick().ground[:, :2] for _ in range(360)])
+    assert session.arrived[2]
+    assert np.linalg.norm(ground[:, 2:] - ground[:, :2], axis=2).min() > 0.4
+
+
 def test_a_crowd_crosses_a_circle_apart_and_goes_on_from_a_snapshot_as_before(model: SteerModel) -> None:
     angles = np.arange(12) * np.pi / 6
     places = 3 * np.stack([np.sin(angles), np.cos(angles)], axis=1)

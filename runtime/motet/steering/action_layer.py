@@ -395,7 +395,7 @@ def _entered(
     act, upper = order
     if act is None:
         return None
-    moves = goes or np.hypot(*playback.spring[figure, :2]) > matcher.settings.idle
+    moves = goes or playback.pace[figure] > matcher.settings.idle
     keeps_moving = moves and act.legs  # its legs go on as it ends
     whole = not upper if upper is not None else bool(keeps_moving or not moves)
     # the first frames, compared with the figure as it is now

@@ -52,7 +52,7 @@ class AvoidanceSettings(Settings):
     """How far from its path a figure among others goes straight on to the next corner."""
     standing: Share = 0.7
     """Share of the room that is kept from those who stand."""
-    gives_way: Radians = 0.5
+    gives_way: Radians = 0.9
     """How far to the left of where it wants to go a figure goes that is held up, and less if it only slows down."""
 
 
@@ -113,13 +113,13 @@ def _changes(gap: Array, closing: Array, room: Array, settings: AvoidanceSetting
     # velocities that meet are in a cone that a circle cuts off: out of it past the circle
     from_circle = closing - gap / seconds[:, None]
     off = np.hypot(*from_circle.T)
-    circle_way = _unit(from_circle)
+    circle_way = directions_of(from_circle)
     circle_change = room / seconds - off
     # or over the nearer leg of the cone
     leg = np.sqrt(np.maximum(apart**2 - room**2, 0.0))
     side = np.where(_cross(gap, from_circle) > 0, 1.0, -1.0)
     across = np.stack([-gap[:, 1], gap[:, 0]], axis=1)
-    leg_way = _unit((leg * side)[:, None] * across - room[:, None] * gap)
+    leg_way = directions_of((leg * side)[:, None] * across - room[:, None] * gap)
     leg_change = -(closing * leg_way).sum(axis=1)
     # past the circle where that is nearer
     towards = (from_circle * gap).sum(axis=1)
@@ -128,7 +128,7 @@ def _changes(gap: Array, closing: Array, room: Array, settings: AvoidanceSetting
     way = np.where(past_circle[:, None], circle_way, leg_way)
     # those that are too near part
     too_near = apart < room
-    away = _unit(-gap)
+    away = directions_of(-gap)
     change = np.where(too_near, (room - apart) / settings.parts - (closing * away).sum(axis=1), change)
     return change, np.where(too_near[:, None], away, way)
 
@@ -187,6 +187,7 @@ def _cross(first: Array, second: Array) -> Array:
     return product
 
 
-def _unit(vectors: Array) -> Array:
+def directions_of(vectors: Array) -> Array:
+    """Vectors (n, 2) over the ground of length 1, or less of shorter ones than a micrometre."""
     units: Array = vectors / np.maximum(np.hypot(*vectors.T), 1e-6)[:, None]
     return units

@@ -1,9 +1,9 @@
 """A foot lock for live figures: standing feet stay in place, without look-ahead.
 
 Contacts come from the table being played, by :func:`motet.figures.feet.contacts.contacts_of` of the recordings. While a
-foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, the
-correction fades, unless its steps are planned (:mod:`motet.steering.stepping`). Hip, knee and ankle follow
-(:class:`motet.figures.two_bones.TwoBones`). The offline twin, which knows how long a foot will stand, is
+foot stands, the movement of its lowest point over the ground is removed, tick by tick; when it lifts off, or its leg is
+too short, the correction fades, unless its steps are planned (:mod:`motet.steering.stepping`). Hip, knee and ankle
+follow (:class:`motet.figures.two_bones.TwoBones`). The offline twin, which knows how long a foot will stand, is
 :mod:`motet.figures.feet.hold`.
 """
 
@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from motet.figures.humanoid import LEG, SOLE
+from motet.figures.humanoid import HUMANOID, LEG, SOLE
 from motet.figures.legs import Limb, joints_of, limbs, reached_by, with_legs
 from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import (
@@ -23,9 +23,10 @@ from motet.motion.scalar_or_batch import (
     Quaternion,
     Vector,
     larger,
+    length,
+    minus,
     parts,
     plus,
-    root,
     rotated,
     single,
     smaller,
@@ -35,7 +36,8 @@ from motet.motion.scalar_or_batch import (
 from motet.motion.springs import Inertializer
 from motet.settings import Range, Settings
 from motet.steering.pose import Floats, Pose, hips_of
-from motet.steering.stepping import FREE, Footing, Move, Plan, Step, lift_of, stepped
+from motet.steering.settings import Share
+from motet.steering.stepping import FREE, Footing, Move, Plan, Step, distance_of, lift_of, stepped
 
 
 @dataclass(frozen=True)
@@ -48,19 +50,28 @@ class FootLockSettings(Settings):
     """Half-life in which a released foot returns to where it is played."""
     farthest: Annotated[float, Range(0, 1, "m")] = 0.2
     """Largest correction; beyond it the foot is released."""
+    stretches: Annotated[float, Range(0.1, 10)] = 1.01
+    """Distance from the hip, in lengths of a leg, beyond which it is released, as it would leave the ground."""
     swings: Annotated[float, Range(0.01, 100, "m/s")] = 1.0
     """Above this speed a foot swings, even if a clip that was just jumped to marks a contact."""
     stands: Annotated[float, Range(0, 1)] = 0.5
     """Contact above which a foot stands."""
-    bears: Annotated[float, Range(0, 1, "m")] = 0.02
+    bears: Annotated[float, Range(0, 1, "m")] = 0.03
     """How much lower than the ball the heel or the tip must be to bear the foot."""
     low: Annotated[float, Range(0, 1, "m")] = 0.5
     """Height of the hips below which no foot is held: who squats or kneels turns on it."""
     steps: Annotated[float, Range(0, 1, "m")] = 0.08
     """How high a foot is lifted that swings while its contact is 1; a slower foot is lifted less."""
+    leaves: Share = 0.1
+    """Contact below which a foot is off the ground,"""
+    clears: Annotated[float, Range(0, 1, "m")] = 0.06
+    """and so high if it is no faster than ``swings``: after a jump to another row it would drag."""
     lifts: Annotated[float, Range(0.001, 10, "s")] = 0.035
     """Half-life in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
 
+
+LEG_LENGTH = float(np.linalg.norm(HUMANOID.offsets[[HUMANOID.index(f"left{part}") for part in LEG[1:3]]], axis=1).sum())
+"""Metres of a thigh and a shin."""
 
 LEFT_THEN_RIGHT = np.array([[True], [False]])
 """Which of both feet in arrays is the left one."""
@@ -76,16 +87,17 @@ class FootLock:
     """The lock of B characters; replaced, never written into."""
 
     feet: Array
-    """(B, 2, 18) of the left and the right foot: what :class:`motet.steering.stepping.Step` has, its offset over the
-    ground, x and z in metres, and how fast that changes first of all; how high it steps, and how fast that changes; and
-    where heel, ball and tip of its sole were in the last tick, x, y and z each, infinite before the first."""
+    """(B, 2, 19) of the left and the right foot: what :class:`motet.steering.stepping.Step` has, its offset over the
+    ground, x and z in metres, and how fast that changes first of all; how high it steps, and how fast that changes; 1
+    where it was released before its contact ended, else 0; and where heel, ball and tip of its sole were in the last
+    tick, x, y and z each, infinite before the first."""
 
     @staticmethod
     def none(characters: int) -> "FootLock":
         """Feet that have not been held yet."""
-        feet = np.zeros((characters, 2, 18))
+        feet = np.zeros((characters, 2, 19))
         feet[:, :, 6] = FREE
-        feet[:, :, 9:] = math.inf
+        feet[:, :, 10:] = math.inf
         return FootLock(feet)
 
     def update(
@@ -110,11 +122,13 @@ class FootLock:
         return lock, replace(pose, rotations=with_legs(pose.rotations, legs), contacts=lock._shown(pose.contacts, plan))
 
     def _shown(self, played: Floats, plan: Plan | None) -> Floats:
-        """Contacts (B, 2) as they are shown, from those that are played: a planned foot stands unless it is lifted."""
-        if plan is None:
-            return played
-        lifted = np.minimum(self.feet[:, :, 7] / plan.settings.lowest, 1.0)
-        return np.where(self.feet[:, :, 6] == FREE, played, 1 - lifted).astype(np.float32)
+        """Contacts (B, 2) as they are shown, from those that are played: a released foot does not stand, and a planned
+        one stands unless it is lifted."""
+        contacts = np.where(self.feet[:, :, 9] > 0, 0.0, played)
+        if plan is not None:
+            lifted = np.minimum(self.feet[:, :, 7] / plan.settings.lowest, 1.0)
+            contacts = np.where(self.feet[:, :, 6] == FREE, contacts, 1 - lifted)
+        return contacts.astype(np.float32)
 
     @property
     def _feet(self) -> Any:
@@ -158,7 +172,7 @@ def _stepping(
     sides: Sequence[Part] = (True, False) if len(feet) == 2 else (LEFT_THEN_RIGHT,)
     each = list[Footing]()
     for foot, limb, is_left in zip(feet, played, sides, strict=True):
-        each.append(Footing(_length(foot[0], foot[1]), foot[6], limb.contact > stands, is_left))
+        each.append(Footing(distance_of(foot[0], foot[1]), foot[6], limb.contact > stands, is_left))
     others = each[::-1] if len(each) == 2 else [Footing(*(part[::-1] for part in each[0]))]
     return [Stepping(footing, other, plan) for footing, other in zip(each, others, strict=True)]
 
@@ -170,7 +184,8 @@ def _held(
     # the foot as it is played, and how it is corrected
     turned, places = joints_of(limb, hips, place)
     sole = sole_points(turned, places)
-    foot = _corrected(foot_before, sole, limb.contact, place[1], tick)
+    is_released = _is_released(foot_before, limb.contact, places, tick.settings)
+    foot = _corrected(foot_before, sole, limb.contact, is_released, place[1], tick)
     correction = (foot[0], _lift(foot, sole), foot[1])
     moves = (correction[0] != 0) | (correction[1] != 0) | (correction[2] != 0)
     if moves is False:
@@ -190,19 +205,36 @@ def _lift(foot: Sequence[Part], sole: Sequence[Vector]) -> Part:
     return where(foot[6] == FREE, larger(lift, 0.0), lift)
 
 
+def _is_released(
+    foot_before: Sequence[Part], contact: Part, places: Sequence[Vector], settings: FootLockSettings
+) -> Part:
+    """Whether a foot is released before its contact ends, as its leg does not reach where it is held."""
+    held = plus(places[2], (foot_before[0], 0.0, foot_before[1]))
+    is_too_far = length(minus(held, places[0])) > settings.stretches * LEG_LENGTH
+    return (contact > settings.stands) & (is_too_far | (foot_before[9] > 0))
+
+
 def _corrected(
-    foot_before: Sequence[Part], sole: Sequence[Vector], contact: Part, hips_height: Part, tick: Tick
+    foot_before: Sequence[Part],
+    sole: Sequence[Vector],
+    contact: Part,
+    is_released: Part,
+    hips_height: Part,
+    tick: Tick,
 ) -> list[Part]:
     """The correction of a foot a tick later, as :attr:`FootLock.feet` has it."""
     settings = tick.settings
     before = Step(*foot_before[:7])
-    height, rise, *sole_before = foot_before[7:]
+    height, rise, _, *sole_before = foot_before[7:]
     move = _sole_move(sole, sole_before, settings.bears)
     is_high = hips_height > settings.low
     # hold: a foot that stands stays where it was, and the offset of one that swings returns to 0
-    contact = where(is_high, contact, 0.0)
-    step, stands = _free(before, move, contact, settings, tick.seconds)
-    goal = contact * _swing_height(before, step, move, settings, tick.seconds)
+    held_contact = where(is_released, 0.0, where(is_high, contact, 0.0))
+    step, stands = _free(before, move, held_contact, settings, tick.seconds)
+    share = _swing_share(before, step, move, settings, tick.seconds)
+    drags = (held_contact < settings.leaves) & (share < 1)
+    goal = contact * share * settings.steps + where(drags, settings.clears, 0.0)
+    goal = where(is_high, goal, 0.0)
     # step: a foot of a figure that goes slowly does so by plan, once it stands
     if tick.stepping is not None:
         plan = tick.stepping.plan
@@ -219,7 +251,7 @@ def _corrected(
     if tick.stepping is not None:
         follows = (step.clock > 0) | ((step.clock == 0) & (before.clock == FREE))
         height = where(follows, larger(height, _lowest(sole)), height)
-    return [*step, height, rise, *chain.from_iterable(sole)]
+    return [*step, height, rise, where(is_released, 1.0, 0.0), *chain.from_iterable(sole)]
 
 
 def _free(before: Step, move: Move, contact: Part, settings: FootLockSettings, seconds: float) -> tuple[Step, Part]:
@@ -228,8 +260,8 @@ def _free(before: Step, move: Move, contact: Part, settings: FootLockSettings, s
     # the move of a foot that stands is taken from its offset
     held_x = before.shift_x - move[0]
     held_z = before.shift_z - move[1]
-    slow = _length(*move) < settings.swings * seconds
-    stands = slow & (contact > settings.stands) & (_length(held_x, held_z) < settings.farthest)
+    slow = distance_of(*move) < settings.swings * seconds
+    stands = slow & (contact > settings.stands) & (distance_of(held_x, held_z) < settings.farthest)
     fade = Inertializer(settings.fade)
     shift_x, drift_x = _held_or_faded(stands, held_x, before.shift_x, before.drift_x, fade, seconds)
     shift_z, drift_z = _held_or_faded(stands, held_z, before.shift_z, before.drift_z, fade, seconds)
@@ -237,10 +269,10 @@ def _free(before: Step, move: Move, contact: Part, settings: FootLockSettings, s
     return Step(shift_x, shift_z, drift_x, drift_z, nothing, nothing, nothing + FREE), stands
 
 
-def _swing_height(before: Step, step: Step, move: Move, settings: FootLockSettings, seconds: float) -> Part:
-    """How high a foot is lifted that moves over the ground while its contact is 1: higher the faster it is."""
-    moved = _length(step.shift_x - (before.shift_x - move[0]), step.shift_z - (before.shift_z - move[1]))
-    return smaller(moved * (settings.steps / (settings.swings * seconds)), settings.steps)
+def _swing_share(before: Step, step: Step, move: Move, settings: FootLockSettings, seconds: float) -> Part:
+    """How fast a foot moves over the ground as a share of the speed above which it swings, at most 1."""
+    moved = distance_of(step.shift_x - (before.shift_x - move[0]), step.shift_z - (before.shift_z - move[1]))
+    return smaller(moved / (settings.swings * seconds), 1.0)
 
 
 def _held_or_faded(
@@ -278,7 +310,3 @@ def _lowest(sole: Sequence[Vector]) -> Part:
     """The height of the lowest point of a sole."""
     heel, ball, tip = sole
     return smaller(smaller(ball[1], heel[1]), tip[1])
-
-
-def _length(x: Part, z: Part) -> Part:
-    return root(x * x + z * z)

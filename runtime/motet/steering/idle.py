@@ -82,7 +82,8 @@ class IdleLayer:
     @staticmethod
     def none(figures: int) -> "IdleLayer":
         """Figures that have not stood yet."""
-        return IdleLayer(np.zeros(figures, dtype=np.int64), np.zeros(figures), np.zeros(figures))
+        zero = np.zeros(figures)
+        return IdleLayer(zero.astype(np.int64), zero, zero)
 
     def update(
         self,
@@ -102,7 +103,7 @@ class IdleLayer:
         # figures stand without a target speed, slow, and on both feet
         stopped = (target[:, :2] == 0).all(axis=1)
         on_both_feet = (pose.contacts > settings.stands).all(axis=1)
-        slow = (playback.spring[:, :2] ** 2).sum(axis=1) < settings.slow**2
+        slow = playback.pace < settings.slow
         stands = stopped & ~acts & on_both_feet & slow
         # come to rest
         error, rate = damped(self.share - stands, self.rate, damping_of(settings.settles), seconds)

@@ -90,6 +90,11 @@ class Playback:
         )
         return playback.copy()
 
+    @property
+    def pace(self) -> Array:
+        """(B,) how fast the springs go, m/s."""
+        return np.hypot(self.spring[:, 0], self.spring[:, 1])
+
     def restart(self, figures: Rows, row: Rows, mirror: Rows) -> None:
         """Let figures (n,) play rows (n,) and mirror images (n,) as they are recorded."""
         self.row[figures] = row
@@ -400,8 +405,7 @@ class Matcher:
 
     def comes_to_rest(self, playback: Playback, target: Array, gait: Rows) -> Flags:
         """Which figures (B,) with targets (B, 3) in gaits (B,) are to stand, and go no faster than a slow walk."""
-        pace = np.hypot(playback.spring[:, 0], playback.spring[:, 1])
-        stops = (target[:, :2] == 0).all(axis=1) & (pace < self.settings.creep)
+        stops = (target[:, :2] == 0).all(axis=1) & (playback.pace < self.settings.creep)
         rests: Flags = self.stretched[gait] & stops
         return rests
 

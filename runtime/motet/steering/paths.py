@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from motet.motion.rotations import Array, wrapped
 from motet.motion.springs import damping_of
 from motet.settings import Range, Settings
-from motet.steering.avoidance import AvoidanceSettings, kept_apart
+from motet.steering.avoidance import AvoidanceSettings, directions_of, kept_apart
 from motet.steering.gaits import Command, Gaits
 from motet.steering.matching import Flags, Playback, Rows
 from motet.steering.settings import Metres, Radians, Seconds, Share, Speed, SteeringSettings
@@ -219,7 +219,7 @@ class Going:
         velocity = (there - here) / seconds + (here - rests) / settings.catches_up
         pace = np.hypot(*velocity.T)
         most = np.where(stops, 0.0, self.speed)
-        return going, _unit(velocity) * np.minimum(most, pace)[:, None]
+        return going, directions_of(velocity) * np.minimum(most, pace)[:, None]
 
     def _slowness(self, settings: ArrivalSettings) -> Array:
         """The share (B,) of their speeds at which figures go through the bend around where they are on their paths: by
@@ -237,7 +237,7 @@ class Going:
         rest at ``rests``, are far from there; and as far as figures are ahead already."""
         off = rests - here
         waits = (1 - np.hypot(*off.T) / settings.strays).clip(0, 1)
-        way = _unit(self.paths.at(self.gone + 0.05) - here)
+        way = directions_of(self.paths.at(self.gone + 0.05) - here)
         ahead = (off * way).sum(axis=1).clip(0, 0.1)
         steps: Array = np.maximum(step * waits, ahead)
         return steps
@@ -246,7 +246,7 @@ class Going:
         """Whether the target of figures is standing, and whether they have arrived, both (B,). at_end: whether they
         come to rest at the end."""
         distance = np.hypot(*(self.paths.ends - playback.root[:, :2]).T)
-        stands = np.hypot(*playback.spring[:, :2].T) < settings.stands
+        stands = playback.pace < settings.stands
         goes_again = stands & (distance > settings.glides_from)
         stops = (self.stops & ~goes_again) | at_end
         turned = np.isnan(self.facing) | (np.abs(wrapped(playback.root[:, 2] - self.facing)) < settings.faces)
@@ -266,8 +266,7 @@ class Going:
         """The step (B, 2) by which figures that come to rest are moved to where they are to stand."""
         missing = self.paths.ends - playback.root[:, :2] - rolling_distance(playback, steering)
         distance = np.hypot(*missing.T)
-        speed = np.hypot(*playback.spring[:, :2].T)
-        most = (settings.glides + settings.glides_moving * speed) * seconds
+        most = (settings.glides + settings.glides_moving * playback.pace) * seconds
         share = np.minimum(seconds / settings.settles, most / np.maximum(distance, 1e-9))
         glides = self.stops & (distance < settings.glides_from)
         return np.where(glides[:, None], missing * share[:, None], 0.0)
@@ -360,8 +359,3 @@ def rolling_distance(playback: Playback, steering: SteeringSettings) -> Array:
     """How far (B, 2) figures still go whose target is standing: the integral of the spring."""
     damping = damping_of(steering.velocity)
     return (2 * playback.spring[:, :2] + playback.spring_rate[:, :2] / damping) / damping
-
-
-def _unit(vectors: Array) -> Array:
-    units: Array = vectors / np.maximum(np.hypot(*vectors.T), 1e-9)[:, None]
-    return units

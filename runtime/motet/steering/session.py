@@ -123,17 +123,9 @@ class SteerSession:
         )
 
     @property
-    def _target(self) -> Array:
-        return self._state.target
-
-    @_target.setter
-    def _target(self, target: Array) -> None:
-        self._state.target = target
-
-    @property
     def characters(self) -> int:
         """Number of characters."""
-        return len(self._target)
+        return len(self._state.target)
 
     def control(
         self,
@@ -176,7 +168,7 @@ class SteerSession:
     @property
     def target(self) -> Array:
         """Velocity along x and z, m/s, and facing, radians (characters, 3), within the limits of gaits."""
-        return self._target.copy()
+        return self._state.target.copy()
 
     @property
     def places(self) -> Array:
@@ -231,9 +223,9 @@ class SteerSession:
                 self._warned.add(gait)
                 warn(message, ControlWarning)
         state = self._state
-        changed = (np.abs(target - self._target).max(axis=1) > 1e-4) | (command.gait != state.command.gait)
+        changed = (np.abs(target - state.target).max(axis=1) > 1e-4) | (command.gait != state.command.gait)
         state.playback.hasten(changed)
-        self._target = target
+        state.target = target
         state.command = command
         state.going = state.going.ended()
         state.saying = None
@@ -256,8 +248,8 @@ class SteerSession:
         if state.going.goes.any() or state.room:
             model = self.model
             ways = Ways(model.abilities, model.settings(ArrivalSettings), model.settings(AvoidanceSettings))
-            state.going, state.command, self._target = ways.lead(
-                state.going, state.room, state.playback, state.command, self._target, 1 / model.fps
+            state.going, state.command, state.target = ways.lead(
+                state.going, state.room, state.playback, state.command, state.target, 1 / model.fps
             )
         return self.tick_to(self._way)
 
@@ -265,7 +257,7 @@ class SteerSession:
     def _way(self) -> Array:
         """The target as gaits approach it."""
         state = self._state
-        return self.model.abilities.curved(self._target, state.command.gait, state.playback.root[:, 2])
+        return self.model.abilities.curved(state.target, state.command.gait, state.playback.root[:, 2])
 
     def _slowed(self, target: Array) -> Array:
         """Targets (characters, 3), slower where they lead uphill."""
@@ -334,7 +326,7 @@ class SteerSession:
         direction = np.where(stands, facing, state.command.direction)
         state.command = replace(state.command, direction=direction, facing=facing)
         standing_target = np.insert(np.zeros((len(facing), 2)), 2, facing, axis=1)
-        self._target = np.where(stands[:, None], standing_target, self._target)
+        state.target = np.where(stands[:, None], standing_target, state.target)
 
     def _events(self, pose: Pose) -> tuple[Event, ...]:
         state = self._state
@@ -524,7 +516,7 @@ class SteerSession:
 
     def _take(self, character: int, acts: tuple[Act, ...]) -> Act | None:
         """The act that leads the farthest if the character moves, else the least far; None of none."""
-        choose = max if self._target[character, :2].any() else min
+        choose = max if self._state.target[character, :2].any() else min
         return choose(acts, key=lambda act: act.reach) if acts else None
 
     def prepare(self, *sentences: str) -> list[Shown]:
@@ -625,7 +617,7 @@ class SteerSession:
         direction = np.where(before.speed > 0, before.direction, facing)
         no_way = np.zeros_like(before.faces_way)
         state.command = replace(before, direction=direction, facing=facing, faces_way=no_way)
-        self._target, _ = self.model.abilities.target(state.command)
+        state.target, _ = self.model.abilities.target(state.command)
         self._begin_anew()
         # nothing lies between there and here
         if state.poses is not None:

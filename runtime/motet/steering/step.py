@@ -150,8 +150,7 @@ def _recorded(matcher: Matcher, playback: Playback, played: Array, target: Array
     forward, left, turn, speed = parts(played[:, -6:-2])
     slow_walk = single(matcher.is_slow_walk(target, gait)) & (speed > 0)  # what has no speed has its own rate
     # who comes to rest goes no faster than the springs, or would lurch as recorded
-    pace = np.hypot(playback.spring[:, 0], playback.spring[:, 1])
-    slow_walk = slow_walk | (single(matcher.comes_to_rest(playback, target, gait)) & (speed > single(pace)))
+    slow_walk = slow_walk | (single(matcher.comes_to_rest(playback, target, gait)) & (speed > single(playback.pace)))
     return Recorded(forward, left, turn, speed, single(way), slow_walk)
 
 

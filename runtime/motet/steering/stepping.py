@@ -10,8 +10,6 @@ a stop ends in balance. :mod:`motet.steering.foot_lock` has the state, and turns
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
-import numpy as np
-
 from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import Part, larger, root, smaller, where
 from motet.settings import Range, Settings
@@ -96,8 +94,7 @@ def planned(matcher: Matcher, playback: Playback, target: Array, gait: Rows) -> 
 
     target: (B, 3) velocity along x and z, and facing. gait: (B,).
     """
-    pace = np.hypot(playback.spring[:, 0], playback.spring[:, 1])
-    creeps = matcher.is_slow_walk(target, gait) & (pace < matcher.settings.creep)
+    creeps = matcher.is_slow_walk(target, gait) & (playback.pace < matcher.settings.creep)
     return creeps, matcher.comes_to_rest(playback, target, gait)
 
 
@@ -120,14 +117,14 @@ def stepped(before: Step, footing: Footing, other: Footing, move: Move, plan: Pl
     return Step(shift_x, shift_z, drift_x, drift_z, anchor_x, anchor_z, where(lands, 0.0, clock))
 
 
-def _drift(before: Step, move: Move, kept: Part, seconds: float) -> tuple[Part, Part]:
+def _drift(before: Step, move: Move, kept: Part, seconds: float) -> Move:
     """The mean drift along x and z, of which a part is kept from the tick before."""
     x = kept * before.drift_x - (1 - kept) * move[0] / seconds
     z = kept * before.drift_z - (1 - kept) * move[1] / seconds
     return x, z
 
 
-def _anchor(before: Step, move: Move) -> tuple[Part, Part]:
+def _anchor(before: Step, move: Move) -> Move:
     """The offset along x and z that keeps a foot where it stood, after a move of the pose."""
     swung = before.clock > 0
     x = where(swung, before.anchor_x, before.shift_x) - move[0]
@@ -139,7 +136,7 @@ def lift_of(step: Step, plan: Plan) -> Part:
     """How high a planned foot is to be above the ground, in metres."""
     settings = plan.settings
     goal_x, goal_z = _goal(step, plan)
-    distance = _length(step.anchor_x - goal_x, step.anchor_z - goal_z)
+    distance = distance_of(step.anchor_x - goal_x, step.anchor_z - goal_z)
     share = smaller(distance / settings.longest, 1.0)
     return where(step.clock > 0, settings.lowest + share * (settings.highest - settings.lowest), 0.0)
 
@@ -153,11 +150,11 @@ def _lifts(footing: Footing, other: Footing, plan: Plan) -> Part:
     return (footing.clock == 0) & (other.clock <= 0) & where(both_alike, strays, other.stands)
 
 
-def _goal(step: Step, plan: Plan) -> tuple[Part, Part]:
+def _goal(step: Step, plan: Plan) -> Move:
     """The offset along x and z that a foot is led to: ahead, against its drift."""
     settings = plan.settings
     ahead = where(plan.settled, 0.0, -settings.leads)
-    length = _length(step.drift_x, step.drift_z) * settings.leads
+    length = distance_of(step.drift_x, step.drift_z) * settings.leads
     ahead = ahead * smaller(settings.lead / larger(length, settings.lead), 1.0)
     return ahead * step.drift_x, ahead * step.drift_z
 
@@ -167,5 +164,6 @@ def _eased(share: Part) -> Part:
     return share * share * share * (10 + share * (6 * share - 15))
 
 
-def _length(x: Part, z: Part) -> Part:
+def distance_of(x: Part, z: Part) -> Part:
+    """The length of a vector over the ground."""
     return root(x * x + z * z)

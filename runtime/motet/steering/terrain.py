@@ -21,7 +21,7 @@ from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import Quaternion, Vector, length, minus, plus, product, rotated, swing
 from motet.motion.springs import damped, damping_of
 from motet.settings import Range, Settings
-from motet.steering.foot_lock import sole_points
+from motet.steering.foot_lock import LEG_LENGTH, sole_points
 from motet.steering.matching import Flags
 from motet.steering.pose import Pose, frame_of
 from motet.steering.settings import HalfLife, Metres, Seconds, Share
@@ -278,9 +278,8 @@ def _hips_goal(height: Array, landing: Array, ankle: Vector, legs: Legs, setting
 
 def _spare_reach(ankle: Vector, places: Sequence[Vector], settings: TerrainSettings) -> Array:
     """How far hips could rise (2, B) until a leg that reaches for its tilted ankle is as long as it may be."""
-    hip, knee, ankle_on_plane = places[:3]
-    longest = settings.straight * (length(minus(knee, hip)) + length(minus(ankle_on_plane, knee)))
-    reach = np.maximum(longest, length(minus(ankle_on_plane, hip)))
+    hip, _, ankle_on_plane = places[:3]
+    reach = np.maximum(settings.straight * LEG_LENGTH, length(minus(ankle_on_plane, hip)))
     away = minus(ankle, hip)
     aside = away[0] ** 2 + away[2] ** 2
     spare: Array = away[1] + np.sqrt(np.maximum(reach**2 - aside, 0.0))

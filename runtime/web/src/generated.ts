@@ -366,7 +366,7 @@ export const avoidanceSettings = {
   waits: { default: 0.02, low: 0, high: 100, whole: false },
   rejoins: { default: 0.1, low: 0, high: 100, whole: false },
   standing: { default: 0.7, low: 0, high: 1, whole: false },
-  gives_way: { default: 0.5, low: 0, high: 3.15, whole: false },
+  gives_way: { default: 0.9, low: 0, high: 3.15, whole: false },
 } as const;
 
 // motet.steering.events
@@ -376,15 +376,23 @@ export const EVENTS = {
   UP_CONTACT: 0.2,
 } as const;
 
+// motet.steering.foot_lock
+export const FOOT_LOCK = {
+  LEG_LENGTH: 0.84,
+} as const;
+
 // motet.steering.foot_lock.FootLockSettings
 export const footLockSettings = {
   fade: { default: 0.1, low: 0.001, high: 10, whole: false },
   farthest: { default: 0.2, low: 0, high: 1, whole: false },
+  stretches: { default: 1.01, low: 0.1, high: 10, whole: false },
   swings: { default: 1, low: 0.01, high: 100, whole: false },
   stands: { default: 0.5, low: 0, high: 1, whole: false },
-  bears: { default: 0.02, low: 0, high: 1, whole: false },
+  bears: { default: 0.03, low: 0, high: 1, whole: false },
   low: { default: 0.5, low: 0, high: 1, whole: false },
   steps: { default: 0.08, low: 0, high: 1, whole: false },
+  leaves: { default: 0.1, low: 0, high: 1, whole: false },
+  clears: { default: 0.06, low: 0, high: 1, whole: false },
   lifts: { default: 0.035, low: 0.001, high: 10, whole: false },
 } as const;
 

@@ -124,7 +124,8 @@ function nearestAllowed(
   return [x, z];
 }
 
-function unit(x: number, z: number): [number, number] {
+/** A vector over the ground of length 1, or less of one shorter than a micrometre. */
+export function unit(x: number, z: number): [number, number] {
   const length = Math.max(Math.hypot(x, z), 1e-6);
   return [x / length, z / length];
 }

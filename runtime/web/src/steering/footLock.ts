@@ -1,9 +1,9 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
-import { type footLockSettings, STEPPING } from "../generated.js";
+import { FOOT_LOCK, type footLockSettings, STEPPING } from "../generated.js";
 import { lengthOf } from "../motion/planar.js";
 import { LEG, SOLES } from "../figures/humanoid/bones.js";
 import { legOf, type Limb, reach } from "../figures/legs.js";
-import { about, plus, product, rotated, turnAt, type Vector, Y } from "../motion/rotations.js";
+import { about, minus, plus, product, rotated, size, turnAt, type Vector, Y } from "../motion/rotations.js";
 import { damped, dampingOf } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
@@ -15,9 +15,11 @@ const POINTS = LEG.flatMap((part, joint) =>
 );
 const BALL = 1;
 
-/** Of one foot, how high it steps and how fast that changes, and where the points of its sole were, if there was a tick. */
+/** Of one foot, how high it steps and how fast that changes, where the points of its sole were, if there was a tick. */
 interface Foot extends Step {
   height: [off: number, rate: number];
+  /** Whether it was released before its contact ended. */
+  released: boolean;
   soles: Float64Array;
   isNew: boolean;
 }
@@ -31,6 +33,7 @@ export function newLock(): Lock {
   const foot = (): Foot => ({
     ...newStep(),
     height: [0, 0],
+    released: false,
     soles: new Float64Array(3 * POINTS.length),
     isNew: true,
   });
@@ -61,7 +64,8 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
     // the shift that keeps it where it was, or that fades once the foot swings; or a planned step
     const isHigh = pose.height > settings.low;
     const planned = isHigh && plan ? plan : null;
-    const contact = isHigh ? pose.contacts[side]! : 0;
+    const contact = pose.contacts[side]!;
+    foot.released = isReleased(foot, contact, leg, settings);
     const rises =
       planned && foot.clock >= 0
         ? byPlan(
@@ -75,11 +79,11 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
             settings,
             dt,
           )
-        : free(foot, contact, moveX, moveZ, !!planned, soles[lowest]![1], settings, dt);
+        : free(foot, contact, moveX, moveZ, isHigh, !!planned, soles[lowest]![1], settings, dt);
     if (foot.shift[0] || foot.shift[1] || rises)
       reach(rotations, side, hips, leg, [foot.shift[0], rises, foot.shift[1]]);
   }
-  if (plan) showContacts(lock, pose, plan);
+  showContacts(lock, pose, plan);
 }
 
 function footingOf(lock: Lock, side: 0 | 1, { contacts }: Played, settings: LockSettings): Footing {
@@ -93,11 +97,22 @@ export function solePoints({ turned, places }: Limb): Vector[] {
   return POINTS.map((point) => plus(places[point[0]]!, rotated(turned[point[0]]!, point[1])));
 }
 
-/** Contacts as they are shown: a planned foot stands unless it is lifted. */
-function showContacts(lock: Lock, { contacts }: Played, { settings }: Plan): void {
-  lock.forEach(({ clock, height }, side) => {
-    if (clock !== STEPPING.FREE) contacts[side] = Math.fround(1 - Math.min(height[0] / settings.lowest, 1));
-  });
+/** Contacts as they are shown: a released foot does not stand, and a planned one stands unless it is lifted. */
+function showContacts(lock: Lock, { contacts }: Played, plan: Plan | null): void {
+  for (let side = 0; side < 2; side++) {
+    const { clock, height, released } = lock[side]!;
+    if (plan && clock !== STEPPING.FREE)
+      contacts[side] = Math.fround(1 - Math.min(height[0] / plan.settings.lowest, 1));
+    else if (released) contacts[side] = 0;
+  }
+}
+
+/** Whether a foot is released before its contact ends, as its leg does not reach where it is held. */
+function isReleased(foot: Foot, contact: number, { places }: Limb, settings: LockSettings): boolean {
+  if (contact <= settings.stands) return false;
+  if (foot.released) return true;
+  const [x, y, z] = minus(places[2], places[0]);
+  return size([x + foot.shift[0], y, z + foot.shift[1]]) > settings.stretches * FOOT_LOCK.LEG_LENGTH;
 }
 
 /** Move a planned foot; by how much its ankle is lifted. lowest: the height of its sole as played. */
@@ -121,27 +136,30 @@ function byPlan(
   return foot.height[0] - lowest;
 }
 
-/** Move a foot that is held while it stands; by how much its ankle is lifted. planned: whether it steps by plan once it stands. */
+/** Move a foot that is held while it stands; by how much its ankle is lifted. isHigh: whether the hips are. planned: whether it steps by plan once it stands. */
 function free(
   foot: Foot,
   contact: number,
   x: number,
   z: number,
+  isHigh: boolean,
   planned: boolean,
   lowest: number,
   settings: LockSettings,
   dt: number,
 ): number {
+  const held = isHigh && !foot.released ? contact : 0;
   const wasX = foot.shift[0] - x;
   const wasZ = foot.shift[1] - z;
-  const stands = shift(foot, x, z, contact > settings.stands, settings, dt);
+  const stands = shift(foot, x, z, held > settings.stands, settings, dt);
   const moved = lengthOf(foot.shift[0] - wasX, foot.shift[1] - wasZ);
   foot.anchor[0] = 0;
   foot.anchor[1] = 0;
   foot.clock = planned && stands ? 0 : STEPPING.FREE;
-  // lift a foot that is moved back while its contact still is high, and any out of the ground
-  const steps = contact * settings.steps * Math.min(1, moved / (settings.swings * dt));
-  rise(foot, steps, settings, dt);
+  // lift a foot that is moved back while its contact still is high, or that would drag, and any out of the ground
+  const share = Math.min(1, moved / (settings.swings * dt));
+  const clears = held < settings.leaves && share < 1 ? settings.clears : 0;
+  rise(foot, isHigh ? contact * share * settings.steps + clears : 0, settings, dt);
   if (foot.clock === 0) foot.height[0] = Math.max(foot.height[0], lowest);
   const lift = foot.height[0] - lowest;
   return foot.clock === 0 ? lift : Math.max(0, lift);

@@ -1,6 +1,6 @@
 /* Figures that go along paths, arrive at their ends, and keep apart on the way, as motet/steering/paths.py says: commands tick by
  * tick. Metres, seconds, radians; x and z. */
-import { keptApart } from "./avoidance.js";
+import { keptApart, unit } from "./avoidance.js";
 import type { arrivalSettings } from "../generated.js";
 import type { Gaits } from "./gaits.js";
 import type { Playback, Target } from "./matching.js";
@@ -64,7 +64,7 @@ export function onward(
     onZ / seconds + offZ / settings.catches_up,
   ];
   const pace = Math.min(going.speed, Math.hypot(...velocity));
-  const [x, z] = unit(velocity);
+  const [x, z] = unit(...velocity);
   return [x * pace, z * pace];
 }
 
@@ -102,7 +102,7 @@ function step(
 ): number {
   const off = minus(rests, here);
   const waits = clamp(1 - Math.hypot(...off) / settings.strays, 0, 1);
-  const way = unit(minus(at(going, going.gone + 0.05), here));
+  const way = unit(...minus(at(going, going.gone + 0.05), here));
   return Math.max(metres * waits, clamp(dot(off, way), 0, 0.1));
 }
 
@@ -178,11 +178,6 @@ const at2 = ([x, z]: readonly number[]): Point => [x!, z!];
 const minus = (a: Point, b: Point): Point => [a[0] - b[0], a[1] - b[1]];
 const dot = (a: Point, b: Point): number => a[0] * b[0] + a[1] * b[1];
 const distance = (a: Point, b: Point): number => Math.hypot(a[0] - b[0], a[1] - b[1]);
-
-function unit([x, z]: Point): Point {
-  const length = Math.max(Math.hypot(x, z), 1e-9);
-  return [x / length, z / length];
-}
 
 /** Let those that are on a way go on, and those that move keep `room` metres apart, if it is not 0. */
 export function lead(model: SteeringModel, figures: Steered[], room: number): void {
