@@ -61,6 +61,9 @@ RECIPES = {"default": DEFAULT}
 TRIED = "tried.npz"
 """File of a run: the answers about held-out people from which their probability was learned."""
 
+KEYED = "keyed"
+"""The subject of clips that nobody performed: acts by key poses."""
+
 TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
 """Beginnings of words for a path that is not straight."""
 
@@ -225,12 +228,14 @@ class Tried(NamedTuple):
 
 def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, visits: KnownVisits) -> Tried:
     """The answers of spaces fitted without each group of people about their motions: about each motion as it is, and
-    about two views."""
+    about two views. What nobody performed is in all spaces."""
     entries = [corpus.store.records[record] for record in examples.records]
     shown = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
-    groups = grouped([entry.subject for entry in entries], visits.folds)
+    performed = np.array([entry.subject != KEYED for entry in entries])
+    groups = np.full(len(entries), -1)
+    groups[performed] = grouped([entry.subject for entry in compress(entries, performed)], visits.folds)
     answers = []
-    for fold in np.unique(groups):
+    for fold in np.unique(groups[performed]):
         # what a space of the others knows
         others = np.flatnonzero(groups != fold).tolist()
         if not others:
