@@ -231,11 +231,9 @@ def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Vi
     about two views. What nobody performed is in all spaces."""
     entries = [corpus.store.records[record] for record in examples.records]
     shown = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
-    performed = np.array([entry.subject != KEYED for entry in entries])
-    groups = np.full(len(entries), -1)
-    groups[performed] = grouped([entry.subject for entry in compress(entries, performed)], visits.folds)
+    groups = grouped([entry.subject for entry in entries], visits.folds)
     answers = []
-    for fold in np.unique(groups[performed]):
+    for fold in np.unique(groups[groups >= 0]):
         # what a space of the others knows
         others = np.flatnonzero(groups != fold).tolist()
         if not others:
@@ -265,11 +263,11 @@ def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown])
 
 def grouped(people: Sequence[str], count: int) -> NDArray[np.int64]:
     """The group (N,) of each motion, from 0 to below ``count``: people whose names are equal up to the first "_" are
-    one corpus and stay together; the largest corpora come first, each into the smallest group."""
+    one corpus and stay together; the largest corpora come first, each into the smallest group. -1: nobody's motion."""
     corpora = [name.partition("_")[0] for name in people]
     sizes = [0] * count
-    groups = {}
-    for corpus in sorted(set(corpora), key=lambda corpus: (-corpora.count(corpus), corpus)):
+    groups = {KEYED: -1}
+    for corpus in sorted(set(corpora) - {KEYED}, key=lambda corpus: (-corpora.count(corpus), corpus)):
         groups[corpus] = sizes.index(min(sizes))
         sizes[groups[corpus]] += corpora.count(corpus)
     return np.array([groups[corpus] for corpus in corpora], dtype=np.int64)

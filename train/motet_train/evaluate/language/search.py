@@ -150,11 +150,13 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> Figure
     for kind in ("text", "motion"):
         # the limit that validation would choose
         if corpus.parts.validation:
-            scores, _, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
+            hits, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
+            scores = np.array([hit.score for hit in hits])
             figures[f"{kind}_least"] = float(np.percentile(scores[right], 5)) if right.any() else np.nan
 
         # how well the bundle tells in the test
-        _, like, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
+        hits, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
+        like = np.array([hit.like for hit in hits], dtype=np.bool_)
         figures[f"{kind}_kept"] = share(like[right])
         figures[f"{kind}_told"] = share(~like[~right])
     return figures
@@ -162,9 +164,8 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> Figure
 
 def _first_hits(
     model: SearchModel, corpus: SplitStore, part: Sequence[int], groups: Numbers, kind: str
-) -> tuple[Array, Mask, Mask]:
-    """The scores (Q,) of the first hits of a part's sentences or motions, whether they are like these, and whether they
-    are right."""
+) -> tuple[list[Hit], Mask]:
+    """The first hits of a part's sentences or motions, and whether they are right."""
     searched = part if kind == "text" else corpus.parts.train
     index = _index(model, corpus, searched)
     searched_groups = groups[list(searched)]
@@ -181,8 +182,7 @@ def _first_hits(
         if not matches.all():
             first_hits.append(hits[int(matches.argmin())])
             right.append(False)
-    scores = np.array([hit.score for hit in first_hits])
-    return scores, np.array([hit.like for hit in first_hits], dtype=np.bool_), np.array(right, dtype=np.bool_)
+    return first_hits, np.array(right, dtype=np.bool_)
 
 
 def _queries_of(corpus: SplitStore, part: Sequence[int], kind: str) -> list[tuple[int, str | Motion]]:
