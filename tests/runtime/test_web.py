@@ -20,7 +20,7 @@ import motet
 from motet.bundle.bundle import Bundle
 from motet.bundle.golden import read
 from motet.decode.beam import noise_of, score_words
-from motet.errors import ControlWarning, TextWarning, TravelWarning
+from motet.errors import ControlWarning, TextWarning, TravelWarning, collected
 from motet.figures.humanoid import BONES
 from motet.formats import read_motion
 from motet.generate.codec import Context
@@ -174,12 +174,13 @@ def long(model: SearchModel) -> list[float]:
 def searched(model: SearchModel) -> dict[str, Any]:
     """What is nearest to sentences and to the frames of the golden run among parts of these, and whether it is like
     them."""
-    frames, texts = golden("search"), ["a person walks", "somebody jumps up and down", "he sits down on a chair"]
+    frames = golden("search")
+    texts = ["a person walks", "somebody jumps up and down", "he sits down on a chair", "a person walks quixotically"]
     vectors = model.contexts([frames[:10], frames[5:], frames], "motion")
     members = tuple(Member(str(place), 0, 0, ((0.0, 1.0),)) for place in range(len(vectors)))
-    hits = [
-        [[int(hit.path.name), hit.like] for hit in row] for row in Index(model, Path(), members, vectors).search(texts)
-    ]
+    with collected(TextWarning):
+        rows = Index(model, Path(), members, vectors).search(texts)
+    hits = [[[int(hit.path.name), hit.like] for hit in row] for row in rows]
     scores, least = vectors @ vectors[2], model.settings(IndexSettings).like_motion
     return {"texts": texts, "hits": [*hits, [[int(row), bool(scores[row] >= least)] for row in np.argsort(-scores)]]}
 

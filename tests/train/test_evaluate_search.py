@@ -44,6 +44,9 @@ class FakeSearch:
         record = self.about[sentence]
         return self.vector(record) + 2 * self.off * self.vector(record + (-4 if record % 5 == 4 else 1))
 
+    def unknown(self, sentence: str) -> list[str]:
+        return []
+
     def vector(self, record: int) -> Floats:
         found = np.zeros(len(self.records) + len(KINDS), np.float32)
         found[[record, len(self.records) + record % len(KINDS)]] = np.sqrt(0.5)

@@ -217,7 +217,8 @@ class Index:
     def search(self, queries: Sequence[Query], count: int | None = None) -> list[list[Hit]]: ...
     def search(self, queries: Query | Sequence[Query], count: int | None = None) -> list[Hit] | list[list[Hit]]:
         """The ``count`` files or clips nearest to a sentence or a motion, best first, each with its best window; for
-        several queries, a list for each. Where the first is not ``like`` the query, nothing is.
+        several queries, a list for each. Where the first is not ``like`` the query, nothing is: none is like a sentence
+        with a word that the model does not know.
 
         count: the bundle's by default. TextError for a sentence without a known word, MotionError for a motion that
         the model cannot take, DecodingError for a count that is not between 1 and 1,000.
@@ -241,7 +242,8 @@ class Index:
         settings = self.model.settings(IndexSettings)
         if isinstance(query, str):
             vector = self.model.embed_text(query)
-            least = settings.like_text
+            # nothing is like what the model has no word for, however near the rest of the sentence is
+            least = np.inf if self.model.unknown(query) else settings.like_text
         else:
             vector = direction(self.model, query)
             least = settings.like_motion

@@ -61,6 +61,9 @@ RECIPES = {"default": DEFAULT}
 TRIED = "tried.npz"
 """File of a run: the answers about held-out people from which their probability was learned."""
 
+KEYED = "keyed"
+"""The subject of clips that nobody performed: acts by key poses."""
+
 TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
 """Beginnings of words for a path that is not straight."""
 
@@ -225,12 +228,12 @@ class Tried(NamedTuple):
 
 def _tried(corpus: Divided, examples: Examples, space: JointEmbedding, views: Views, visits: KnownVisits) -> Tried:
     """The answers of spaces fitted without each group of people about their motions: about each motion as it is, and
-    about two views."""
+    about two views. What nobody performed is in all spaces."""
     entries = [corpus.store.records[record] for record in examples.records]
     shown = [shown_by((*entry.sentences, *entry.unseen), entry.action) for entry in entries]
     groups = grouped([entry.subject for entry in entries], visits.folds)
     answers = []
-    for fold in np.unique(groups):
+    for fold in np.unique(groups[groups >= 0]):
         # what a space of the others knows
         others = np.flatnonzero(groups != fold).tolist()
         if not others:
@@ -260,11 +263,11 @@ def _answered(known: Known, vectors: Floats, group: int, shows: Sequence[Shown])
 
 def grouped(people: Sequence[str], count: int) -> NDArray[np.int64]:
     """The group (N,) of each motion, from 0 to below ``count``: people whose names are equal up to the first "_" are
-    one corpus and stay together; the largest corpora come first, each into the smallest group."""
+    one corpus and stay together; the largest corpora come first, each into the smallest group. -1: nobody's motion."""
     corpora = [name.partition("_")[0] for name in people]
     sizes = [0] * count
-    groups = {}
-    for corpus in sorted(set(corpora), key=lambda corpus: (-corpora.count(corpus), corpus)):
+    groups = {KEYED: -1}
+    for corpus in sorted(set(corpora) - {KEYED}, key=lambda corpus: (-corpora.count(corpus), corpus)):
         groups[corpus] = sizes.index(min(sizes))
         sizes[groups[corpus]] += corpora.count(corpus)
     return np.array([groups[corpus] for corpus in corpora], dtype=np.int64)

@@ -33,14 +33,16 @@ export class SearchModel extends LanguageModel {
     return (await this.graphs.text!.run(this.words(text))).vector!.data;
   }
 
-  /** The vectors of motions that are nearest to a sentence or to frames (T, D), best first; where the first is not `like` it, none is. */
+  /** The vectors of motions that are nearest to a sentence or to frames (T, D), best first; where the first is not `like` it, none is, and none is like a sentence with an unknown word. */
   async search(
     query: string | Frames,
     vectors: Float32Array[],
     count = this.setting("count"),
   ): Promise<Hit[]> {
-    const least = typeof query === "string" ? this.index.like_text : this.index.like_motion;
-    const vector = await (typeof query === "string" ? this.embedText(query) : this.embedMotion(query));
+    const isText = typeof query === "string";
+    const isUnknown = isText && this.vocabulary.encode(query).unknown.length > 0;
+    const least = isUnknown ? Infinity : isText ? this.index.like_text : this.index.like_motion;
+    const vector = await (isText ? this.embedText(query) : this.embedMotion(query));
     return this.nearest(vector, vectors, count).map((hit) => ({ ...hit, like: hit.score >= least }));
   }
 

@@ -13,6 +13,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array, Indices, Mask
 from motet.search.model import Hit, Index, IndexSettings, Member, SearchModel
 from motet_train.data.errors import DataError
+from motet_train.evaluate.language.confidence import share
 from motet_train.evaluate.language.describe import retrieved
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, description_groups, unknown_words_allowed
@@ -21,6 +22,9 @@ from motet_train.evaluate.tables import Figures, Report, gathered, read_goals
 SEARCH_GOALS = read_goals("search")
 
 Numbers = NDArray[np.int64]
+
+MOST_HITS = 1000
+"""Hits that a search gives at most."""
 
 
 def search_report(model: SearchModel, corpus: SplitStore, describe: DescribeModel | None = None) -> Report:
@@ -139,45 +143,46 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> Figure
     """How well a score tells that no hit matches the query: sentences search for motions of their own part, motions for
     training motions. Each counts twice, the second time without the motions that have an equal description.
 
-    "_least": the score that 95 % of the right first hits reach in the validation part. In the test part, by the model's
-    settings: the share of right first hits that are accepted ("_kept"), and of wrong ones that are rejected ("_told").
+    "_least": the score that 95 % of the right first hits reach in the validation part. In the test part: the share of
+    right first hits that are like the query ("_kept"), and of wrong ones that are not ("_told").
     """
-    settings = model.settings(IndexSettings)
     figures: Figures = {}
-    for kind, least in (("text", settings.like_text), ("motion", settings.like_motion)):
+    for kind in ("text", "motion"):
         # the limit that validation would choose
         if corpus.parts.validation:
-            scores, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
+            hits, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
+            scores = np.array([hit.score for hit in hits])
             figures[f"{kind}_least"] = float(np.percentile(scores[right], 5)) if right.any() else np.nan
 
-        # how well the bundle's limit does in the test
-        scores, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
-        figures[f"{kind}_kept"] = float((scores[right] >= least).mean()) if right.any() else np.nan
-        figures[f"{kind}_told"] = float((scores[~right] < least).mean()) if not right.all() else np.nan
+        # how well the bundle tells in the test
+        hits, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
+        like = np.array([hit.like for hit in hits], dtype=np.bool_)
+        figures[f"{kind}_kept"] = share(like[right])
+        figures[f"{kind}_told"] = share(~like[~right])
     return figures
 
 
 def _first_hits(
     model: SearchModel, corpus: SplitStore, part: Sequence[int], groups: Numbers, kind: str
-) -> tuple[Array, Mask]:
-    """The scores (Q,) of the first hits of a part's sentences or motions, and whether they are right."""
+) -> tuple[list[Hit], Mask]:
+    """The first hits of a part's sentences or motions, and whether they are right."""
     searched = part if kind == "text" else corpus.parts.train
     index = _index(model, corpus, searched)
     searched_groups = groups[list(searched)]
-    scores = []
+    first_hits = []
     right = []
     for row, query in _queries_of(corpus, part, kind):
         with unknown_words_allowed():
-            hits = index.search(query, len(index.members))
+            hits = index.search(query, min(MOST_HITS, len(index.members)))
         # which hits have an equal description
         matches = searched_groups[_places(hits)] == groups[part[row]]
-        scores.append(hits[0].score)
+        first_hits.append(hits[0])
         right.append(bool(matches[0]))
         # the first hit if no motion had an equal description
         if not matches.all():
-            scores.append(hits[int(matches.argmin())].score)
+            first_hits.append(hits[int(matches.argmin())])
             right.append(False)
-    return np.array(scores), np.array(right, dtype=np.bool_)
+    return first_hits, np.array(right, dtype=np.bool_)
 
 
 def _queries_of(corpus: SplitStore, part: Sequence[int], kind: str) -> list[tuple[int, str | Motion]]:

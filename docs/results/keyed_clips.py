@@ -1,0 +1,76 @@
+"""Clips of the acts by key poses that ship, with a table of sentences, for the training of describe and search:
+`python docs/results/keyed_clips.py FOLDER`."""
+
+import csv
+import sys
+from pathlib import Path
+
+import motet
+import motet.keyed
+from motet.cli.key import WALK_SPEED
+from motet_train.recipes.known import KEYED
+
+SENTENCES = 18
+"""Sentences of an act at most. The last two of more than eight are for measuring."""
+
+BASE_SECONDS = 20
+"""How long somebody stands or walks, over which acts are laid."""
+
+PHRASES = {
+    **{"robot dance": "dance like a robot", "side bend": "bend to the side", "arm circles": "circle both arms"},
+    **{"yoga pose": "hold a yoga pose", "hands on hips": "put the hands on the hips", "airplane": "play airplane"},
+    **{"hands behind the back": "put the hands behind the back", "hand on heart": "put a hand on the heart"},
+    **{"hands behind the head": "put the hands behind the head", "hands in pockets": "put the hands in the pockets"},
+    **{"thumbs up": "give a thumbs up", "victory": "make a sign of victory", "play cello": "sit and play the cello"},
+    **{"play harp": "sit and play the harp", "milk a cow": "sit and milk a cow", "row a boat": "sit and row a boat"},
+    **{"drive a car": "sit and drive a car", "ride a motorcycle": "sit and ride a motorcycle"},
+}
+"""What is done in acts whose names have no verb, or leave out that somebody sits."""
+
+
+def third_person(phrase: str) -> str:
+    """A phrase of what somebody does, such as "sit and wave": "sits and waves"."""
+    verb, *rest = phrase.split(" ", 1)
+    if verb == "be":
+        verb = "is"
+    elif verb.endswith(("s", "sh", "ch", "x", "z", "o")):
+        verb += "es"
+    elif verb.endswith("y") and verb[-2] not in "aeiou":
+        verb = verb[:-1] + "ies"
+    else:
+        verb += "s"
+    return " ".join([verb, *rest])
+
+
+def sentences(name: str, says: tuple[str, ...]) -> list[str]:
+    """Sentences for an act, the plainest first."""
+    phrase = PHRASES.get(name, name)
+    shown = " and ".join(map(third_person, phrase.split(" and ")))
+    plain = [f"a person {shown}", f"someone {shown}", f"the figure {shown}", phrase]
+    return list(dict.fromkeys([*plain, *says]))[:SENTENCES]
+
+
+def main(folder: Path) -> None:
+    """Write the clips, and the table beside them."""
+    folder.mkdir()
+    model = motet.load_as(motet.SteerModel, "control")
+    bases: dict[str, motet.Motion] = {}
+    rows = [("clip", "description", "sentence", "pool", "subject")]
+    for name, act in motet.keyed.ours().items():
+        order = f"walk speed {WALK_SPEED * act.pace:.2f}" if act.over == "walk" else "stop"
+        if order not in bases:
+            bases[order] = model.run(f"{order} {BASE_SECONDS}s")
+        base = bases[order]
+        texts = sentences(name, act.says)
+        kept = len(texts) - 2 if len(texts) > 8 else len(texts)
+        clip = f"KEYED_{name.replace(' ', '-')}"
+        motet.write(folder / f"{clip}.npz", act.motion(base, seed=0, strict=False))
+        for place, text in enumerate(texts):
+            pool = "train" if place < kept else "test"
+            rows.append((clip, PHRASES.get(name, name), text, pool, KEYED))
+    with (folder / "sentences.tsv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, delimiter="\t", lineterminator="\n", quoting=csv.QUOTE_NONE).writerows(rows)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
