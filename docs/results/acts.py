@@ -17,7 +17,7 @@ SOME = (
 )
 """Those of the picture in the README."""
 
-COLUMNS, PER_SHEET, POSES = 3, 48, 5
+COLUMNS, PER_SHEET, POSES = 3, 51, 5
 
 
 def sheet(names: list[str], bases: dict[str, motet.Motion]) -> Figure:

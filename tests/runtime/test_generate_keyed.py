@@ -1,5 +1,6 @@
 """Sentences of acts that nobody recorded: laid by their key poses over a figure that stands."""
 
+import tomllib
 import warnings
 
 import numpy as np
@@ -10,7 +11,10 @@ import motet.keyed
 from motet.errors import TextWarning, collected
 from motet.figures.humanoid import HUMANOID
 from motet.generate.keyed_acts import act_named, act_within, without_subject
+from motet.keyed.shipped import LIBRARY, TEXTS
 from motet.motion.kinematics import global_transforms
+
+OTHER_TEXTS = tomllib.loads((LIBRARY / "says.toml").read_text(encoding="utf-8"))[TEXTS]
 
 
 @pytest.fixture(scope="module")
@@ -205,3 +209,47 @@ def test_a_hurried_act_is_done_to_its_end(model: motet.CodesModel) -> None:
 
 def test_no_act_lasts_longer_than_it_may(model: motet.CodesModel) -> None:
     assert len(model.generate("salute", max_seconds=1.0)[0].frames) == 30
+
+
+@pytest.mark.parametrize(
+    ("sentence", "parts"),
+    [
+        ("nod and then shake your head", ["nod", "shake your head"]),
+        ("turn left, walk two metres, turn left again", ["turn left", "walk two metres", "turn left again"]),
+        ("draw a bow and release the arrow", ["draw a bow and release the arrow"]),
+        ("salute twice", ["salute", "salute"]),  # its keys cannot be repeated
+        ("He punches left and right. Then he bows.", ["punch left", "punch right", "he bows"]),
+    ],
+)
+def test_what_is_done_again_or_otherwise_is_a_part(model: motet.CodesModel, sentence: str, parts: list[str]) -> None:
+    assert model.parts(sentence) == parts
+
+
+def test_sentences_mean_other_texts(model: motet.CodesModel) -> None:
+    assert model.generate("He rises from his seat.")[0].action == "a person stands up"
+    assert model.generate("do squats")[0].requested == {"times": 4}
+    # none leaves anything out, or means a third text
+    for text in OTHER_TEXTS:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for part in model.parts(text):
+                assert not model.likeliest(part).lacking, text
+
+
+def test_a_side_that_a_text_does_not_have_is_left_out(model: motet.CodesModel) -> None:
+    assert model.parts("combat roll") == ["a person dives into a forward roll and stands up"]
+    assert model.likeliest("combat roll to the right").lacking
+
+
+def test_who_kneels_does_an_act_of_the_hands_kneeling(model: motet.CodesModel) -> None:
+    story = model.story("kneel, pray, then stand up")
+    _, pray, _ = story.passages
+    hips = global_transforms(story.motion)[1][round(30 * pray.start) : round(30 * pray.stop), 0, 1]
+    assert hips.max() < 0.75
+
+
+def test_a_participle_is_done_at_the_same_time(model: motet.CodesModel) -> None:
+    (walk,) = model.generate("a woman walks backwards clapping her hands")
+    assert walk.action == "clap"
+    places = global_transforms(walk.motion)[1][:, 0]
+    assert places[-1, 2] - places[0, 2] < -1.5

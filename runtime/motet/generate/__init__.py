@@ -8,5 +8,5 @@ motion_measures.py). A motion that no sentence describes is continued by continu
 
 Main names: CodesModel (model.py), GenerateModel and Generated (base.py), Writer (codes.py), Memory (memory.py).
 Numbers: CodesSettings (codes.py), MemorySettings (memory.py), ContinuationSettings (continue_codes.py),
-FamiliaritySettings (model.py), and the constants at the head of motion_measures.py.
+FamiliaritySettings (base.py), and the constants at the head of motion_measures.py.
 """

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypedDict, Unpack, cast, overload
+from typing import Annotated, Any, ClassVar, TypedDict, Unpack, cast, overload
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
-from motet.settings import Progress, Seed, seeds_of, silent
+from motet.settings import Progress, Range, Seed, Settings, seeds_of, silent
 from motet.text.numeric_phrases import Quantities
 
 SETTLED = 0.3
@@ -57,6 +57,19 @@ class _Options(GenerateSettings, total=False):
     seed: Seed
     strict: bool
     progress: Progress
+
+
+@dataclass(frozen=True)
+class FamiliaritySettings(Settings):
+    """When a sentence counts as known (docs/generate.md)."""
+
+    FEATURE: ClassVar[str] = "familiarity"
+
+    confident: Annotated[float, Range(0, 1)] = 0.5
+    """Least confidence of a known sentence."""
+
+    doubt: Annotated[float, Range(0, 10)] = 0.25
+    """Exponent of the probability of the likeliest action, which is often low because sentences share actions."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

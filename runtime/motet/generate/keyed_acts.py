@@ -28,14 +28,16 @@ BASE_SENTENCES = {"stand": STANDS, "walk": "a person walks forward"}
 WALKED_SECONDS = 4.0
 """How long an act that is laid over anything but a figure that stands lasts at least."""
 
-TOGETHER = re.compile(r"\b(?:while|whilst|as (?:he|she|they|it)|with)\b")
-"""Words between an act and what the figure does below it."""
+TOGETHER = re.compile(
+    r"\b(?:while|whilst|as (?:he|she|they|it)|with)\b|(?<!\bis)(?<!\bthe)(?<!\ba),? (?=[a-z]+(?<!th)ing\b)"
+)
+"""Words between an act and what the figure does below it; a participle needs none: "walks backwards, waving"."""
 
 FILLER_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
 """Stems of verbs that name no act."""
 
 # fmt: off
-FILLER_WORDS = FUNCTION_WORDS | {
+FILLER_WORDS = (FUNCTION_WORDS - {"up"}) | {
     "across", "human", "humans", "like", "persons", "please", "quite", "really", "some", "subject", "subjects",
     "through", "very",
 }
@@ -58,20 +60,25 @@ BOTH_SIDES = frozenset(("left", "right"))
 
 @dataclass(frozen=True)
 class NamedAct:
-    """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act. is_counted:
-    whether the sentence says how often. lacking: the words of the sentence that the act leaves out. below: the text of
+    """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act. times: how often
+    the sentence says, 0 if it does not. lacking: the words of the sentence that the act leaves out. below: the text of
     what the act is laid over, "" for what the act says itself."""
 
     act: KeyedAct
     sentence: str
-    is_counted: bool = False
+    times: int = 0
     lacking: tuple[str, ...] = ()
     below: str = ""
 
     @property
     def base(self) -> str:
         """The text of what the act is laid over."""
-        return self.below or BASE_SENTENCES[self.act.over]
+        return self.below or BASE_SENTENCES.get(self.act.over, self.act.over)
+
+    @property
+    def is_other_text(self) -> bool:
+        """Whether it is no act by key poses, but a text that is shown instead."""
+        return not self.act.keys
 
     @property
     def goes(self) -> bool:
@@ -79,10 +86,10 @@ class NamedAct:
         return self.base != STANDS
 
     @property
-    def is_of_upper_body(self) -> bool:
-        """Whether hips and feet stay, so that the act can be laid over anything."""
+    def leaves_legs(self) -> bool:
+        """Whether hips and feet are as below, so that the act can be laid over anything."""
         lower = {"hips", "left_foot", "right_foot"}
-        return all(key.numbers.keys().isdisjoint(lower) for key in self.act.keys)
+        return not self.goes and all(key.numbers.keys().isdisjoint(lower) for key in self.act.keys)
 
     @property
     def confidence(self) -> float:
@@ -106,7 +113,7 @@ class NamedAct:
         it lasts longer. seconds: 0 for its usual length."""
         seconds = seconds or max(self.act.seconds(seed), WALKED_SECONDS if self.goes else 0.0)
         shortfall = seconds - self.act.seconds(seed)
-        if shortfall > 0 and self.act.repeat and not self.is_counted:
+        if shortfall > 0 and self.act.repeat and not self.times:
             times = self.act.repeat.times[0] + math.ceil(shortfall / self.act.repeat.every[0])
             return replace(self, act=replace(self.act, repeat=replace(self.act.repeat, times=(times, times))))
         faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / ACT_FPS, 1 / ACT_FPS), 1, MOST_HURRIED)
@@ -162,7 +169,7 @@ def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | N
         return None
     lacking = {}
     for name in {order.name for order in orders}:
-        of_act = _stems_of_act(name) | BOTH_SIDES
+        of_act = _stems_of_act(name) | (BOTH_SIDES if shipped(name).mirrored else set())
         lacking[name] = tuple(word for word in words if stems_of([word]) - of_act)
     best = max(orders, key=lambda order: (-len(lacking[order.name]), *order.fit(words)))
     return replace(_adapted(best, stems, times), lacking=lacking[best.name])
@@ -186,9 +193,10 @@ def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedA
     sides = stems & BOTH_SIDES - order.stems
     if act.mirrored and len(sides) == 1:
         act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
-    if times is not None and act.repeat is not None:
-        act = replace(act, repeat=replace(act.repeat, times=(int(times),) * 2))
-    return NamedAct(act, order.sentence, times is not None)
+    count = int(times or 0)
+    if count and act.repeat:
+        act = replace(act, repeat=replace(act.repeat, times=(count, count)))
+    return NamedAct(act, order.sentence, count)
 
 
 def counted(sentence: str) -> tuple[str, float | None]:

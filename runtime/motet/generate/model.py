@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Annotated, Any, ClassVar, Literal, Self, Unpack, cast, get_args
+from typing import Any, Literal, Self, Unpack, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from motet.errors import (
     warn,
 )
 from motet.figures.humanoid import HUMANOID
-from motet.generate.base import Generated, GenerateModel, LoopSettings, LoopValues
+from motet.generate.base import FamiliaritySettings, Generated, GenerateModel, LoopSettings, LoopValues
 from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
@@ -47,7 +47,7 @@ from motet.models.language import texts_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
-from motet.settings import Range, Seed, Settings
+from motet.settings import Seed
 from motet.text.clauses import (
     FUNCTION_WORDS,
     OWN,
@@ -103,19 +103,6 @@ class Story(Generated):
     """One motion for several sentences, and when each is shown."""
 
     passages: tuple[Passage, ...] = ()
-
-
-@dataclass(frozen=True)
-class FamiliaritySettings(Settings):
-    """When a sentence counts as known (docs/generate.md)."""
-
-    FEATURE: ClassVar[str] = "familiarity"
-
-    confident: Annotated[float, Range(0, 1)] = 0.5
-    """Least confidence of a known sentence."""
-
-    doubt: Annotated[float, Range(0, 10)] = 0.25
-    """Exponent of the probability of the likeliest action, which is often low because sentences share actions."""
 
 
 @dataclass(frozen=True)
@@ -272,40 +259,39 @@ class CodesModel(GenerateModel):
 
     def _keyed(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
-        sentence is a command or a recorded action has all its words, those of the act in its own sentence.
-
-        A sentence may say more than the act, where the likeliest recorded action leaves out more of it.
-        """
-        if self.contract.skeleton != HUMANOID:
+        sentence is a command or a recorded action has all its words, those of the act in its own sentence, and shows no
+        more. A sentence may say more than the act, where the likeliest recorded action leaves out more of it."""
+        if self.contract.skeleton != HUMANOID or sentence in self._sentences:
             return None
         words = self.vocabulary.rules.words(sentence)
-        act = act_named(words) or self._keyed_counted(sentence)
+        act = self._keyed_counted(sentence) or act_named(words)
         if act is None:
             words = without_subject(words)
             sentence = " ".join(words)
             act = act_named(words)
         if act is None:
             return self._keyed_over(sentence) or self._keyed_within(sentence)
-        if act.is_small:
+        if act.is_small or act.times or act.is_other_text:
             return act
         if self._commands.act(sentence) is not None and not self._commands.is_instead(sentence):
             return None
         if self._leaves_out(sentence):
             return act
-        recorded = self.vocabulary.rules.words(self._sentences[int(self._context(sentence).argmax())])
-        return None if stems_of(act.sentence.split()) <= stems_of(recorded) else act
+        recorded = stems_of(self.vocabulary.rules.words(self._shown_as(sentence).action))
+        shows_more = not recorded & self._verbs <= stems_of(words)
+        return act if shows_more or not stems_of(act.sentence.split()) <= recorded else None
 
     def _keyed_over(self, sentence: str) -> NamedAct | None:
         """The act of the upper body that a sentence names beside what is done at the same time, "waves while walking",
         unless the likeliest recorded action or command shows both."""
-        clauses = [clause.strip() for clause in TOGETHER.split(sentence)]
-        if len(clauses) != 2 or not all(clauses) or not self._leaves_out(sentence):
+        clauses = list(filter(None, map(str.strip, TOGETHER.split(sentence))))
+        if len(clauses) != 2 or not self._leaves_out(sentence):
             return None
         for act_clause, below in (clauses, clauses[::-1]):
             words = without_subject(act_clause.split())
             act = act_named(words) or act_within(words)
             has_verb = any(stem(word) in self._verbs for word in below.split())
-            if act and act.is_of_upper_body and not act.goes and has_verb and not self._leaves_out(below):
+            if act and act.leaves_legs and has_verb and not self._leaves_out(below):
                 return replace(act, below=below)
         return None
 
@@ -316,16 +302,20 @@ class CodesModel(GenerateModel):
 
     def _keyed_within(self, sentence: str) -> NamedAct | None:
         """The act whose order a sentence without its subject holds beside other words, unless the likeliest recorded
-        action or command leaves out no more of it, which counts a word more where it lacks a word of the order."""
+        action or command leaves out no more of it. For this a word more counts where that is not confident, and another
+        one where it lacks a word of the order."""
         text, times = counted(sentence)
         words = self.vocabulary.rules.words(text)
         act = act_within(words, times) if words else None
-        if act is None:
+        if act is None or act.is_other_text:
             return None
-        lacking = self.lacking(text) if any(map(self.vocabulary.meant, words)) else []
+        if not any(map(self.vocabulary.meant, words)):
+            return act
+        lacking = self.lacking(text)
         missing = stems_of(word for word in words if self.vocabulary.meant(word) in ("", *lacking))
-        lacks_order = not missing.isdisjoint(stems_of(act.sentence.split()))
-        return act if len(act.lacking) < len(missing) + lacks_order else None
+        limit = len(missing) + (not self._understood(text, self._context(text)).confident)
+        limit += not missing.isdisjoint(stems_of(act.sentence.split()))
+        return act if len(act.lacking) < limit else None
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
@@ -343,17 +333,25 @@ class CodesModel(GenerateModel):
         """The things that a text requests one after another: its sentences, and the parts of a sentence
         (:func:`motet.text.clauses.parts_of`) whose likeliest action leaves something out; errors like :meth:`ids`."""
         act = self._keyed(sentence)
-        if act and not act.lacking:
-            return [sentence]
-        self.vocabulary.encode(sentence)
-        shown_in_turn = []
+        if act and act.is_other_text:
+            return max(1, act.times) * self._pieces(act.base)
+        if act is None:
+            self.vocabulary.encode(sentence)
+        pieces = self._pieces(sentence)
+        if len(pieces) > 1:
+            return list(chain.from_iterable(map(self.parts, pieces)))
+        if act and act.times and not (act.act.repeat or act.lacking):
+            return act.times * [counted(sentence)[0]]
+        return [sentence]
+
+    def _pieces(self, sentence: str) -> list[str]:
+        """The sentences of a text, each cut into its parts where they are not shown at once."""
+        pieces = []
         for whole in sentences_of(sentence):
             parts = self._parts_of(whole)
-            if len(parts) > 1 and not self._shown_at_once(whole, parts):
-                shown_in_turn += parts
-            else:
-                shown_in_turn.append(whole)
-        return shown_in_turn if len(shown_in_turn) > 1 else [sentence]
+            at_once = len(parts) > 1 and self._shown_at_once(whole, parts)
+            pieces += [whole] if at_once else parts
+        return pieces
 
     def _parts_of(self, sentence: str) -> list[str]:
         """The parts of a sentence before verbs of recorded actions and commands, or, if one of them is then an act by
@@ -362,8 +360,15 @@ class CodesModel(GenerateModel):
         return with_keyed if any(map(self._keyed, with_keyed)) else parts_of(sentence, self._verbs)
 
     def _shown_at_once(self, sentence: str, parts: Sequence[str]) -> bool:
-        """Whether the likeliest action of a sentence shows all its parts, and no part has numbers of its own."""
-        if self.likeliest(sentence).lacking:
+        """Whether the likeliest action of a sentence shows all its parts, none of which has numbers of its own or
+        is done again; or an act by key poses shows all, and no two parts name different ones."""
+        if self.likeliest(sentence).lacking or not self.understood(sentence).confident:
+            return False
+        if self._keyed(sentence):
+            acts = filter(None, map(self._keyed, parts))
+            return len({act.act.name for act in acts}) < 2
+        verbs = [stem(SUBJECT.sub("", part).split()[0].lower()) for part in parts]
+        if len(set(verbs)) < len(verbs):
             return False
         quantities = self.quantities(sentence)
         for part in parts:
@@ -383,9 +388,9 @@ class CodesModel(GenerateModel):
             return Quantities(sentence)
         if act := self._keyed(sentence):
             return Quantities(act.base)
-        if self._commands.act(sentence) is not None:
-            return Quantities(sentence)
         quantities = self._on_the_spot(quantities_of(sentence))
+        if self._commands.act(sentence) is not None and "times" not in quantities.amounts:
+            return Quantities(sentence)
         if self._commands.act(quantities.text) is not None:
             return quantities
         if quantities.amounts and quantities.text != sentence:
@@ -449,7 +454,7 @@ class CodesModel(GenerateModel):
         """A request to show a text. seconds: 0 where the text says them, or it ends by itself. paced: whether it is
         played faster or slower to last as long."""
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
-        if (act := self._keyed(text)) and quantities.text == act.base:
+        if (act := self._keyed(text)) and quantities.text == act.base and not act.is_other_text:
             return replace(request, keyed=act)
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
@@ -761,6 +766,9 @@ class CodesModel(GenerateModel):
         timed = []
         for sentence, length in zip(sentences, lengths, strict=True):
             parts = [sentence] if whole else self.parts(sentence)
+            for part in parts[1:]:
+                if re.match(r"\w+ing\b", part) and f", {part}" in sentence:
+                    warn(f"{part!r} is shown after the rest, not at the same time (in {sentence!r})", TextWarning)
             timed += [(part, length / len(parts)) for part in parts]
         return timed
 

@@ -24,6 +24,9 @@ LONGEST_REQUEST = 300.0
 STRETCH_SECONDS = 20.0
 """Seconds, at most, of the stretches in which a request is drawn whose length comes first."""
 
+LOW_HIPS = 0.7
+"""Metres of the hips of a figure that sits, kneels or lies, whose standing hips are about 0.95 m high."""
+
 LEAST_PROGRESS: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
 """Least progress per second, after ten seconds of grace: a motion that is slower is not continued."""
 
@@ -250,13 +253,23 @@ class Teller:
         act = act.lasting(request.seconds, seed)
         # as many steps as the act has, or more; what lasts longer than it may is begun, and cut off
         seconds = act.act.seconds(seed)
-        limit = seconds if act.is_counted else min(seconds, self.settings["max_seconds"])
+        limit = seconds if act.times else min(seconds, self.settings["max_seconds"])
         last = max(1, round((request.seconds or limit) * self.contract.fps))
         steps = self.codec.steps(max(seconds, request.seconds) * act.act.pace) + 1
         action = self._action(request)
-        frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
+        frames = self._below(act, action, steps, context)
         shown = act.laid_over(frames, self.contract, seed)[:last]
         yield Piece(number, int(action[0]), shown, len(shown))
+
+    def _below(self, act: NamedAct, action: Ids, steps: int, context: Context | None) -> Array:
+        """What an act is laid over: as many steps of an action, or the last frame of who sits, kneels or lies."""
+        frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
+        height = self.contract.channels.index("root.height")
+        if context is None or not act.leaves_legs or context.frames[-1, height] >= LOW_HIPS:
+            return frames
+        held = np.repeat(context.frames[-1:], len(frames), axis=0)
+        held[:, :height] = 0
+        return held
 
     def _drawn(self, action: Ids, steps: int, context: Context | None) -> Ids:
         """As many steps of an action (N, P)."""

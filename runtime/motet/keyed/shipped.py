@@ -1,5 +1,6 @@
 """The acts that ship, in the folder library: says.toml has what each is called, in a table for each of the other files,
-which have the key poses. A sentence is looked up in the first, and only the file of its act is read."""
+which have the key poses. A sentence is looked up in the first, and only the file of its act is read. One more table of
+says.toml, "texts", has sentences that mean another text, of what is recorded."""
 
 import tomllib
 from collections.abc import Mapping
@@ -12,6 +13,9 @@ from motet.keyed.file import read
 
 LIBRARY = files("motet.keyed") / "library"
 
+TEXTS = "texts"
+"""The table of other texts."""
+
 
 @cache
 def _says_by_file() -> Mapping[str, Mapping[str, list[str]]]:
@@ -21,7 +25,7 @@ def _says_by_file() -> Mapping[str, Mapping[str, list[str]]]:
 
 @cache
 def says() -> Mapping[str, tuple[str, ...]]:
-    """The name of each act -> its sentences."""
+    """The name of each act, and each other text -> its sentences."""
     sentences: dict[str, tuple[str, ...]] = {}
     for acts in _says_by_file().values():
         sentences |= {name: tuple(of_act) for name, of_act in acts.items()}
@@ -36,7 +40,9 @@ def _acts_of(file: str) -> Mapping[str, KeyedAct]:
 
 
 def shipped(name: str) -> KeyedAct:
-    """An act by its name; KeyError for one that does not ship."""
+    """An act by its name, or another text as an act without keys; KeyError for one that does not ship."""
+    if name in _says_by_file()[TEXTS]:
+        return KeyedAct(name, (name,), (), over=name)
     for file, acts in _says_by_file().items():
         if name in acts:
             return _acts_of(file)[name]
@@ -47,5 +53,6 @@ def ours() -> Mapping[str, KeyedAct]:
     """All acts by name."""
     acts: dict[str, KeyedAct] = {}
     for file in _says_by_file():
-        acts |= _acts_of(file)
+        if file != TEXTS:
+            acts |= _acts_of(file)
     return acts

@@ -92,10 +92,12 @@ ENDINGS = (
 @lru_cache(1 << 14)
 def stem(word: str) -> str:
     """The part that the forms of a lower-case word share: "danc" of dance, dances and dancing."""
-    if len(word) <= 3:
+    if len(word) <= 3 and not word.endswith(("e", "y")):
         return word
     for ending, rest in ENDINGS:
-        word = ending.sub(rest, word)
+        shorter = ending.sub(rest, word)
+        # the ing of "sing" is no ending
+        word = shorter if re.search("[aeiouy]", shorter) else word
     return word
 
 
@@ -145,7 +147,7 @@ def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:
     start = 0
     for match in ALSO.finditer(text):
         done = re.findall(r"\w+", text[start : match.start()].lower())
-        opened = re.match(r"\w+", SUBJECT.sub("", text[match.end() :], count=1).lower())
+        opened = re.match(r"(?!back (?!up|away|off))\w+", SUBJECT.sub("", text[match.end() :], count=1).lower())
         if opened and stem(opened[0]) in verbs and any(stem(word) in verbs for word in done):
             yield text[start : match.start()]
             start = match.end()

@@ -56,6 +56,7 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (r"\bthrice\b", "3 times"),
     (r"(?<!at )\bonce\b(?! more| again)", "1 time"),
     (r"\b(?:a )?single\b", "1"),
+    (r"\b(do|does|doing|performs?) (?=(?:squat|lunge|cartwheel|burpee|sit-?up|pull-?up)s\b)", r"\1 4 "),
     (r"\b(\d+)[ -]and[ -]a[ -]half\b", r"\1.5"),
     (rf"\b(?:an?|1) ({MEASURES}) and a half\b", r"1.5 \1"),
     (r"\b3[ -]quarters?(?: of)?(?: an?)?\b", "0.75"),

@@ -9,8 +9,9 @@ def corrected(word: str, *known: Iterable[str]) -> str:
     """The known word of which another one is a misspelling; "" where that is not clear.
 
     It is the nearest that starts with the same letter and has four letters or more: one letter off, or two if the word
-    has eight letters or more. If several are as near, those of the first of ``known`` count; they have to be forms of
-    one word, and the first of them is returned.
+    has eight letters or more. A shorter word with another letter is no slip but one of English ("coin" is no "chin"),
+    as is one of less than six letters with a letter more, unless that is there twice. If several are as near, those of
+    the first of ``known`` count; they have to be forms of one word, and the first of them is returned.
     """
     most = 2 if len(word) >= 8 else 1
     for off in range(1, most + 1):
@@ -26,7 +27,10 @@ def _alike(word: str, words: Iterable[str], most: int) -> Iterator[str]:
     letters = set(word)
     for other in words:
         near = other[0] == word[0] and len(other) >= 4 and abs(len(other) - len(word)) <= most
-        if near and len(letters.symmetric_difference(other)) <= 2 * most:
+        longer = len(word) - len(other)
+        changed = not longer and len(word) < 8 and sorted(word) != sorted(other)
+        added = longer > 0 and len(word) < 6 and letters != set(other)
+        if near and not changed and not added and len(letters.symmetric_difference(other)) <= 2 * most:
             yield other
 
 

@@ -10,14 +10,22 @@ export const SUBJECT =
 /** Words that say little about what is done. */
 export const FUNCTION_WORDS: ReadonlySet<string> = new Set(CLAUSES.FUNCTION_WORDS);
 
+const ENDINGS: [RegExp, string][] = [
+  [/ies$/u, "y"],
+  [/(?:ing|ed|es|s|e)$/u, ""],
+  [/y$/u, "i"],
+  [/([^aeiou])\1$/u, "$1"],
+];
+
 /** What the forms of a lower-case word share: "danc" of dance, dances and dancing. */
 export function stem(word: string): string {
-  if (word.length <= 3) return word;
-  return word
-    .replace(/ies$/u, "y")
-    .replace(/(?:ing|ed|es|s|e)$/u, "")
-    .replace(/y$/u, "i")
-    .replace(/([^aeiou])\1$/u, "$1");
+  if (word.length <= 3 && !/[ey]$/u.test(word)) return word;
+  for (const [ending, rest] of ENDINGS) {
+    const shorter = word.replace(ending, rest);
+    // the ing of "sing" is no ending
+    if (/[aeiouy]/u.test(shorter)) word = shorter;
+  }
+  return word;
 }
 
 /** The stems of those of some words that have a form in -ing among them. */
@@ -52,7 +60,7 @@ function beforeVerbs(text: string, verbs: Set<string>): string[] {
         .slice(start, index)
         .toLowerCase()
         .match(/[\p{L}\p{N}_]+/gu) ?? [];
-    const opened = /^[\p{L}\p{N}_]+/u.exec(
+    const opened = /^(?!back (?!up|away|off))[\p{L}\p{N}_]+/u.exec(
       text
         .slice(index + separator.length)
         .replace(SUBJECT, "")

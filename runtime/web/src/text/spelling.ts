@@ -12,12 +12,22 @@ export function corrected(word: string, ...known: string[][]): string {
           candidate[0] === word[0] &&
           candidate.length >= 4 &&
           Math.abs(candidate.length - size) <= most &&
+          isSlip(word, candidate) &&
           distance(word, candidate) === off,
       );
       if (near.length) return new Set(near.map(stem)).size === 1 ? near[0]! : "";
     }
   }
   return "";
+}
+
+/** Whether two words differ as in a slip: a short word with another letter, or a letter more, is one of English. */
+function isSlip(word: string, other: string): boolean {
+  const letters = (text: string) => [...text].sort().join("");
+  const kinds = (text: string) => [...new Set(text)].sort().join("");
+  const size = [...word].length;
+  if (size === other.length && size < 8) return letters(word) === letters(other);
+  return !(other.length < size && size < 6) || kinds(word) === kinds(other);
 }
 
 /** How many letters are added, left out, changed, or swapped with the next one between two words. */
