@@ -23,6 +23,7 @@ PHRASES = {
     **{"hands behind the head": "put the hands behind the head", "hands in pockets": "put the hands in the pockets"},
     **{"thumbs up": "give a thumbs up", "victory": "make a sign of victory", "play cello": "sit and play the cello"},
     **{"play harp": "sit and play the harp", "milk a cow": "sit and milk a cow", "row a boat": "sit and row a boat"},
+    **{"fan yourself": "fan the face", "carry on the head": "carry something on the head"},
     **{"drive a car": "sit and drive a car", "ride a motorcycle": "sit and ride a motorcycle"},
 }
 """What is done in acts whose names have no verb, or leave out that somebody sits."""
@@ -55,7 +56,7 @@ def main(folder: Path) -> None:
     folder.mkdir()
     model = motet.load_as(motet.SteerModel, "control")
     bases: dict[str, motet.Motion] = {}
-    rows = [("clip", "description", "sentence", "pool", "subject")]
+    rows = [("clip", "description", "sentence", "pool")]
     for name, act in motet.keyed.ours().items():
         order = f"walk speed {WALK_SPEED * act.pace:.2f}" if act.over == "walk" else "stop"
         if order not in bases:
@@ -63,11 +64,11 @@ def main(folder: Path) -> None:
         base = bases[order]
         texts = sentences(name, act.says)
         kept = len(texts) - 2 if len(texts) > 8 else len(texts)
-        clip = f"KEYED_{name.replace(' ', '-')}"
+        clip = f"{KEYED}_{name.replace(' ', '-')}"
         motet.write(folder / f"{clip}.npz", act.motion(base, seed=0, strict=False))
         for place, text in enumerate(texts):
             pool = "train" if place < kept else "test"
-            rows.append((clip, PHRASES.get(name, name), text, pool, KEYED))
+            rows.append((clip, PHRASES.get(name, name), text, pool))
     with (folder / "sentences.tsv").open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, delimiter="\t", lineterminator="\n", quoting=csv.QUOTE_NONE).writerows(rows)
 

@@ -61,8 +61,8 @@ RECIPES = {"default": DEFAULT}
 TRIED = "tried.npz"
 """File of a run: the answers about held-out people from which their probability was learned."""
 
-KEYED = "keyed"
-"""The subject of clips that nobody performed: acts by key poses."""
+KEYED = "KEYED"
+"""Who shows the clips that nobody performed, acts by key poses: the beginning of their names, up to "_"."""
 
 TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
 """Beginnings of words for a path that is not straight."""
