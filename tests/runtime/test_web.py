@@ -200,7 +200,7 @@ def parted(model: CodesModel) -> dict[str, list[str]]:
         "a person is walking, then stops",
         "she carries a box and punches, kicks and dances next to the wall",
         "a tall, thin man walks 1.5 metres with the left and the right hand raised",
-        "rock and roll",
+        "hop and skip",
         "stand up and walk",
     ]
     return {text: model.parts(text) for text in texts}

@@ -139,12 +139,15 @@ export class GenerateModel extends LanguageModel {
   /** What a text asks for one after another: docs/reference/bundle.md, "Several things in one text". */
   async parts(text: string): Promise<string[]> {
     this.words(text);
-    const lacking: string[] = [];
+    const pieces: string[] = [];
     for (const sentence of sentencesOf(text)) {
       const parts = partsOf(sentence, this.verbs);
-      lacking.push(...(parts.length > 1 && (await this.splits(sentence, parts)) ? parts : [sentence]));
+      const atOnce = parts.length > 1 && !(await this.splits(sentence, parts));
+      pieces.push(...(atOnce ? [sentence] : parts));
     }
-    return lacking.length > 1 ? lacking : [text];
+    if (pieces.length < 2) return [text];
+    const parts = await Promise.all(pieces.map((piece) => this.parts(piece)));
+    return parts.flat();
   }
 
   /** Whether parts are shown one by one: the likeliest action lacks some, or all are commands and not one together. */
