@@ -39,6 +39,7 @@ MODULES = (
     "motet.formats.gltf",
     "motet.formats.gltf_data",
     "motet.formats.text",
+    "motet.generate.base",
     "motet.generate.codec",
     "motet.generate.codes",
     "motet.generate.continue_codes",

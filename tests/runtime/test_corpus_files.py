@@ -113,7 +113,7 @@ def test_a_verb_is_a_function_of_sources_in_a_library_too(folder: Path) -> None:
     answers = list(in_batches(Embed({}), sources, 2, 64))
     assert [answer.source for answer in answers] == sources
     assert [bool(answer.error) for answer in answers] == [source.name in ("3", "short") for source in sources]
-    described = Describe({}, settings={"beams": 2})(sources[:1])
+    described = Describe({}, settings={"beams": 2, "decoding": "beam"})(sources[:1])
     assert len(described[0].rows[0]["hypotheses"]) == 2
 
 

@@ -296,7 +296,7 @@ def test_what_no_recording_shows_is_said_to_be_outside() -> None:
     for sentence in OUTSIDE:
         if not any(model.likeliest(part).action in keyed for part in model.parts(sentence)):
             others.append(sentence)
-    assert len(others) == 20
+    assert len(others) == 19
     assert said_to_be_outside(model, others) >= 0.8
     silent = set()
     for sentence in others:
@@ -305,6 +305,6 @@ def test_what_no_recording_shows_is_said_to_be_outside() -> None:
             model.generate(sentence, max_seconds=0.2)
         silent |= set() if told else {sentence}
     # what hand-keyed clips show
-    assert silent == {"someone drives a car", "a man does push ups", "a woman does yoga in the lotus position"}
+    assert silent == {"a man does push ups", "a woman does yoga in the lotus position"}
     assert said_to_be_outside(model, ["a person walks forward", "a man is running", "someone kicks"]) == 0
     assert said_to_be_outside(model, ["xyzzy", ""]) == 1

@@ -119,6 +119,12 @@ export const TEXT = {
   FRAME_RATES: [0.001, 100000],
 } as const;
 
+// motet.generate.base.FamiliaritySettings
+export const familiaritySettings = {
+  confident: { default: 0.5, low: 0, high: 1, whole: false },
+  doubt: { default: 0.25, low: 0, high: 10, whole: false },
+} as const;
+
 // motet.generate.codec
 export const CODEC = {
   PATH_CHANNELS: 3,
@@ -199,12 +205,6 @@ export const GENERATE = {
   NEVER: -1000000000,
   STANDING_SECONDS: 0.8,
   STANDS: "a person stands still",
-} as const;
-
-// motet.generate.model.FamiliaritySettings
-export const familiaritySettings = {
-  confident: { default: 0.5, low: 0, high: 1, whole: false },
-  doubt: { default: 0.25, low: 0, high: 10, whole: false },
 } as const;
 
 // motet.models.control
