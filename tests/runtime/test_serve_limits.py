@@ -47,13 +47,13 @@ class Process:
     """A server of a process of its own."""
 
     def __init__(self) -> None:
-        command = [sys.executable, "-m", "motet", "serve", "--port", "0", "--timeout", "30"]
+        command = [sys.executable, "-m", "motet", "serve", "--port", "0", "--timeout", "300"]
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         assert self.process.stderr is not None
         self.port = int(self.process.stderr.readline().split(";")[0].rpartition(":")[2])
 
     def get(self, address: str) -> tuple[int, bytes]:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=300)
         connection.request("GET", address)
         answer = connection.getresponse()
         return answer.status, answer.read()
@@ -68,7 +68,7 @@ def server() -> Iterator[Process]:
     found = Process()
     yield found
     found.process.terminate()
-    out = found.process.communicate(timeout=30)[1]
+    out = found.process.communicate(timeout=300)[1]
     assert (found.process.returncode, out.splitlines()[-1]) == (0, "stopped")
     assert "Traceback" not in out
 
@@ -349,14 +349,14 @@ def test_two_servers_on_a_port(server: Process) -> None:
 
 def test_a_request_that_runs_is_answered_before_the_end() -> None:
     server = Process()
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=300)
     connection.request("GET", "/stream?text=a+person+walks&seconds=20")
     answer = connection.getresponse()
     lines = [answer.readline()]
     server.process.send_signal(signal.SIGINT)
     lines += answer.readlines()
     assert sum(len(json.loads(line)["rotations"]) for line in lines[1:]) == 20 * 30
-    assert server.process.wait(30) == 0
+    assert server.process.wait(300) == 0
 
 
 @pytest.mark.parametrize("begun", [False, True])
