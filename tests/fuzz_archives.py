@@ -2,7 +2,7 @@
 
 A zip reads nothing of its host, and what is merged is whole.
 
-    python tests/fuzz_archives.py --count 5000 [--seed N] [--first N] [--seconds 5] [--megabytes 500]
+    python tests/fuzz_archives.py --count 5000 [--seed N] [--first N] [--seconds 2] [--megabytes 500]
 
 Of zips, bytes, names, fields of the tables and the motions in them are altered. Each is listed, unpacked, read, and
 opened as a corpus for training. Of parts, bytes, lines and values are altered. They are counted and merged, and gone on

@@ -1,6 +1,6 @@
 """Mutated bundles: whatever is altered, only motet's own errors come out, soon and in little memory.
 
-    python tests/fuzz_bundles.py --count 5000 [--seed N] [--first N] [--seconds 5] [--megabytes 500]
+    python tests/fuzz_bundles.py --count 5000 [--seed N] [--first N] [--seconds 2] [--megabytes 500]
 
 The bundles that come with motet are altered in six ways: bytes of the zip, values and keys of the manifest, bytes of a
 graph, its weights moved out of it, what one of its outputs says, and bytes of golden vectors; in all but the first the

@@ -1,6 +1,6 @@
 """Mutated motion files: whatever is altered, only motet's own errors come out, soon and in little memory.
 
-    python tests/fuzz_motions.py --count 5000 [--seed N] [--first N] [--seconds 5] [--megabytes 500]
+    python tests/fuzz_motions.py --count 5000 [--seed N] [--first N] [--seconds 2] [--megabytes 500]
     python tests/fuzz_motions.py --folder ../shared/data/figures
 
 Small files of every format that motet reads, or those of a folder, are altered: bytes and numbers of all, words of

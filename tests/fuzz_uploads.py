@@ -1,6 +1,6 @@
 """Mutated motion files as uploads: whatever is altered, motet serve answers, and an error is the client's, as JSON.
 
-    python tests/fuzz_uploads.py --count 300 [--seed N] [--first N] [--seconds 5] [--megabytes 500]
+    python tests/fuzz_uploads.py --count 300 [--seed N] [--first N] [--seconds 2] [--megabytes 500]
 
 The mutants are those of tests/fuzz_motions.py. Each is described, continued, and taken for the character of another
 motion, by the application in a process of its own. An answer with a status of 500 or more is a failure.

@@ -218,8 +218,7 @@ def options(description: str | None) -> argparse.ArgumentParser:
     parser.add_argument("--count", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0, help="number of the first mutant")
-    # 30 MB of JSON take 2 s on the slowest processor that was tried
-    parser.add_argument("--seconds", type=float, default=5.0, help="longest processor time of one call")
+    parser.add_argument("--seconds", type=float, default=2.0, help="longest processor time of one call")
     parser.add_argument("--megabytes", type=float, default=500.0, help="largest peak of memory of one mutant")
     parser.add_argument("--keep", type=Path, default=Path(tempfile.gettempdir()) / "motet-fuzz", help="of failures")
     return parser
@@ -229,7 +228,7 @@ def fuzz(given: argparse.Namespace, mutate: Callable[[Generator], Mutant], steps
     """Try mutants and say what came of them; the exit code, which is 1 where one failed."""
     outcomes: Counter[str] = Counter()
     failures, slowest, largest, started = 0, 0.0, 0.0, time.perf_counter()
-    worker = Worker(steps, address_space=4096, patience=40 * given.seconds)
+    worker = Worker(steps, address_space=4096, patience=100 * given.seconds)
     with tempfile.TemporaryDirectory() as folder:
         for number in range(given.first, given.first + given.count):
             how, files = mutate(np.random.default_rng([given.seed, number]))

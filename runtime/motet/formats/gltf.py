@@ -124,11 +124,12 @@ def _scene(file: File) -> _Scene:
     gltf = parse(file)
     # figures in the order of the file's nodes, and the animations that move them
     animations = gltf.objects("animations")
-    parts = figures(gltf, set().union(*map(moved, animations)))
+    moved_nodes = list(map(moved, animations))
+    parts = figures(gltf, set().union(*moved_nodes))
     parts.sort(key=lambda joints: gltf.order[_top(gltf, joints)])
     titles = part_names((gltf.name(_top(gltf, joints)) for joints in parts), "figure")
     near = above(gltf, set().union(*parts))
-    moving = [animation for animation in animations if moved(animation) & near]
+    moving = [animation for animation, nodes in zip(animations, moved_nodes, strict=True) if nodes & near]
     if animations and not moving:
         raise ContentError("its animations move no joint of its skeleton: export the armature's animations")
     names = part_names(str(animation.get("name", "")) for animation in moving)

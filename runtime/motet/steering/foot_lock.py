@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from motet.figures.humanoid import HUMANOID, LEG, SOLE
+from motet.figures.humanoid import LEG, SOLE, leg_length
 from motet.figures.legs import Limb, joints_of, limbs, reached_by, with_legs
 from motet.motion.rotations import Array
 from motet.motion.scalar_or_batch import (
@@ -70,7 +70,7 @@ class FootLockSettings(Settings):
     """Half-life in which a foot is lifted and let down: at once, the knee of a straight leg would pop forward."""
 
 
-LEG_LENGTH = float(np.linalg.norm(HUMANOID.offsets[[HUMANOID.index(f"left{part}") for part in LEG[1:3]]], axis=1).sum())
+LEG_LENGTH = leg_length()
 """Metres of a thigh and a shin."""
 
 LEFT_THEN_RIGHT = np.array([[True], [False]])

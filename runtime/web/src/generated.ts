@@ -376,11 +376,6 @@ export const EVENTS = {
   UP_CONTACT: 0.2,
 } as const;
 
-// motet.steering.foot_lock
-export const FOOT_LOCK = {
-  LEG_LENGTH: 0.84,
-} as const;
-
 // motet.steering.foot_lock.FootLockSettings
 export const footLockSettings = {
   fade: { default: 0.1, low: 0.001, high: 10, whole: false },

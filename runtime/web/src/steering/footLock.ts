@@ -1,7 +1,7 @@
 /* A foot lock for live figures, standing feet stay in place without look-ahead: docs/reference/bundle.md, "The foot lock". */
-import { FOOT_LOCK, type footLockSettings, STEPPING } from "../generated.js";
+import { type footLockSettings, STEPPING } from "../generated.js";
 import { lengthOf } from "../motion/planar.js";
-import { LEG, SOLES } from "../figures/humanoid/bones.js";
+import { LEG, LEG_LENGTH, SOLES } from "../figures/humanoid/bones.js";
 import { legOf, type Limb, reach } from "../figures/legs.js";
 import { about, minus, plus, product, rotated, size, turnAt, type Vector, Y } from "../motion/rotations.js";
 import { damped, dampingOf } from "../motion/springs.js";
@@ -112,7 +112,7 @@ function isReleased(foot: Foot, contact: number, { places }: Limb, settings: Loc
   if (contact <= settings.stands) return false;
   if (foot.released) return true;
   const [x, y, z] = minus(places[2], places[0]);
-  return size([x + foot.shift[0], y, z + foot.shift[1]]) > settings.stretches * FOOT_LOCK.LEG_LENGTH;
+  return size([x + foot.shift[0], y, z + foot.shift[1]]) > settings.stretches * LEG_LENGTH;
 }
 
 /** Move a planned foot; by how much its ankle is lifted. lowest: the height of its sole as played. */
