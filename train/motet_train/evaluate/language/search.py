@@ -12,6 +12,7 @@ from motet.models.describe import DescribeModel
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array, Indices, Mask
 from motet.search.model import Hit, Index, IndexSettings, Member, SearchModel
+from motet.search.nearest import NearestSettings
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.confidence import share
 from motet_train.evaluate.language.describe import retrieved
@@ -23,7 +24,7 @@ SEARCH_GOALS = read_goals("search")
 
 Numbers = NDArray[np.int64]
 
-MOST_HITS = 1000
+MOST_HITS = int(NearestSettings.RANGES["count"][1].high)
 """Hits that a search gives at most."""
 
 
