@@ -433,8 +433,9 @@ def moved(animation: Json) -> NodeSet:
 def _channels(animation: Json) -> Iterator[tuple[Json, int, str]]:
     """The channels of an animation that move nodes, each with the node and the part of its transform."""
     for channel in animation.get("channels", []):
-        node = channel["target"].get("node")
-        path = channel["target"].get("path")
+        target = channel["target"]
+        node = target.get("node")
+        path = target.get("path")
         if path in REST_TRANSFORM and node is not None:
             yield channel, node, path
 
