@@ -6,6 +6,7 @@ tried with it runs in a worker process whose memory is limited; one that dies or
 
 import argparse
 import copy
+import json
 import multiprocessing
 import os
 import re
@@ -29,6 +30,11 @@ from motet.errors import MotetError
 Generator = np.random.Generator
 Files = dict[str, bytes]
 Mutant = tuple[str, Files]
+YARDSTICK_REPEATS = 8
+YARDSTICK_SECONDS = 0.5
+"""Processor time of the yardstick, which parses 2 MB of JSON several times, on the processor that limits are meant for:
+an AMD EPYC of family 25."""
+
 Steps = Callable[[Path], Iterator[Callable[[], object]]]
 """What is tried with a file: calls, each of which may raise motet's errors."""
 
@@ -46,7 +52,8 @@ NUMBERS = [struct.pack(kind, value) for kind, values in (
 
 class Found(NamedTuple):
     """What became of a mutant: "runs", the name of motet's first error, or what is a failure; the seconds of processor
-    time that its slowest call took, and the peak of megabytes beyond what the worker held before."""
+    time that its slowest call would take on a processor that runs at the pace of the ``YARDSTICK``, and the peak of
+    megabytes beyond what the worker held before."""
 
     outcome: str
     seconds: float
@@ -134,7 +141,22 @@ def tried(steps: Steps, path: Path) -> Found:
         slowest = max(slowest, _seconds() - started)
         if outcome == "FOREIGN":
             break
-    return Found(outcome, slowest, _megabytes("VmHWM") - before, detail)
+    megabytes = _megabytes("VmHWM") - before
+    if slowest > YARDSTICK_SECONDS:
+        slowest /= _slowness()
+    return Found(outcome, slowest, megabytes, detail)
+
+
+def _slowness() -> float:
+    """How many times longer than ``YARDSTICK_SECONDS`` this process takes just now for the yardstick; at least 1.
+
+    A slow or a busy processor slows the yardstick as it slows the mutant, so a verdict depends on neither.
+    """
+    document = json.dumps([{"name": str(number), "values": [number, number / 8]} for number in range(50_000)])
+    started = _seconds()
+    for _ in range(YARDSTICK_REPEATS):
+        json.loads(document)
+    return max(1.0, (_seconds() - started) / YARDSTICK_SECONDS)
 
 
 def _seconds() -> float:
