@@ -104,8 +104,8 @@ class Known:
 
     @cached_property
     def _bank(self) -> Floats:
-        """All vectors (B, T, E), in B tiles of T rows, the last filled up with zeros."""
-        rows = self.vectors.reshape(-1, self.vectors.shape[-1])
+        """All vectors (B, T, E), view by view, in B tiles of T rows, the last filled up with zeros."""
+        rows = self.vectors.transpose(1, 0, 2).reshape(-1, self.vectors.shape[-1])
         tile = max(1, TILE // rows.shape[1])
         bank = np.zeros((-(-len(rows) // tile) * tile, rows.shape[1]), dtype=np.float32)
         bank[: len(rows)] = rows / np.float32(127)
@@ -145,7 +145,7 @@ class Known:
         similarities = self._similarities(vectors)
         best = similarities.max(axis=1, keepdims=True)
         count = min(settings.near, similarities.shape[1])
-        least = np.sort(similarities, axis=1)[:, -count][:, None]
+        least = np.partition(similarities, -count, axis=1)[:, -count, None]
         weights = np.exp((similarities - best) / settings.temperature)
         weights = np.where(similarities >= least, weights, 0.0)
         counted = np.zeros((len(vectors), len(self.shown)))
@@ -155,14 +155,16 @@ class Known:
     def _similarities(self, vectors: Floats) -> Array:
         """Of vectors (N, E) with each motion, seen from the side from which they are most alike: (N, motions)."""
         motions, views = self.vectors.shape[:2]
-        products = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: motions * views].T
-        similarities: Array = products.reshape(len(vectors), motions, views).max(axis=2).astype(np.float64)
+        products = np.matmul(self._bank, vectors.T).reshape(-1, len(vectors))[: views * motions]
+        similarities: Array = products.reshape(views, motions, -1).max(axis=0).T.astype(np.float64)
         return similarities
 
     def shares(self, counted: Array) -> Array:
         """Of each set of kinds (N, Q) the share of near motions that it is right about; 0 where none of them is said to
         show it."""
-        return np.where(counted @ self._named > 0, counted @ self._right, 0.0)
+        near = np.flatnonzero(counted.any(axis=0))  # some 30 of all actions
+        weights = counted[:, near]
+        return np.where(weights @ self._named[near] > 0, weights @ self._right[near], 0.0)
 
     def answers(self, seen: Sequence[Seen], count: int = 1) -> list[list[Answer]]:
         """For each motion up to ``count`` sentences about different kinds of action, the likeliest first; one of

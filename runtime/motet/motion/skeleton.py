@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from operator import index
 from typing import Any
 
@@ -226,18 +226,19 @@ def metres(unit: str | float) -> float:
 
 def partners_of(names: Sequence[str]) -> tuple[int, ...]:
     """For each name the index of its partner on the other side, or its own if there is none."""
-    return tuple(partner for partner, _ in _partners(names))
+    return tuple(partner for partner, _ in _partners(tuple(names)))
 
 
 def sides_of(names: Sequence[str]) -> Names:
     """:data:`LEFT`, :data:`RIGHT` or :data:`MIDDLE` for each name; one without a partner is in the middle."""
-    return tuple(side for _, side in _partners(names))
+    return tuple(side for _, side in _partners(tuple(names)))
 
 
-def _partners(names: Sequence[str]) -> list[tuple[int, str]]:
+@lru_cache(maxsize=16)
+def _partners(names: Names) -> tuple[tuple[int, str], ...]:
     """For each name the index of its partner and the side that it is on itself."""
     places = {name: place for place, name in enumerate(names)}
-    return [_partner(place, name, places) for place, name in enumerate(names)]
+    return tuple(_partner(place, name, places) for place, name in enumerate(names))
 
 
 SIDE_PATTERNS = (
