@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from motet.formats import Character, clips, figures_in
     from motet.formats import read_motion as read
     from motet.formats import write_motion as write
-    from motet.generate.base import Generated, GenerateModel, GenerateSettings
-    from motet.generate.model import CodesModel, Story, StorySettings, Understood
+    from motet.generate.base import Generated, GenerateModel, GenerateSettings, Story, Understood
+    from motet.generate.model import CodesModel, StorySettings
     from motet.live.demo import write_demo
     from motet.live.page import live_page, write_live_page
     from motet.models.base import BundleModel
@@ -92,8 +92,8 @@ _PLACES = {
     ),
     "motet.figures.humanoid": "Humanoid from_humanoid read_map to_humanoid",
     "motet.formats": "Character clips figures_in read=read_motion write=write_motion",
-    "motet.generate.base": "Generated GenerateModel GenerateSettings",
-    "motet.generate.model": "CodesModel Story StorySettings Understood",
+    "motet.generate.base": "Generated GenerateModel GenerateSettings Story Understood",
+    "motet.generate.model": "CodesModel StorySettings",
     "motet.live.demo": "write_demo",
     "motet.live.page": "live_page write_live_page",
     "motet.models.base": "BundleModel",

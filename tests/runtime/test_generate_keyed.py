@@ -104,6 +104,29 @@ def test_it_is_done_as_often_as_the_sentence_says(model: motet.CodesModel) -> No
     assert counts == [2, 5]
 
 
+@pytest.mark.parametrize(
+    ("sentence", "act", "seconds"),
+    [
+        ("Raise both arms above the head and hold for 6 seconds.", "raise both arms", 6),
+        ("clap for ten seconds", "clap", 10),
+        ("salute and hold it for five seconds", "salute", 5),
+    ],
+)
+def test_it_lasts_as_long_as_the_sentence_says(
+    model: motet.CodesModel, sentence: str, act: str, seconds: float
+) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (generated,) = model.generate(sentence)
+    assert (generated.action, generated.requested) == (act, {"seconds": seconds})
+    assert generated.motion.duration == pytest.approx(seconds, abs=0.05)
+    # its last pose is held, not begun and left
+    _, places = global_transforms(generated.motion)
+    hand = places[:, HUMANOID.index("rightHand"), 1]
+    late = round(0.8 * len(hand))
+    assert act == "clap" or hand[late] > 0.95 * hand.max()
+
+
 def test_recorded_actions_come_first(model: motet.CodesModel) -> None:
     assert model.likeliest("a person walks forward").action != "walk"
     assert model.likeliest("a person waves").action not in motet.keyed.ours()["wave"].says

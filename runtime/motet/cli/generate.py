@@ -14,8 +14,8 @@ from motet.cli.options import Tries, bar, bundle_option, json_option, naming, no
 from motet.cli.writing import Output, out_option, places, size, write_options
 from motet.files import Json
 from motet.formats import read_motion
-from motet.generate.base import PLAYED, Generated, GenerateModel
-from motet.generate.model import CodesModel, Story
+from motet.generate.base import PLAYED, Generated, GenerateModel, Story
+from motet.generate.model import CodesModel
 from motet.models.load import load_as
 from motet.motion.looping import looped
 from motet.text.clauses import Passage

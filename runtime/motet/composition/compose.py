@@ -20,8 +20,9 @@ from motet.composition.steered_segments import Leg, Walk, gait_of, walked
 from motet.errors import MotionError, SettingError, needs
 from motet.figures.feet.hold import hold_feet
 from motet.figures.humanoid import BONES, HUMANOID, on_humanoid, sole_points
+from motet.generate.base import Story
 from motet.generate.codec import seen_from as ground_seen_from
-from motet.generate.model import CodesModel, Story
+from motet.generate.model import CodesModel
 from motet.models.load import load
 from motet.motion.kinematics import (
     global_transforms,

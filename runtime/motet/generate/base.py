@@ -19,6 +19,7 @@ from motet.motion.rotations import Array
 from motet.motion.skeleton import Skeleton
 from motet.representation.contract import MotionContract
 from motet.settings import Progress, Range, Seed, Settings, seeds_of, silent
+from motet.text.clauses import Passage
 from motet.text.numeric_phrases import Quantities
 
 SETTLED = 0.3
@@ -145,6 +146,27 @@ class Generated:
         seconds = len(self.frames) / self.contract.fps
         score = "" if self.log_likelihood is None else f", log-likelihood {self.log_likelihood:.1f}"
         return f"Generated({len(self.frames)} frames, {seconds:.1f} s{score})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Story(Generated):
+    """One motion for several sentences, and when each is shown."""
+
+    passages: tuple[Passage, ...] = ()
+
+
+@dataclass(frozen=True)
+class Understood:
+    """How well a model knows a sentence."""
+
+    confidence: float
+    """The share of known words, rare words counting more, times the certainty about the action meant; 0 to 1."""
+
+    nearest: tuple[str, ...]
+    """Sentences of the likeliest actions, the likeliest first."""
+
+    confident: bool
+    """Whether the model knows the sentence."""
 
 
 class GenerateModel(LanguageModel):

@@ -12,12 +12,12 @@ import numpy as np
 
 from motet.errors import TextError
 from motet.keyed.acts import ACT_FPS, KeyedAct
-from motet.keyed.keys import mirrored_keys
+from motet.keyed.keys import held_longer, mirrored_keys
 from motet.keyed.shipped import says, shipped
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
-from motet.text.numeric_phrases import PACE_PHRASES, quantities_of
+from motet.text.numeric_phrases import PACE_PHRASES, Kind, quantities_of
 
 STANDS = "a person stands still"
 """The sentence of a figure that stands."""
@@ -47,6 +47,12 @@ FILLER_WORDS = (FUNCTION_WORDS - {"up"}) | {
 BODY_STEMS = frozenset(map(stem, ("hand", "arm", "fist", "finger", "thumb", "head", "knee")))
 """Stems of words that orders may begin with, and that are no verbs: "hands on hips"."""
 
+LIMB_STEMS = BODY_STEMS | frozenset(map(stem, ("leg", "foot", "feet", "elbow", "shoulder")))
+"""Stems of words for what an act moves: a recording that moves more shows more."""
+
+HELD = re.compile(r",? and holds?(?: (?:it|that|still|there|the pose|the position|this))?$")
+"""Words of a sentence that says how long its last pose stays."""
+
 ARTICLES = frozenset(("a", "an", "the", "my", "our", "your"))
 
 LONGEST_SUBJECT = 3
@@ -60,15 +66,16 @@ BOTH_SIDES = frozenset(("left", "right"))
 
 @dataclass(frozen=True)
 class NamedAct:
-    """An act as a sentence names it: on its side, and as often as it says. sentence: that of the act. times: how often
-    the sentence says, 0 if it does not. lacking: the words of the sentence that the act leaves out. below: the text of
-    what the act is laid over, "" for what the act says itself."""
+    """An act as a sentence names it: on its side, and as often and as long as it says. sentence: that of the act.
+    times, seconds: how often and how long the sentence says, 0 if it does not. lacking: the words of the sentence that
+    the act leaves out. below: the text of what the act is laid over, "" for what the act says itself."""
 
     act: KeyedAct
     sentence: str
     times: int = 0
     lacking: tuple[str, ...] = ()
     below: str = ""
+    seconds: float = 0.0
 
     @property
     def base(self) -> str:
@@ -109,8 +116,11 @@ class NamedAct:
         return all(key.numbers.keys() <= small and not key.hands for key in self.act.keys)
 
     def lasting(self, seconds: float, seed: int) -> "NamedAct":
-        """The act repeated more often, if it can be and is shorter than some seconds, or played up to twice as fast, if
-        it lasts longer. seconds: 0 for its usual length."""
+        """The act repeated more often, if it can be and is shorter than some seconds, or with its longest pose held
+        longer, if it cannot; or played up to twice as fast, if it lasts longer. seconds: 0 for its usual length."""
+        if seconds > self.act.seconds(seed) and self.act.repeat is None:
+            keys = held_longer(self.act.keys, seconds - self.act.seconds(seed))
+            return replace(self, act=replace(self.act, keys=keys))
         seconds = seconds or max(self.act.seconds(seed), WALKED_SECONDS if self.goes else 0.0)
         shortfall = seconds - self.act.seconds(seed)
         if shortfall > 0 and self.act.repeat and not self.times:
@@ -199,16 +209,16 @@ def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedA
     return NamedAct(act, order.sentence, count)
 
 
-def counted(sentence: str) -> tuple[str, float | None]:
-    """A sentence without how often it says that something is done, and that number; itself and None where it says none,
-    or another number, too."""
+def counted(sentence: str) -> tuple[str, Mapping[Kind, float]]:
+    """A sentence without how often and how long it says that something is done, and these numbers, "times" and
+    "seconds"; itself and none where it says neither, or another number, too."""
     try:
         quantities = quantities_of(sentence)
     except TextError:  # it is said when the sentence is read
-        return sentence, None
-    if quantities.amounts.keys() != {"times"}:
-        return sentence, None
-    return quantities.text, quantities.amounts["times"]
+        return sentence, {}
+    if quantities.amounts and quantities.amounts.keys() <= {"times", "seconds"}:
+        return quantities.text, quantities.amounts
+    return sentence, {}
 
 
 def without_subject(words: Sequence[str]) -> list[str]:

@@ -4,7 +4,8 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import lru_cache
 from itertools import chain
 from typing import Any, Literal, Self, Unpack, cast, get_args
 
@@ -24,12 +25,22 @@ from motet.errors import (
     warn,
 )
 from motet.figures.humanoid import HUMANOID
-from motet.generate.base import FamiliaritySettings, Generated, GenerateModel, LoopSettings, LoopValues
+from motet.generate.base import (
+    FamiliaritySettings,
+    Generated,
+    GenerateModel,
+    LoopSettings,
+    LoopValues,
+    Story,
+    Understood,
+)
 from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecoder
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
 from motet.generate.keyed_acts import (
+    HELD,
+    LIMB_STEMS,
     STANDS,
     TOGETHER,
     NamedAct,
@@ -98,27 +109,6 @@ class StorySettings(ReadSettings, total=False):
     strict: bool
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Story(Generated):
-    """One motion for several sentences, and when each is shown."""
-
-    passages: tuple[Passage, ...] = ()
-
-
-@dataclass(frozen=True)
-class Understood:
-    """How well a model knows a sentence."""
-
-    confidence: float
-    """The share of known words, rare words counting more, times the certainty about the action meant; 0 to 1."""
-
-    nearest: tuple[str, ...]
-    """Sentences of the likeliest actions, the likeliest first."""
-
-    confident: bool
-    """Whether the model knows the sentence."""
-
-
 class CodesModel(GenerateModel):
     """A model that generates motion codes; docs/reference/bundle.md has its graphs and tables. A context is the
     log-probabilities of actions."""
@@ -139,6 +129,8 @@ class CodesModel(GenerateModel):
         written = self._commands.written
         self.source = Source(graphs["step"], graphs["part"], self.codec.moves, self.sizes["A"], self._remember, written)
         self._familiar = self.settings(FamiliaritySettings)
+        # a reading asks for the act of each part of a sentence several times
+        self._keyed = lru_cache(maxsize=256)(self._keyed_act)
         self._read_actions(source.list_of_fields("actions"))
 
     def _read_codec(self) -> Codec:
@@ -257,12 +249,20 @@ class CodesModel(GenerateModel):
         is_command = action >= self._commands.first
         return frozenset(stem(word) for word in self._words[action] if is_command or DONE.search(word))
 
-    def _keyed(self, sentence: str) -> NamedAct | None:
+    def _keyed_act(self, sentence: str) -> NamedAct | None:
         """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
         sentence is a command or a recorded action has all its words, those of the act in its own sentence, and shows no
         more. A sentence may say more than the act, where the likeliest recorded action leaves out more of it."""
         if self.contract.skeleton != HUMANOID or sentence in self._sentences:
             return None
+        text, amounts = counted(sentence)
+        if amounts.keys() != {"seconds"}:
+            return self._keyed_usual(sentence)
+        act = self._keyed(HELD.sub("", text))
+        return replace(act, seconds=amounts["seconds"]) if act and not act.is_other_text else None
+
+    def _keyed_usual(self, sentence: str) -> NamedAct | None:
+        """The act of a sentence that does not say how long it lasts: :meth:`_keyed_act`."""
         words = self.vocabulary.rules.words(sentence)
         act = self._keyed_counted(sentence) or act_named(words)
         if act is None:
@@ -278,7 +278,7 @@ class CodesModel(GenerateModel):
         if self._leaves_out(sentence):
             return act
         recorded = stems_of(self.vocabulary.rules.words(self._shown_as(sentence).action))
-        shows_more = not recorded & self._verbs <= stems_of(words)
+        shows_more = not recorded & (self._verbs | LIMB_STEMS) <= stems_of(words)
         return act if shows_more or not stems_of(act.sentence.split()) <= recorded else None
 
     def _keyed_over(self, sentence: str) -> NamedAct | None:
@@ -304,9 +304,9 @@ class CodesModel(GenerateModel):
         """The act whose order a sentence without its subject holds beside other words, unless the likeliest recorded
         action or command leaves out no more of it. For this a word more counts where that is not confident, and another
         one where it lacks a word of the order."""
-        text, times = counted(sentence)
+        text, amounts = counted(sentence)
         words = self.vocabulary.rules.words(text)
-        act = act_within(words, times) if words else None
+        act = act_within(words, amounts.get("times")) if words else None
         if act is None or act.is_other_text:
             return None
         if not any(map(self.vocabulary.meant, words)):
@@ -319,7 +319,8 @@ class CodesModel(GenerateModel):
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
-        text, times = counted(sentence)
+        text, amounts = counted(sentence)
+        times = amounts.get("times")
         if times is None:
             return None
         words = self.vocabulary.rules.words(text)
@@ -387,7 +388,7 @@ class CodesModel(GenerateModel):
         if self.contract.skeleton != HUMANOID:
             return Quantities(sentence)
         if act := self._keyed(sentence):
-            return Quantities(act.base)
+            return Quantities(act.base, {"seconds": act.seconds} if act.seconds else {})
         quantities = self._on_the_spot(quantities_of(sentence))
         if self._commands.act(sentence) is not None and "times" not in quantities.amounts:
             return Quantities(sentence)

@@ -51,6 +51,18 @@ class Repeat:
     times: tuple[int, int]
 
 
+def held_longer(keys: tuple[Key, ...], seconds: float) -> tuple[Key, ...]:
+    """Keys of which the one that is held longest, if any is held, stays some seconds longer, and those after it come
+    as much later."""
+    longest = max(range(len(keys)), key=lambda number: keys[number].hold[1])
+    low, high = keys[longest].hold
+    if not high:
+        return keys
+    held = replace(keys[longest], hold=(low + seconds, high + seconds))
+    later = [replace(key, at=(key.at[0] + seconds, key.at[1] + seconds)) for key in keys[longest + 1 :]]
+    return (*keys[:longest], held, *later)
+
+
 def mirrored_keys(keys: Iterable[Key]) -> tuple[Key, ...]:
     """Keys with left and right exchanged."""
     swapped = []

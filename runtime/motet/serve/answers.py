@@ -15,8 +15,8 @@ from motet.figures.feet.treadmill import is_in_place
 from motet.figures.humanoid import rig
 from motet.files import Json
 from motet.formats import ONTO, Character
-from motet.generate.base import PLAYED, Generated
-from motet.generate.model import CodesModel, Story
+from motet.generate.base import PLAYED, Generated, Story
+from motet.generate.model import CodesModel
 from motet.models.describe import DescribeModel, Description
 from motet.motion.looping import looped
 from motet.motion.motion import Motion, rest_motion

@@ -9,7 +9,9 @@ from typing import NamedTuple
 
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
-    r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*", re.IGNORECASE
+    r",?\s*\b(?:(?:and|but)\s+)?"
+    r"(?:then|after that|(?<=and )after(?= (?:he|she|they|it)\b)|afterwards|finally|next(?!\s+to))\b,?\s*",
+    re.IGNORECASE,
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
 SUBJECT = re.compile(r"^((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
@@ -147,7 +149,8 @@ def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:
     start = 0
     for match in ALSO.finditer(text):
         done = re.findall(r"\w+", text[start : match.start()].lower())
-        opened = re.match(r"(?!back (?!up|away|off))\w+", SUBJECT.sub("", text[match.end() :], count=1).lower())
+        following = SUBJECT.sub("", text[match.end() :], count=1).lower()
+        opened = re.match(r"(?!back (?!up|away|off)|holds? (?:\w+ )?for)\w+", following)
         if opened and stem(opened[0]) in verbs and any(stem(word) in verbs for word in done):
             yield text[start : match.start()]
             start = match.end()

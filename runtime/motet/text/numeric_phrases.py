@@ -7,6 +7,7 @@ before something that is counted is a quantity. Anything else stays a word of th
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 from motet.errors import TextError
@@ -54,6 +55,7 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (r"\b(?:a )?dozen\b", "12"),
     (r"\btwice\b(?! as\b)", "2 times"),
     (r"\bthrice\b", "3 times"),
+    (r"(?<= )x ?(\d+)\b", r"\1 times"),
     (r"(?<!at )\bonce\b(?! more| again)", "1 time"),
     (r"\b(?:a )?single\b", "1"),
     (r"\b(do|does|doing|performs?) (?=(?:squat|lunge|cartwheel|burpee|sit-?up|pull-?up)s\b)", r"\1 4 "),
@@ -158,6 +160,7 @@ def numerals(sentence: str) -> str:
     return text
 
 
+@lru_cache(maxsize=256)
 def quantities_of(sentence: str) -> Quantities:
     """The quantities of a sentence, the first of each kind; TextError for an impossible one: "-3 jumps"."""
     # the first phrase of each kind, left to right; phrases do not overlap

@@ -1,7 +1,8 @@
 /* Sentences that ask for several things in a row, as parts: docs/reference/bundle.md, "Several things in one text". */
 import { CLAUSES } from "../generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
-const THEN = /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
+const THEN =
+  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?= (?:he|she|they|it)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
 const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
 /** Words that may stand before the verb of a part: its subject, or an adverb. */
 export const SUBJECT =
@@ -60,7 +61,7 @@ function beforeVerbs(text: string, verbs: Set<string>): string[] {
         .slice(start, index)
         .toLowerCase()
         .match(/[\p{L}\p{N}_]+/gu) ?? [];
-    const opened = /^(?!back (?!up|away|off))[\p{L}\p{N}_]+/u.exec(
+    const opened = /^(?!back (?!up|away|off)|holds? (?:[\p{L}\p{N}_]+ )?for)[\p{L}\p{N}_]+/u.exec(
       text
         .slice(index + separator.length)
         .replace(SUBJECT, "")

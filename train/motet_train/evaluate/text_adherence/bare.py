@@ -7,8 +7,7 @@ import numpy as np
 
 from motet.bundle.fields import Json
 from motet.errors import TextWarning, collected
-from motet.generate.base import Generated, GenerateModel
-from motet.generate.model import Story
+from motet.generate.base import Generated, GenerateModel, Story
 from motet.text.clauses import stem
 from motet.text.vocabulary import NEW_MODEL_RULES
 from motet_train.data.table import read_toml

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from motet.bundle.fields import Json
-from motet.generate.model import CodesModel, Story
+from motet.generate.base import Story
+from motet.generate.model import CodesModel
 from motet_train.data.table import read_toml
 from motet_train.evaluate.tables import Report
 from motet_train.evaluate.text_adherence.prompts import holds
