@@ -18,6 +18,7 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
 from motet.text.numeric_phrases import PACE_PHRASES, Kind, quantities_of
+from motet.text.vocabulary import NUMBER_WORDS
 
 STANDS = "a person stands still"
 """The sentence of a figure that stands."""
@@ -68,7 +69,8 @@ BOTH_SIDES = frozenset(("left", "right"))
 class NamedAct:
     """An act as a sentence names it: on its side, and as often and as long as it says. sentence: that of the act.
     times, seconds: how often and how long the sentence says, 0 if it does not. lacking: the words of the sentence that
-    the act leaves out. below: the text of what the act is laid over, "" for what the act says itself."""
+    the act leaves out. below: the text of what the act is laid over, "" for what the act says itself. legs: another
+    act that is done at the same time, below it."""
 
     act: KeyedAct
     sentence: str
@@ -76,10 +78,13 @@ class NamedAct:
     lacking: tuple[str, ...] = ()
     below: str = ""
     seconds: float = 0.0
+    legs: "NamedAct | None" = None
 
     @property
     def base(self) -> str:
         """The text of what the act is laid over."""
+        if self.legs is not None:
+            return self.legs.base
         return self.below or BASE_SENTENCES.get(self.act.over, self.act.over)
 
     @property
@@ -107,7 +112,8 @@ class NamedAct:
     @property
     def shown(self) -> Shown:
         """How the sentence is shown."""
-        return Shown(self.act.says[0], self.lacking, self.confidence)
+        name = self.act.says[0] if self.legs is None else f"{self.act.says[0]}, {self.legs.act.says[0]}"
+        return Shown(name, self.lacking, self.confidence)
 
     @property
     def is_small(self) -> bool:
@@ -132,6 +138,8 @@ class NamedAct:
 
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
         """Frames (T, D) of what is below the act, in the contract's channels, that do the act, too."""
+        if self.legs is not None:
+            frames = self.legs.lasting(len(frames) / contract.fps, seed).laid_over(frames, contract, seed)
         base = contract.motion(frames, plant=False)
         acted = self.act.motion(base, seed, strict=False)
         shown = frames.copy()
@@ -247,7 +255,12 @@ def _stems_of_acts() -> frozenset[str]:
 @cache
 def _stems_of_act(name: str) -> frozenset[str]:
     """The stems of all words of an act."""
-    return frozenset[str]().union(*map(stems_of, map(str.split, says()[name])))
+    return frozenset[str]().union(*map(stems_of, map(_words_of, says()[name])))
+
+
+def _words_of(sentence: str) -> list[str]:
+    """The words of an act's sentence, its numbers in digits, as sentences have them when they are read."""
+    return [str(NUMBER_WORDS.get(word, word)) for word in sentence.split()]
 
 
 def stems_of(words: Iterable[str]) -> frozenset[str]:
@@ -270,8 +283,9 @@ def _orders() -> Mapping[str, Sequence[Order]]:
     orders: dict[str, list[Order]] = {}
     for name, sentences in says().items():
         for sentence in sentences:
-            particles = FUNCTION_WORDS.intersection(sentence.split()) - ARTICLES
-            order = Order(name, sentence, stems_of(sentence.split()), particles)
+            words = _words_of(sentence)
+            particles = FUNCTION_WORDS.intersection(words) - ARTICLES
+            order = Order(name, " ".join(words), stems_of(words), particles)
             for of_sentence in order.stems:
                 orders.setdefault(of_sentence, []).append(order)
     return orders

@@ -283,13 +283,16 @@ class CodesModel(GenerateModel):
 
     def _keyed_over(self, sentence: str) -> NamedAct | None:
         """The act of the upper body that a sentence names beside what is done at the same time, "waves while walking",
-        unless the likeliest recorded action or command shows both."""
+        or beside an act of the legs, unless the likeliest recorded action or command shows both."""
         clauses = list(filter(None, map(str.strip, TOGETHER.split(sentence))))
         if len(clauses) != 2 or not self._leaves_out(sentence):
             return None
         for act_clause, below in (clauses, clauses[::-1]):
             words = without_subject(act_clause.split())
             act = act_named(words) or act_within(words)
+            legs = act_named(without_subject(below.split()))
+            if act and act.leaves_legs and legs and not (legs.leaves_legs or legs.is_other_text):
+                return replace(act, legs=legs)
             has_verb = any(stem(word) in self._verbs for word in below.split())
             if act and act.leaves_legs and has_verb and not self._leaves_out(below):
                 return replace(act, below=below)
