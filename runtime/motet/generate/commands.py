@@ -1,7 +1,7 @@
 """Bare commands, such as "walk" or "sit down", and the plain act that each means: docs/reference/bundle.md, "Bare
 commands"."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -50,8 +50,11 @@ class Commands:
     verbs: frozenset[str]
     """The stems of the words that commands begin with."""
 
+    meant: Callable[[str], str] = str
+    """The known word that a word is, or of which it is a misspelling; "" where there is none."""
+
     @staticmethod
-    def of(entries: Sequence[Fields], rules: TextRules, actions: int) -> "Commands":
+    def of(entries: Sequence[Fields], rules: TextRules, actions: int, meant: Callable[[str], str] = str) -> "Commands":
         """Those of a manifest. actions: how many known actions there are; the number after them stands for none.
         BundleError for an action that is not there, and for a command that means two acts."""
         acts: list[Command] = []
@@ -66,7 +69,7 @@ class Commands:
                     raise BundleError(f"manifest, commands: {text!r} does not mean one act")
             verbs.update(stem(rules.words(text)[0]) for text in texts)
             acts.append(_command(entry, rules, actions))
-        return Commands(rules, actions + 1, acts, numbers, frozenset(verbs))
+        return Commands(rules, actions + 1, acts, numbers, frozenset(verbs), meant)
 
     @property
     def written(self) -> NDArray[np.int64]:
@@ -75,8 +78,14 @@ class Commands:
 
     def act(self, text: str) -> int | None:
         """The action of the command that a text is; None if it is none."""
-        key = key_of(self.rules.words(text))
+        key = self._key(text)
         return self.action(key) if key in self.numbers else None
+
+    def _key(self, text: str) -> Key:
+        """The key of a text; of what it means, if it is misspelt."""
+        words = self.rules.words(text)
+        key = key_of(words)
+        return key if key in self.numbers else key_of(self.meant(word) or word for word in words)
 
     def action(self, key: Key) -> int:
         """The action of a command."""
@@ -84,7 +93,7 @@ class Commands:
 
     def is_instead(self, text: str) -> bool:
         """Whether a text is a command for an act that nobody recorded."""
-        key = key_of(self.rules.words(text))
+        key = self._key(text)
         return key in self.numbers and key in self._act(key).instead
 
     def nearest(self, text: str) -> Key | None:

@@ -54,6 +54,12 @@ LIMB_STEMS = BODY_STEMS | frozenset(map(stem, ("leg", "foot", "feet", "elbow", "
 HELD = re.compile(r",? and holds?(?: (?:it|that|still|there|the pose|the position|this))?$")
 """Words of a sentence that says how long its last pose stays."""
 
+HAND = re.compile(r" ?\b(?:with|in|using) (?:the |your |his |her |their |my |its )?(left|right) (?:hand|arm)\b")
+"""The hand that an act is done with."""
+
+STANDING = re.compile(r"standing(?: up| still| there)?")
+"""What a figure does below an act that need not be said."""
+
 ARTICLES = frozenset(("a", "an", "the", "my", "our", "your"))
 
 LONGEST_SUBJECT = 3
@@ -120,6 +126,13 @@ class NamedAct:
         """Whether only head, trunk and shoulders move: codes of recordings lose movements as small."""
         small = {"head", "chest", "shoulders"}
         return all(key.numbers.keys() <= small and not key.hands for key in self.act.keys)
+
+    def with_hand(self, side: str) -> "NamedAct":
+        """The act done with the hand of a side; a word that it leaves out where it is not an act of either hand."""
+        if not self.act.mirrored:
+            return replace(self, lacking=(*self.lacking, side))
+        keys = mirrored_keys(self.act.keys) if side == "left" else self.act.keys
+        return replace(self, act=replace(self.act, keys=keys, mirrored=False))
 
     def lasting(self, seconds: float, seed: int) -> "NamedAct":
         """The act repeated more often, if it can be and is shorter than some seconds, or with its longest pose held
@@ -207,8 +220,11 @@ def _orders_in(words: Sequence[str], stems: Iterable[str]) -> Iterator[Order]:
 def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedAct:
     """The act of an order on the side that some stems name, as often as it is to be done."""
     act = shipped(order.name)
-    # acts of either hand are written for the right one
     sides = stems & BOTH_SIDES - order.stems
+    for side in sides:
+        if len(sides) == 1 and f"{order.name} {side}" in says():  # point left is not to point with the left hand
+            return NamedAct(shipped(f"{order.name} {side}"), order.sentence, int(times or 0))
+    # acts of either hand are written for the right one
     if act.mirrored and len(sides) == 1:
         act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
     count = int(times or 0)

@@ -39,8 +39,11 @@ from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_code
 from motet.generate.commands import Commands
 from motet.generate.continue_codes import ContinuationSettings
 from motet.generate.keyed_acts import (
+    BOTH_SIDES,
+    HAND,
     HELD,
     LIMB_STEMS,
+    STANDING,
     STANDS,
     TOGETHER,
     NamedAct,
@@ -60,9 +63,11 @@ from motet.motion.rotations import Array
 from motet.representation.root_sixd import in_world
 from motet.settings import Seed
 from motet.text.clauses import (
+    ADDRESSEE,
     FUNCTION_WORDS,
     OWN,
     SUBJECT,
+    THEN,
     Passage,
     Shown,
     at_odds,
@@ -125,7 +130,7 @@ class CodesModel(GenerateModel):
         self._bind()
         source = Fields(manifest.source)
         commands = source.list_of_fields("commands") if "commands" in manifest.source else []
-        self._commands = Commands.of(commands, self.vocabulary.rules, self.sizes["A"])
+        self._commands = Commands.of(commands, self.vocabulary.rules, self.sizes["A"], self.vocabulary.meant)
         written = self._commands.written
         self.source = Source(graphs["step"], graphs["part"], self.codec.moves, self.sizes["A"], self._remember, written)
         self._familiar = self.settings(FamiliaritySettings)
@@ -263,6 +268,9 @@ class CodesModel(GenerateModel):
 
     def _keyed_usual(self, sentence: str) -> NamedAct | None:
         """The act of a sentence that does not say how long it lasts: :meth:`_keyed_act`."""
+        if hand := HAND.search(sentence):
+            act = self._keyed_usual(HAND.sub("", sentence, count=1))
+            return act.with_hand(hand[1]) if act and not act.is_other_text else None
         words = self.vocabulary.rules.words(sentence)
         act = self._keyed_counted(sentence) or act_named(words)
         if act is None:
@@ -285,15 +293,23 @@ class CodesModel(GenerateModel):
         """The act of the upper body that a sentence names beside what is done at the same time, "waves while walking",
         or beside an act of the legs, unless the likeliest recorded action or command shows both."""
         clauses = list(filter(None, map(str.strip, TOGETHER.split(sentence))))
-        if len(clauses) != 2 or not self._leaves_out(sentence):
+        if len(clauses) != 2:
             return None
+        leaves_out = self._leaves_out(sentence)
         for act_clause, below in (clauses, clauses[::-1]):
             words = without_subject(act_clause.split())
-            act = act_named(words) or act_within(words)
+            named = act_named(words)
+            # a recorded action has all words: it gives way to an act and a command that are said so
+            if not (leaves_out or (named and self._commands.act(below) is not None)):
+                continue
+            act = named or act_within(words)
+            if act and STANDING.fullmatch(below):
+                return act
             legs = act_named(without_subject(below.split()))
             if act and act.leaves_legs and legs and not (legs.leaves_legs or legs.is_other_text):
                 return replace(act, legs=legs)
-            has_verb = any(stem(word) in self._verbs for word in below.split())
+            is_limb = stems_of(below.split()) <= BOTH_SIDES | LIMB_STEMS
+            has_verb = not is_limb and any(stem(word) in self._verbs for word in below.split())
             if act and act.leaves_legs and has_verb and not self._leaves_out(below):
                 return replace(act, below=below)
         return None
@@ -336,6 +352,7 @@ class CodesModel(GenerateModel):
     def parts(self, sentence: str) -> list[str]:
         """The things that a text requests one after another: its sentences, and the parts of a sentence
         (:func:`motet.text.clauses.parts_of`) whose likeliest action leaves something out; errors like :meth:`ids`."""
+        sentence = ADDRESSEE.sub("", sentence)
         act = self._keyed(sentence)
         if act and act.is_other_text:
             return max(1, act.times) * self._pieces(act.base)
@@ -369,8 +386,8 @@ class CodesModel(GenerateModel):
         if self.likeliest(sentence).lacking or not self.understood(sentence).confident:
             return False
         if self._keyed(sentence):
-            acts = filter(None, map(self._keyed, parts))
-            return len({act.act.name for act in acts}) < 2
+            acts = [act.act for act in map(self._keyed, parts) if act]
+            return all(act == acts[0] for act in acts)
         verbs = [stem(SUBJECT.sub("", part).split()[0].lower()) for part in parts]
         if len(set(verbs)) < len(verbs):
             return False
@@ -379,10 +396,11 @@ class CodesModel(GenerateModel):
             amounts = dict(quantities_of(part).amounts)
             if amounts and amounts != dict(quantities.amounts):
                 return False
-        # Several commands are one only where they are known as one.
+        # Several commands are one only where they are known as one, and what is said to come after is.
         if self._commands.act(quantities.text) is not None:
             return True
-        return any(self._commands.act(self.quantities(part).text) is None for part in parts)
+        are_commands = [self._commands.act(self.quantities(part).text) is not None for part in parts]
+        return not (all(are_commands) or (THEN.search(sentence) and any(are_commands)))
 
     def quantities(self, sentence: str) -> Quantities:
         """The numbers in a sentence, and the text that it is read as: itself if the likeliest action has all its words,

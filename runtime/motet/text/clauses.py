@@ -9,13 +9,25 @@ from typing import NamedTuple
 
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
-    r",?\s*\b(?:(?:and|but)\s+)?"
-    r"(?:then|after that|(?<=and )after(?= (?:he|she|they|it)\b)|afterwards|finally|next(?!\s+to))\b,?\s*",
+    r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|"
+    r"afterwards|finally|next(?!\s+to))\b,?\s*",
     re.IGNORECASE,
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
 SUBJECT = re.compile(r"^((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
 """Words that may stand before the verb of a part: its subject, or an adverb."""
+
+DIRECTION = re.compile(
+    r"\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b",
+    re.IGNORECASE,
+)
+OTHER_SIDE = re.compile(r"(?:the|your|his|her|their) (left|right)(?: one)?", re.IGNORECASE)
+OBJECT = re.compile(r"\b(?:an?|the) (\w+)", re.IGNORECASE)
+LOW = re.compile(r"\b(?:sit|kneel|lie|lay|crouch|squat|knee)\w*", re.IGNORECASE)
+AROUND = re.compile(r"\b(?:turn\w* (?:a?round|180)|half turn)", re.IGNORECASE)
+ADDRESSEE = re.compile(
+    r"^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+", re.IGNORECASE
+)
 
 # fmt: off
 FUNCTION_WORDS = frozenset((
@@ -125,7 +137,7 @@ def at_odds(sentence: str) -> tuple[str, str] | None:
 
 def sentences_of(text: str) -> list[str]:
     """The sentences of a text; semicolons and line breaks end a sentence, too."""
-    sentences = [sentence.strip(" ,") for sentence in STOPS.split(text)]
+    sentences = [ADDRESSEE.sub("", sentence.strip(" ,")) for sentence in STOPS.split(text)]
     return [sentence for sentence in sentences if sentence]
 
 
@@ -141,7 +153,34 @@ def parts_of(sentence: str, verbs: Set[str]) -> list[str]:
         stripped = piece.strip(" ,")
         if stripped:
             parts += _before_verbs(stripped, verbs)
-    return parts
+    return _in_full(parts)
+
+
+def _in_full(parts: Iterable[str]) -> list[str]:
+    """Parts with what they leave out since the part before says it: "look up", "down" looks down, "take a ball",
+    "throw it" throws the ball, who sits and then stands stands up, and who turns around and walks back goes forward."""
+    full: list[str] = []
+    for part in parts:
+        before = full[-1] if full else ""
+        full.append(_after(before, part) if before else part)
+    return full
+
+
+def _after(before: str, part: str) -> str:
+    directions = list(DIRECTION.finditer(before))
+    if directions and DIRECTION.fullmatch(part):
+        return before[: directions[-1].start()] + part + before[directions[-1].end() :]
+    side = OTHER_SIDE.fullmatch(part)
+    if side and re.search(r"\b(?:left|right)\b", before):
+        return re.sub(r"\b(?:left|right)\b", side[1], before)
+    thing = OBJECT.search(before)
+    if thing and re.match(r"\w+ it\b", part):
+        return re.sub(r"\bit\b", f"the {thing[1]}", part, count=1)
+    if re.fullmatch(r"stands?", part) and LOW.search(before):
+        return f"{part} up"
+    if AROUND.search(before):
+        return re.sub(r"^(walks?|runs?|goe?s?|jogs?) back\b", r"\1 forward", part)
+    return part
 
 
 def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:

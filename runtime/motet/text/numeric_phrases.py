@@ -65,9 +65,11 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (r"\b(?:an? |1 )?quarter(?: of)?(?: an?)?(?=[ -])", "0.25"),
     (r"\b(?:an? )?half(?: an?)?(?=[ -])", "0.5"),
     (rf"\b(?:an? )?(?:full|whole|complete) (?={WHOLE_TURN}\b)", "1 "),
+    (r"\bin an? ((?:counter-?|anti-?)?clockwise) circle\b", r"\1 1 circle"),
     (r"\bin circles?\b|\bin an? circle\b", "1 circle"),
     (rf"\ban? (?=(?:{MEASURES})\b)", "1 "),
-    (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*|does an?|do an?) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
+    (r"\b(?:does|do) an? (45|90|135|180|270|360|540|720)\b(?! deg)", r"turn \1"),
+    (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
 )  # fmt: skip
 """Other ways to say numbers and their units, and their replacements."""
 
@@ -177,6 +179,8 @@ def quantities_of(sentence: str) -> Quantities:
     # sides and paces have no numbers
     sides = {1 if left else -1 for left, _ in SIDE_PHRASES.findall(text)}
     _turned(text, amounts, sides)
+    if "degrees" in amounts:  # which way is in their sign
+        text = re.sub(r"\b(?:anti-?|counter-?)?clockwise\b", "", text)
     if pace := PACE_PHRASES.search(text):
         amounts["pace"] = SLOWER if pace[1] else FASTER
     remaining = _plain(text, amounts) if phrases or "degrees" in amounts else sentence

@@ -26,10 +26,14 @@ export class Commands {
   private readonly numbers = new Map<string, { number: number; instead: boolean }>();
   readonly verbs = new Set<string>();
 
-  /** split: the words of a text. actions: how many known ones there are; the number after them stands for none. */
+  /**
+   * split: the words of a text. meant: the known word of which one is a misspelling. actions: how many known ones there
+   * are; the number after them stands for none.
+   */
   constructor(
     readonly acts: Command[],
     private readonly split: (text: string) => string[],
+    private readonly meant: (word: string) => string,
     actions: number,
   ) {
     this.first = actions + 1;
@@ -51,8 +55,15 @@ export class Commands {
 
   /** The action of the command that a text is. */
   act(text: string): number | undefined {
-    const key = keyOf(this.split(text));
+    const key = this.key(text);
     return this.numbers.has(key) ? this.action(key) : undefined;
+  }
+
+  /** The key of a text; of what it means, if it is misspelt. */
+  private key(text: string): string {
+    const words = this.split(text);
+    const key = keyOf(words);
+    return this.numbers.has(key) ? key : keyOf(words.map((word) => this.meant(word) || word));
   }
 
   /** The action of a command. */
@@ -62,7 +73,7 @@ export class Commands {
 
   /** Whether a text is a command for an act that nobody recorded. */
   isInstead(text: string): boolean {
-    return this.numbers.get(keyOf(this.split(text)))?.instead ?? false;
+    return this.numbers.get(this.key(text))?.instead ?? false;
   }
 
   /** The sorted stems of the longest command in a text that begins with a command's verb. */

@@ -1,7 +1,16 @@
 import { GENERATE, continuationSettings, familiaritySettings, memorySettings } from "../generated.js";
 import type { Bundle, Manifest } from "../bundle/bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
-import { FUNCTION_WORDS, partsOf, sentencesOf, stem, SUBJECT, verbsOf } from "../text/clauses.js";
+import {
+  ADDRESSEE,
+  FUNCTION_WORDS,
+  partsOf,
+  sentencesOf,
+  stem,
+  SUBJECT,
+  THEN,
+  verbsOf,
+} from "../text/clauses.js";
 import { Commands } from "./commands.js";
 import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
 import { BundleError, DecodingError, TextError } from "../errors.js";
@@ -117,7 +126,8 @@ export class GenerateModel extends LanguageModel {
   ) {
     super(manifest);
     const split = (text: string) => this.vocabulary.split(text);
-    this.commands = new Commands(manifest.commands ?? [], split, manifest.actions?.length ?? 0);
+    const meant = (word: string) => this.vocabulary.meant(word);
+    this.commands = new Commands(manifest.commands ?? [], split, meant, manifest.actions?.length ?? 0);
     const verbs = verbsOf((manifest.actions ?? []).flatMap(({ words }) => words));
     this.verbs = new Set([...verbs, ...this.commands.verbs]);
   }
@@ -137,7 +147,8 @@ export class GenerateModel extends LanguageModel {
   }
 
   /** What a text asks for one after another: docs/reference/bundle.md, "Several things in one text". */
-  async parts(text: string): Promise<string[]> {
+  async parts(request: string): Promise<string[]> {
+    const text = request.replace(ADDRESSEE, "");
     this.words(text);
     const pieces: string[] = [];
     for (const sentence of sentencesOf(text)) {
@@ -150,11 +161,12 @@ export class GenerateModel extends LanguageModel {
     return parts.flat();
   }
 
-  /** Whether parts are shown one by one: the likeliest action lacks some, or all are commands and not one together. */
+  /** Whether parts are shown one by one: the likeliest action lacks some, or all are commands and not one together, or one comes after. */
   private async splits(sentence: string, parts: string[]): Promise<boolean> {
     if (await this.lacks(sentence)) return true;
     if (this.commands.act(sentence) !== undefined) return false;
-    return parts.every((part) => this.commands.act(part) !== undefined);
+    const areCommands = parts.map((part) => this.commands.act(part) !== undefined);
+    return areCommands.every(Boolean) || (THEN.test(sentence) && areCommands.some(Boolean));
   }
 
   /** Whether the likeliest action lacks something of a sentence. */

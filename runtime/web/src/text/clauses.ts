@@ -1,8 +1,18 @@
 /* Sentences that ask for several things in a row, as parts: docs/reference/bundle.md, "Several things in one text". */
 import { CLAUSES } from "../generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
-const THEN =
-  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?= (?:he|she|they|it)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
+/** Words between things that are done one after the other. */
+export const THEN =
+  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
+const DIRECTION =
+  /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
+const OTHER_SIDE = /^(?:the|your|his|her|their) (left|right)(?: one)?$/iu;
+const OBJECT = /\b(?:an?|the) ([\p{L}\p{N}_]+)/iu;
+const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
+const AROUND = /\b(?:turn\w* (?:a?round|180)|half turn)/iu;
+/** Who is told to do something. */
+export const ADDRESSEE =
+  /^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+/iu;
 const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
 /** Words that may stand before the verb of a part: its subject, or an adverb. */
 export const SUBJECT =
@@ -38,7 +48,10 @@ const bare = (text: string) => text.replace(/^[ ,]+|[ ,]+$/gu, "");
 
 /** The sentences of a text, and what it has between semicolons and in lines. */
 export function sentencesOf(text: string): string[] {
-  return text.split(STOPS).map(bare).filter(Boolean);
+  return text
+    .split(STOPS)
+    .map((sentence) => bare(sentence).replace(ADDRESSEE, ""))
+    .filter(Boolean);
 }
 
 /** The parts of a sentence, in the order in which they are done. */
@@ -48,7 +61,31 @@ export function partsOf(sentence: string, verbs: Set<string>): string[] {
     .split(THEN)
     .map(bare)
     .filter(Boolean);
-  return pieces.flatMap((piece) => beforeVerbs(piece, verbs));
+  return inFull(pieces.flatMap((piece) => beforeVerbs(piece, verbs)));
+}
+
+/** Parts with what they leave out since the part before says it: "look up", "down" looks down. */
+function inFull(parts: string[]): string[] {
+  const full: string[] = [];
+  for (const part of parts) {
+    const before = full.at(-1);
+    full.push(before === undefined ? part : after(before, part));
+  }
+  return full;
+}
+
+function after(before: string, part: string): string {
+  const direction = [...before.matchAll(DIRECTION)].at(-1);
+  if (direction && part.match(DIRECTION)?.[0] === part) {
+    return before.slice(0, direction.index) + part + before.slice(direction.index + direction[0].length);
+  }
+  const side = OTHER_SIDE.exec(part);
+  if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
+  const thing = OBJECT.exec(before);
+  if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
+  if (/^stands?$/u.test(part) && LOW.test(before)) return `${part} up`;
+  if (AROUND.test(before)) return part.replace(/^(walks?|runs?|goe?s?|jogs?) back\b/u, "$1 forward");
+  return part;
 }
 
 /** A text cut at each comma and "and" that a verb follows, if one came before. */
