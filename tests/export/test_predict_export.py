@@ -27,9 +27,14 @@ def run() -> Run:
     torch.manual_seed(0)
     config = FigurePredictorConfig(
         CHANNELS,
-        VectorFigure((-1, 0, 1), ((0, 1, 0), (0, 0.3, 0), (0.1, 0.2, 0)), (0, 1), (6, 7, 8), tuple(range(6))),
-        tuple(range(CHANNELS)),
-        (1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, -1.0),
+        VectorFigure(
+            (-1, 0, 1),
+            ((0, 1, 0), (0, 0.3, 0), (0.1, 0.2, 0)),
+            (0, 1),
+            (6, 7, 8),
+            tuple(range(6)),
+            partners=(0, 1, 2),
+        ),
         frames=6,
         hidden=12,
         doubts=True,
@@ -38,7 +43,6 @@ def run() -> Run:
     with torch.no_grad():
         for parameter in net.parameters():
             parameter.add_(0.05 * torch.randn_like(parameter))
-    net.reach.fill_(0.02)  # what is fed back stays small
     assert net.doubt is not None
     net.doubt.weight.uniform_(-0.5, 0.5)
     return Run({**predict_manifest("figure-trajectory", 3, 6), "config": asdict(config)}, net)

@@ -29,7 +29,7 @@ from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows, store_material
 from motet_train.data.preparation import FULL, VECTORS, Preparation
 from motet_train.data.store import Store, split
-from motet_train.models.kinematics import VectorPlaces, vector_figure_of
+from motet_train.models.kinematics import VectorPoints, vector_figure_of
 from motet_train.papers.li2018.expmap import (
     CMU_LAYOUT,
     H36M_LAYOUT,
@@ -326,16 +326,6 @@ def test_velocities_are_those_of_the_motion_that_is_played_faster() -> None:
     assert 30 * drawn[..., 0].diff(dim=1).abs().max() > 2.3  # at its own speed it is 2.1 at most
 
 
-def test_places_are_those_of_the_runtime(tmp_path: Path) -> None:
-    store = of_people(tmp_path, read_motion(CMU_FOLDER / "02_06.amc")[:400])
-    motion = store.motion(0)
-    expected = positions(named(store.representation).motion(motion))
-    frames = torch.from_numpy(motion.values.astype(np.float32))[None].clone()
-    frames[:, 0, :3] = 0  # the first frame's steps lead there from a frame that is not known
-    places = VectorPlaces(vector_figure_of(store.contract([0])))
-    np.testing.assert_allclose(places(frames)[0], expected, atol=2e-5)
-
-
 def test_places_from_the_last_frame_are_those_of_the_runtime_turned_there(tmp_path: Path) -> None:
     store = of_people(tmp_path, read_motion(CMU_FOLDER / "02_06.amc")[:400])
     motion = store.motion(0)[:90]
@@ -343,9 +333,13 @@ def test_places_from_the_last_frame_are_those_of_the_runtime_turned_there(tmp_pa
     angle = heading(named(store.representation).motion(motion)[-1])[0]
     turn = euler_to_rotmat(np.array([[-angle, 0, 0]]), "yxz")[0]
     expected = (world - world[-1, 0] * (1, 0, 1)) @ turn.T
-    places = VectorPlaces(vector_figure_of(store.contract([0])))
+    points = VectorPoints(vector_figure_of(store.contract([0])))
     frames = torch.from_numpy(motion.values.astype(np.float32))[None]
-    np.testing.assert_allclose(places.from_last(frames)[0], expected, atol=2e-5)
+    found = points(frames, len(world) - 1)
+    np.testing.assert_allclose(found[0, :, : points.joints], expected, atol=2e-5)
+    # and back, after the first frame
+    back = points.frames(points(frames, 9)[:, 10:], frames[:, 9:10])
+    np.testing.assert_allclose(back, frames[:, 10:], atol=5e-5)
 
 
 def test_windows_along_motions_are_all_there_are(tmp_path: Path) -> None:

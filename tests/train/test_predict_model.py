@@ -23,7 +23,7 @@ from motet_train.models.figure_predictor import (
     FigurePredictorConfig,
     error_signs,
 )
-from motet_train.models.kinematics import VectorFigure
+from motet_train.models.kinematics import VectorFigure, VectorPoints, rotmat_to_rotvec, rotvec_to_rotmat
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.papers.li2018.expmap import CMU_ACTIONS, expmap_material, read_expmap
 from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
@@ -214,8 +214,8 @@ def test_doubt_finds_the_law_that_errors_follow() -> None:
 
 
 def test_signs_grow_with_what_they_are_signs_of() -> None:
-    past = torch.randn(5, 9, 4)
-    steps = torch.randn(5, 3, 4)
+    past = torch.randn(5, 9, 4, 3)
+    steps = torch.randn(5, 3, 4, 3)
     agreed = torch.zeros(5, 3)
     alike = error_signs(past, steps, agreed)
     faster = error_signs(2 * past, steps, agreed)
@@ -227,13 +227,22 @@ def test_signs_grow_with_what_they_are_signs_of() -> None:
 
 SIDES = FigurePredictorConfig(
     12,
-    VectorFigure((-1, 0, 0), ((0, 1, 0), (0.2, 0, 0), (-0.2, 0, 0)), (0, 1, 2), tuple(range(6, 12)), tuple(range(6))),
-    (0, 1, 2, 3, 4, 5, 9, 10, 11, 6, 7, 8),
-    (1.0, -1.0, -1.0, 1.0, 1.0, -1.0) + (1.0, -1.0, -1.0) * 2,
+    VectorFigure(
+        (-1, 0, 0),
+        ((0, 1, 0), (0.2, 0, 0), (-0.2, 0, 0)),
+        (0, 1, 2),
+        tuple(range(6, 12)),
+        tuple(range(6)),
+        partners=(0, 2, 1),
+    ),
     hidden=8,
     blocks=1,
 )
 """A root with a joint on either side."""
+
+MIRRORED = torch.tensor((0, 1, 2, 3, 4, 5, 9, 10, 11, 6, 7, 8))
+SIGNS = torch.tensor((1.0, -1.0, -1.0, 1.0, 1.0, -1.0) + (1.0, -1.0, -1.0) * 2)
+"""What mirrors its frames."""
 
 
 def stirred_figure() -> FigurePredictor:
@@ -249,23 +258,43 @@ def stirred_figure() -> FigurePredictor:
 def test_before_training_a_figure_stands_still() -> None:
     frames = torch.randn(3, 10, 12)
     after = FigurePredictor(SIDES).eval()(frames)
-    assert after[..., :3].abs().max() == 0
-    torch.testing.assert_close(after[..., 3:], frames[:, -1:, 3:].expand(-1, 25, -1))
+    torch.testing.assert_close(after[..., :3], torch.zeros(3, 25, 3), atol=2e-5, rtol=0)
+    torch.testing.assert_close(after[..., 3:], frames[:, -1:, 3:].expand(-1, 25, -1), atol=1e-5, rtol=1e-5)
 
 
 def test_a_figures_mirror_image_goes_on_as_its_mirror_image() -> None:
     net = stirred_figure()
-    frames = torch.randn(4, 10, 12)
-    torch.testing.assert_close(net(net.mirror(frames)), net.mirror(net(frames)))
+    frames = 0.3 * torch.randn(4, 10, 12)
+    mirrored = net(frames[..., MIRRORED] * SIGNS)
+    torch.testing.assert_close(mirrored, net(frames)[..., MIRRORED] * SIGNS, atol=1e-4, rtol=1e-4)
 
 
-def test_a_figures_frames_add_up_to_its_steps() -> None:
-    net = stirred_figure()
-    last = torch.randn(4, 1, 12)
-    changes = torch.randn(4, 25, 12)
-    frames = net.frames_after(last, changes)
-    steps = net.steps_to(frames, last)
-    torch.testing.assert_close(steps[..., :3], changes[..., :3].cumsum(1), atol=1e-4, rtol=1e-4)
-    torch.testing.assert_close(steps[..., 3:], changes[..., 3:])
-    # where the root is after all of them, seen from the last frame
-    torch.testing.assert_close(steps[..., :2], net.places(frames)[:, :, 0, [2, 0]], atol=1e-5, rtol=1e-5)
+def test_bones_keep_their_lengths_and_are_aimed_at_their_points() -> None:
+    chain = VectorFigure(
+        (-1, 0, 1, 2),
+        ((0, 1, 0), (0, 0.3, 0), (0, 0.4, 0), (0.2, 0, 0)),
+        (0, 1, 2),
+        tuple(range(6, 12)),
+        tuple(range(6)),
+    )
+    points = VectorPoints(chain)
+    frames = 0.5 * torch.randn(2, 12, 12)
+    shaken = points(frames, 4)[:, 5:] + 0.1 * torch.randn(2, 7, 7, 3)
+    found = points(torch.cat([frames[:, :5], points.frames(shaken, frames[:, 4:5])], dim=1), 4)[:, 5:]
+    torch.testing.assert_close(found[:, :, 0], shaken[:, :, 0], atol=1e-5, rtol=1e-5)
+    for joint, length in ((1, 0.3), (2, 0.4), (3, 0.2)):
+        bone = found[:, :, joint] - found[:, :, joint - 1]
+        torch.testing.assert_close(bone.norm(dim=-1), torch.full((2, 7), length), atol=1e-5, rtol=0)
+        aim = shaken[:, :, joint] - found[:, :, joint - 1]
+        torch.testing.assert_close(torch.cosine_similarity(bone, aim, dim=-1), torch.ones(2, 7), atol=1e-5, rtol=0)
+
+
+def test_rotation_vectors_are_those_of_matrices() -> None:
+    vectors = torch.randn(3, 500, dtype=torch.float64)
+    vectors = vectors / vectors.norm(dim=0)
+    # all angles up to half a turn, and those near its ends
+    angles = torch.cat([torch.linspace(0, np.pi, 480), np.pi - torch.logspace(-6, -2, 20)]).double()
+    expected = vectors * angles
+    found = rotmat_to_rotvec(rotvec_to_rotmat(expected.float()))
+    torch.testing.assert_close(rotvec_to_rotmat(found), rotvec_to_rotmat(expected.float()), atol=2e-3, rtol=0)
+    torch.testing.assert_close(found[:, :470], expected[:, :470].float(), atol=1e-4, rtol=1e-4)

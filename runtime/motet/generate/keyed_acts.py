@@ -128,9 +128,7 @@ class NamedAct:
         return all(key.numbers.keys() <= small and not key.hands for key in self.act.keys)
 
     def with_hand(self, side: str) -> "NamedAct":
-        """The act done with the hand of a side; a word that it leaves out where it is not an act of either hand."""
-        if not self.act.mirrored:
-            return replace(self, lacking=(*self.lacking, side))
+        """The act, one of either hand, done with the hand of a side."""
         keys = mirrored_keys(self.act.keys) if side == "left" else self.act.keys
         return replace(self, act=replace(self.act, keys=keys, mirrored=False))
 

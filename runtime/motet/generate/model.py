@@ -270,7 +270,8 @@ class CodesModel(GenerateModel):
         """The act of a sentence that does not say how long it lasts: :meth:`_keyed_act`."""
         if hand := HAND.search(sentence):
             act = self._keyed_usual(HAND.sub("", sentence, count=1))
-            return act.with_hand(hand[1]) if act and not act.is_other_text else None
+            if act and act.act.mirrored:
+                return act.with_hand(hand[1])
         words = self.vocabulary.rules.words(sentence)
         act = self._keyed_counted(sentence) or act_named(words)
         if act is None:

@@ -1,67 +1,55 @@
-"""A predictor of figures: where the joints were, to how the figure moves on.
+"""A predictor of figures: where points of a figure were, to where they will be, and from there to its frames.
 
-It sees the places of the joints in all seed frames, from above the last frame's ground and in its facing, and the last
-frames' channels. A residual MLP on that gives all predicted frames at once: for each channel a step from the last
-frame, and for the root's path where it is and faces. A linear map of each channel's own past is added, which sets the
-first frames. The answer is the mean of that for the seed and of that for its mirror image.
+A residual MLP sees the joints and a marker of each bone in all seed frames, from above the last frame's ground and in
+its facing, and gives their steps from the last frame as weights of a few cosines of time. The answer is the mean of
+that for the seed and of that for its mirror image, with each bone at its length and aimed at the point of its child.
+(Rotations along chains of bones, learnt in place of points, are predicted worse: docs/results/predict.md.)
 
-Letters in shapes: B rows, L seed frames, C channels of the contract, D numbers that the MLP sees, J joints, N predicted
-frames, H hidden units, S signs of errors.
+Letters in shapes: B rows, L seed frames, C channels of the contract, P points, N predicted frames, H hidden units, W
+cosines, S signs of errors.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
-from motet_train.models.kinematics import VectorFigure, VectorPlaces
-from motet_train.models.net import Graphs, Part, float_rows, gelu, normalised, zero_linear
-from motet_train.models.predictor import Block, MirroredPredictor, step_graph
+from motet_train.models.kinematics import VectorFigure, VectorPoints
+from motet_train.models.net import Graphs, Net, Part, constants, float_rows, zero_linear
+from motet_train.models.predictor import Block, step_graph
 
-ERROR_FLOOR = 1e-3
-"""Added to a sign of an error before its logarithm, in units of usual first steps."""
-
-VELOCITIES = 3
-"""The first channels: how far the root goes forward and to the left, and how far it turns, a second."""
-
-RECENT = 3
-"""Last seed frames whose channels are seen, besides the places of all."""
-
-LARGEST_STEP = 4.0
-"""A step between seed frames counts for the linear maps up to so many times a usual one."""
+ERROR_FLOOR = 1e-4
+"""Metres added to a sign of an error before its logarithm."""
 
 LARGEST_INPUT = 100.0
 """Numbers of frames further from 0, in metres, radians, and these a second, are no motion, and count as this."""
+
+PLACE_SCALE = 3.0
+"""Factor on metres, so that inputs and outputs are of the order of 1."""
+
+STEP_SCALE = 20.0
+"""Factor on metres a frame, likewise."""
 
 
 @dataclass(frozen=True)
 class FigurePredictorConfig:
     """The figure, and sizes of the net. figure: see :class:`motet_train.models.kinematics.VectorFigure`.
 
-    channels: C, those of the root block first. mirrored, signs: channel c of a mirrored frame is channel
-    ``mirrored[c]`` times ``signs[c]``; empty where left and right are not known. doubts: whether the net has an
-    :class:`ErrorHead`, which needs the mirror image.
+    channels: C. waves: W. doubts: whether the net has an :class:`ErrorHead`, which needs the mirror image.
     """
 
     channels: int
     figure: VectorFigure = field(default_factory=VectorFigure)
-    mirrored: tuple[int, ...] = ()
-    signs: tuple[float, ...] = ()
     seed_frames: int = 10
     frames: int = 25
+    waves: int = 8
     hidden: int = 512
     blocks: int = 3
-    dropout: float = 0.3
-    unseen: float = 0.1
+    dropout: float = 0.1
+    unseen: float = 0.05
     doubts: bool = False
-
-    @property
-    def seen(self) -> int:
-        """D: places of joints, channels of the last frame, and how these changed last."""
-        places = 3 * len(self.figure.parents) * self.seed_frames
-        return places + self.channels + (RECENT - 1) * (self.channels - VELOCITIES)
 
 
 def possible(frames: Tensor) -> Tensor:
@@ -73,9 +61,9 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     """Logarithms (B, N, S) of what an error is judged by: how fast and how unevenly the figure moves, how far the net
     takes it and on what way, and how much its answers so far differ from those to the mirrored question.
 
-    All in units of the first predicted frame's usual steps. past: (B, L - 1, C), the steps between seed frames. steps:
-    (B, N, C) predicted, from the last frame. disagreement: (B, N), how far the steps are from those predicted for the
-    mirrored seed and mirrored back.
+    All in metres. past: (B, L - 1, P, 3), the steps of points between seed frames. steps: (B, N, P, 3) predicted, from
+    the last frame. disagreement: (B, N), how far the points are from those predicted for the mirrored seed and mirrored
+    back.
     """
     # how the figure moves before, and how it is predicted to
     shared = [size(past[:, -1]), size(past).mean(1), size(past.diff(dim=1)[:, -2:]).mean(1)]
@@ -85,9 +73,10 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1) + ERROR_FLOOR)
 
 
-def size(values: Tensor) -> Tensor:
-    """The root mean square (...) over the channels of (..., C)."""
-    return (values.square().mean(-1) + 1e-12).sqrt()
+def size(points: Tensor) -> Tensor:
+    """The root mean square (...) over the numbers of points (..., P, 3)."""
+    root_mean: Tensor = (points.square().mean((-2, -1)) + 1e-12).sqrt()
+    return root_mean
 
 
 class ErrorHead(nn.Module):
@@ -143,114 +132,76 @@ def _likeliest_law(signs: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
     return fitted[:, :-1], fitted[:, -1]
 
 
-class FigurePredictor(MirroredPredictor):
+class FigurePredictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
-    mean, scale: (D,) of what is seen. reach: (N, C), how large true steps are. alone: (L - 1, C, N), the
-    linear maps. doubt: the error head.
+    cosines: (N, W), what steps are made of. doubt: the error head.
     """
 
     CONFIG = FigurePredictorConfig
-    reach: Tensor
+    cosines: Tensor
     doubt: ErrorHead | None
 
     def __init__(self, config: FigurePredictorConfig) -> None:
-        super().__init__(config.channels, config.seen, config.mirrored, config.signs)
+        super().__init__(config.channels)
         self.config = config
-        self.places = VectorPlaces(config.figure)
-        self.register_buffer("reach", torch.ones(config.frames, config.channels))
-        # the MLP, and the linear map of each channel alone
+        self.points = VectorPoints(config.figure)
+        numbers = 3 * len(self.points.parents)
         self.unseen = nn.Dropout(config.unseen)
-        self.inward = nn.Linear(config.seen, config.hidden)
+        self.inward = nn.Linear(numbers * config.seed_frames, config.hidden)
         self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
-        self.norm = nn.LayerNorm(config.hidden)
-        self.outward = zero_linear(config.hidden, config.frames * config.channels)
-        self.alone = nn.Parameter(torch.zeros(config.seed_frames - 1, config.channels, config.frames))
+        self.outward = zero_linear(config.hidden, numbers * config.waves)
         self.doubt = ErrorHead(config.frames) if config.doubts else None
 
+        # steps grow with time, so that those of early frames are small
+        time = torch.arange(config.frames)[:, None]
+        waves = torch.cos(math.pi / config.frames * (time + 0.5) * torch.arange(config.waves))
+        constants(self, cosines=waves * (time + 1) * (3 / config.frames / PLACE_SCALE))
+
     def seen(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) as the numbers (B, D) that are seen of them."""
-        frames = possible(frames)
-        # where the joints are at the end, and how they came there
-        places = self.places.from_last(frames).flatten(2)
-        parts = [places[:, -1], places.diff(dim=1).flatten(1)]
-        # turns about a bone's own axis move no joint: the channels tell them
-        parts += [frames[:, -1], frames[:, -RECENT:, VELOCITIES:].diff(dim=1).flatten(1)]
-        return torch.cat(parts, dim=1)
+        """Frames (B, L, C) as points (B, L, P, 3), seen from the last one."""
+        seen: Tensor = self.points(possible(frames), frames.shape[1] - 1)
+        return seen
 
-    def changes(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to changes (B, N, C), by themselves, without the mirror image: of the root forward, to the
-        left and in its turn since the frame before, in metres and radians, and of all other channels since the last
-        frame."""
-        seen = normalised(self.seen(frames), self.mean, self.scale)
-        hidden = gelu(self.norm(self.blocks(self.inward(self.unseen(seen)))))
-        together = functional.linear(hidden, self._of_changes(self.outward.weight), self._of_changes(self.outward.bias))
+    def points_after(self, seen: Tensor) -> Tensor:
+        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), by themselves: this is trained."""
+        last = seen[:, -1:]
+        inputs = torch.cat([PLACE_SCALE * last.flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
+        hidden: Tensor = self.blocks(self.inward(self.unseen(inputs)))
+        weights = torch.unflatten(self.outward(hidden), 1, (self.config.waves, -1))
+        steps = torch.unflatten(self.cosines @ weights, 2, (-1, 3))
+        moved: Tensor = last + steps
+        return moved
 
-        # each channel by its own past
-        usual = self._past(possible(frames)).clamp(-LARGEST_STEP, LARGEST_STEP)
-        alone = self._of_changes(self.alone.permute(2, 1, 0).flatten(0, 1))
-        by_itself = torch.einsum("blc,ncl->bnc", usual, torch.unflatten(alone, 0, self.reach.shape))
-        changes: Tensor = torch.unflatten(together, 1, self.reach.shape) + by_itself
-        return changes
-
-    def _of_changes(self, weight: Tensor) -> Tensor:
-        """Weights (N C, ...) of steps from the last frame, in units of ``reach``, as those of changes.
-
-        The difference is made here: between steps of a metre it would magnify their last bits.
-        """
-        by_step = torch.unflatten(weight, 0, self.reach.shape)
-        by_step = by_step * self.reach.reshape(*self.reach.shape, *[1] * (by_step.dim() - 2))
-        root = by_step[:, :VELOCITIES]
-        root = torch.cat([root[:1], root.diff(dim=0)])
-        return torch.cat([root, by_step[:, VELOCITIES:]], dim=1).flatten(0, 1)
-
-    def _past(self, frames: Tensor) -> Tensor:
-        """The steps (B, L - 1, C) between frames (B, L, C), in units of the first predicted frame's usual steps."""
-        velocities = frames[:, 1:, :VELOCITIES] / self.config.figure.fps
-        return torch.cat([velocities, frames[..., VELOCITIES:].diff(dim=1)], dim=-1) / self.reach[0]
-
-    def steps_to(self, truth: Tensor, last: Tensor) -> Tensor:
-        """The steps (B, N, C) from the last frames (B, 1, C) to frames (B, N, C): where the root is forward and to the
-        left, in metres, and how far it has turned, in radians, in place of its velocities; and changes of the rest."""
-        facing, path = self.places.path(truth)
-        root = torch.stack([path[..., 2], path[..., 0], facing], dim=-1)
-        return torch.cat([root, (truth - last)[..., VELOCITIES:]], dim=-1)
-
-    def frames_after(self, last: Tensor, changes: Tensor) -> Tensor:
-        """The frames (B, N, C) to which changes (B, N, C) lead from the last frames (B, 1, C)."""
-        # the root moves as it faced in the frame before
-        z, x, turn = changes[..., :VELOCITIES].unbind(-1)
-        before = turn.cumsum(1) - turn
-        sin = before.sin()
-        cos = before.cos()
-        velocities = torch.stack([x * sin + z * cos, x * cos - z * sin, turn], dim=-1) * self.config.figure.fps
-        return torch.cat([velocities, (last + changes)[..., VELOCITIES:]], dim=-1)
-
-    def plain(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the next (B, N, C), by themselves: what is trained."""
-        return self.frames_after(frames[:, -1:], self.changes(frames))
+    def points_on_both_sides(self, seen: Tensor) -> tuple[Tensor, Tensor]:
+        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), the mean of those for them and for their mirror
+        image; and how far (B, N) these are apart, in metres."""
+        if not self.config.figure.partners:
+            alone = self.points_after(seen)
+            return alone, torch.zeros_like(alone[..., 0, 0])
+        # rows and their mirror images in one batch, side by side
+        both = torch.stack([seen, self.points.mirror(seen)], dim=1).flatten(0, 1)
+        after = torch.unflatten(self.points_after(both), 0, (-1, 2))
+        plain = after[:, 0]
+        mirrored = self.points.mirror(after[:, 1])
+        return (plain + mirrored) / 2, size((plain - mirrored) / 2)
 
     def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them."""
-        changes, mirrored = self.on_both_sides(self.changes, frames)
-        apart = changes - mirrored
-        apart = torch.cat([apart[..., :VELOCITIES].cumsum(1), apart[..., VELOCITIES:]], dim=-1)
-        return self.frames_after(frames[:, -1:], (changes + mirrored) / 2), size(apart / 2 / self.reach)
+        points, apart = self.points_on_both_sides(self.seen(frames))
+        return self.points.frames(points, frames[:, -1:]), apart
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the next (B, N, C): by the mean of the changes for them and for their mirror image."""
-        return self.with_disagreement(frames)[0] if self.config.mirrored else self.plain(frames)
-
-    def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
-        """The signs (B, N, S) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
-        seed = possible(frames)
-        steps = self.steps_to(possible(trajectory), seed[:, -1:]) / self.reach[0]
-        return error_signs(self._past(seed), steps, disagreement)
+        """Frames (B, L, C) to the next (B, N, C)."""
+        return self.with_disagreement(frames)[0]
 
     def expected_error(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
-        """What :meth:`error_signs` takes to the expected error (B, N) in metres."""
+        """The expected error (B, N) in metres, from frames (B, L, C) and what :meth:`with_disagreement` gives."""
         assert self.doubt is not None
-        expected: Tensor = self.doubt(self.error_signs(frames, trajectory, disagreement))
+        count = self.config.seed_frames
+        points = self.points(possible(torch.cat([frames, trajectory], dim=1)), count - 1)
+        past = points[:, :count]
+        expected: Tensor = self.doubt(error_signs(past.diff(dim=1), points[:, count:] - past[:, -1:], disagreement))
         return expected
 
     def graphs(self) -> Graphs:

@@ -13,7 +13,7 @@ from torch.nn import functional
 
 from motet.figures.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton
+from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton, partners_of
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS
 from motet.representation.root_sixd import SIXD_KINDS
@@ -139,7 +139,8 @@ class VectorFigure:
     parents: index of each joint's parent, -1 for the root. offsets: (x, y, z) from the parent in metres. bones: the
     joints that have exponential maps or children, the root first. vectors: the channels of the maps of all bones but
     the root, three each; D where there is none and the bone turns with its parent. root: the channels of the root
-    block. fps: frames per second.
+    block. fps: frames per second. partners: for each joint that on the other side, or itself; none where sides are not
+    known.
     """
 
     parents: tuple[int, ...] = ()
@@ -148,6 +149,7 @@ class VectorFigure:
     vectors: tuple[int, ...] = ()
     root: tuple[int, ...] = ()
     fps: float = 30.0
+    partners: tuple[int, ...] = ()
 
 
 def vector_figure_of(contract: MotionContract) -> VectorFigure:
@@ -169,59 +171,98 @@ def vector_figure_of(contract: MotionContract) -> VectorFigure:
         tuple(vectors),
         tuple(_columns(contract, ROOT_BLOCK)),
         contract.fps,
+        partners_of(contract.skeleton.names),
     )
 
 
-class VectorPlaces(nn.Module):
-    """Places of the joints of a figure in ``root_vectors``."""
+MARKER = 0.1
+"""Metres from a bone's joint to its marker."""
+
+UP = (0.0, MARKER, 0.0)
+AHEAD = (0.0, 0.0, MARKER)
+"""Where markers are, in the axes of their bones."""
+
+
+class VectorPoints(nn.Module):
+    """Points that tell how a figure in ``root_vectors`` stands: P in all, the J joints, then for each bone a marker
+    that shows how it is turned about itself, and a tip for a bone without a child to aim at.
+
+    A bone is aimed at its first child, one in the middle if the bone is, or at its tip. Its rotation follows from that
+    and from its marker.
+    """
 
     offsets: Tensor
+    rest: Tensor
     ground: Tensor
+    sides: Tensor
+    plane: Tensor
 
     def __init__(self, figure: VectorFigure) -> None:
         super().__init__()
         self.figure = figure
-        constants(self, offsets=torch.tensor(figure.offsets), ground=torch.tensor([1.0, 0.0, 1.0]))
+        parents = list(figure.parents)
+        offsets = list(figure.offsets)
+        partners = list(figure.partners or range(len(parents)))
+        self.joints = len(parents)
+
+        # a marker for each bone, across the way to its child, and a tip where it has none
+        self.aims = [_aim(bone, parents, partners) for bone in figure.bones]
+        self.markers: list[int] = []
+        for bone, aim in zip(figure.bones, self.aims, strict=True):
+            self.markers.append(len(parents))
+            parents.append(bone)
+            x, y, z = figure.offsets[aim] if aim >= 0 else UP
+            offsets.append(UP if abs(z) > max(abs(x), abs(y)) else AHEAD)
+        for row, bone in enumerate(figure.bones):
+            if self.aims[row] < 0:
+                self.aims[row] = len(parents)
+                parents.append(bone)
+                offsets.append(UP)
+
+        # those of the other side: of a bone's points those of its partner
+        others = [figure.bones.index(partners[bone]) for bone in figure.bones]
+        partners += [self.markers[other] for other in others]
+        partners += [self.aims[other] for aim, other in zip(self.aims, others, strict=True) if aim >= self.joints]
+        self.parents = tuple(parents)
+        self.partners = partners
+        in_rest = torch.tensor(offsets)
+        aimed = torch.cat([in_rest[self.aims].T, in_rest[self.markers].T])
+        constants(
+            self,
+            offsets=in_rest,
+            rest=axes_to_rotmat(aimed).transpose(0, 1)[..., None],
+            ground=torch.tensor([1.0, 0.0, 1.0]),
+            plane=torch.tensor([-1.0, 1.0, 1.0]),
+        )
         self.root = list(figure.root)
         self.vectors = list(figure.vectors)
 
-    def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, T, D) in the contract's units to places (B, T, J, 3) in metres, in the world.
+    def mirror(self, points: Tensor) -> Tensor:
+        """Points (..., P, 3) with left and right exchanged."""
+        return _at(points, self.partners, dim=-2) * self.plane
 
-        The origin is on the ground below the root in the frame before the first, and the figure faces z there.
+    def forward(self, frames: Tensor, last: int) -> Tensor:
+        """Frames (B, T, D) in the contract's units to points (B, T, P, 3) in metres.
+
+        The origin is on the ground below the root in frame ``last``, and the figure faces z there.
         """
         root = frames[..., self.root]
-        facing = self._facing(root)
-        return self._joints(frames, facing) + self._path(root, facing)[..., None, :]
-
-    def from_last(self, frames: Tensor) -> Tensor:
-        """As :meth:`forward`, but the origin and the facing are those of the last frame."""
-        root = frames[..., self.root]
-        facing = self._facing(root)
-        facing = facing - facing[:, -1:]
+        facing = root[..., 2].cumsum(1) / self.figure.fps
+        facing = facing - facing[:, last, None]
         path = self._path(root, facing)
-        path = path - self.ground * path[:, -1:]
-        return self._joints(frames, facing) + path[..., None, :]
+        path = path - self.ground * path[:, last, None]
+        return self._points(frames, facing) + path[..., None, :]
 
-    def path(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """The root's facing (B, T) and place (B, T, 3), from where :meth:`forward` sees it."""
-        root = frames[..., self.root]
-        facing = self._facing(root)
-        return facing, self._path(root, facing)
-
-    def _facing(self, root: Tensor) -> Tensor:
-        return root[..., 2].cumsum(1) / self.figure.fps
-
-    def _joints(self, frames: Tensor, facing: Tensor) -> Tensor:
-        """Places (B, T, J, 3) around the root, by its rotation and those of all other bones."""
+    def _points(self, frames: Tensor, facing: Tensor) -> Tensor:
+        """Points (B, T, P, 3) around the root, by its rotation and those of all other bones."""
         root = frames[..., self.root]
         turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
         # bones without a map turn with their parents: they see a column of zeros
         bones = self.figure.bones
         vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(bones) - 1, 3)
         local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
-        joints = forward_kinematics(self.figure.parents, self.offsets, local, bones)
-        return joints.reshape(*frames.shape[:-1], -1, 3)
+        points = forward_kinematics(self.parents, self.offsets, local, bones)
+        return points.reshape(*frames.shape[:-1], -1, 3)
 
     def _path(self, root: Tensor, facing: Tensor) -> Tensor:
         """Places (B, T, 3) of the root by its channels (B, T, 6): it goes where it faced in the frame before."""
@@ -232,6 +273,79 @@ class VectorPlaces(nn.Module):
         x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / fps
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / fps
         return torch.stack([x, root[..., 3], z], dim=-1)
+
+    def frames(self, points: Tensor, last: Tensor) -> Tensor:
+        """Points (B, N, P, 3), seen from the frame before them, to frames (B, N, D) that are as near as bones allow.
+
+        last: (B, 1, D) that frame, whose other channels stay.
+        """
+        count = points.shape[1]
+        rotations = self._aimed(points.flatten(0, 1).permute(2, 1, 0))
+        root = self._root(points[:, :, 0], torch.unflatten(rotations[:, :, 0], -1, (-1, count)))
+
+        # rotations of the bones seen from their parents
+        parents = _places_in(self.figure.bones, [self.figure.parents[bone] for bone in self.figure.bones[1:]])
+        local = product(_at(rotations, parents).transpose(0, 1), rotations[:, :, 1:])
+        vectors = torch.unflatten(rotmat_to_rotvec(local).permute(2, 1, 0).flatten(1), 0, (-1, count))
+
+        # each channel from the root block, the maps or the last frame
+        values = torch.cat([root, vectors, last.expand(-1, count, -1)], dim=-1)
+        known = [*self.root, *self.vectors]
+        columns = range(last.shape[-1])
+        return _at(values, [known.index(n) if n in known else len(known) + n for n in columns], dim=-1)
+
+    def _aimed(self, points: Tensor) -> Tensor:
+        """Rotations (3, 3, K, n) in the world of the bones of points (3, P, n), from the root outwards: each bone is
+        aimed from where it is at the point of its child."""
+        bones = self.figure.bones
+        level = [0]
+        places = points[:, :1]
+        order: list[int] = []
+        rotations: list[Tensor] = []
+        while inner := [joint for joint in level if joint in bones]:
+            # the bones of this depth, their rotations
+            rows = _places_in(bones, inner)
+            starts = _at(places, _places_in(level, inner), dim=1)
+            aims = _at(points, [self.aims[row] for row in rows], dim=1) - starts
+            across = _at(points, [self.markers[row] for row in rows], dim=1) - _at(points, inner, dim=1)
+            turned = product(axes_to_rotmat(torch.cat([aims, across])), _at(self.rest, rows))
+            order += rows
+            rotations.append(turned)
+
+            # and where their children are
+            level = [joint for joint in range(self.joints) if self.parents[joint] in inner]
+            rows = [inner.index(self.parents[joint]) for joint in level]
+            if level:
+                offsets = self.offsets[level].T[:, None, :, None]
+                places = _at(starts, rows, dim=1) + product(_at(turned, rows), offsets)[:, 0]
+        return _at(torch.cat(rotations, dim=2), _places_in(order, range(len(bones))))
+
+    def _root(self, places: Tensor, rotations: Tensor) -> Tensor:
+        """The root block (B, N, 6) by places (B, N, 3) and rotations (3, 3, B, N) of the root."""
+        fps = self.figure.fps
+        pitch = torch.asin((-rotations[1, 2]).clamp(-1, 1))
+        roll = torch.atan2(rotations[1, 0], rotations[1, 1])
+        # how far it turns since the frame before, at first since it faced z
+        sin, cos = functional.normalize(torch.stack([rotations[0, 2], rotations[2, 2]]), dim=0, eps=1e-6)
+        sin_before = functional.pad(sin[:, :-1], (1, 0))
+        cos_before = functional.pad(cos[:, :-1], (1, 0), value=1.0)
+        turn = torch.atan2(sin * cos_before - cos * sin_before, cos * cos_before + sin * sin_before)
+        # and goes, as it faced then
+        x, y, z = places.unbind(-1)
+        x = x - functional.pad(x[:, :-1], (1, 0))
+        z = z - functional.pad(z[:, :-1], (1, 0))
+        forward = x * sin_before + z * cos_before
+        left = x * cos_before - z * sin_before
+        return torch.stack([forward * fps, left * fps, turn * fps, y, pitch, roll], dim=-1)
+
+
+def _aim(bone: int, parents: Sequence[int], partners: Sequence[int]) -> int:
+    """The child that a bone is aimed at; -1 where there is none."""
+    for joint, parent in enumerate(parents):
+        in_the_middle = partners[joint] == joint
+        if parent == bone and (in_the_middle or partners[bone] != bone):
+            return joint
+    return -1
 
 
 def _turn(angle: Tensor, axis: int) -> Tensor:
@@ -259,6 +373,27 @@ def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
     cross = torch.unflatten(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]), 0, (3, 3))
     eye = torch.eye(3, dtype=vectors.dtype, device=vectors.device).reshape(3, 3, *[1] * angle.dim())
     return eye + angle.sin() / angle * cross + (1 - angle.cos()) / squared * product(cross, cross)
+
+
+def rotmat_to_rotvec(rotations: Tensor) -> Tensor:
+    """Matrices (3, 3, ...) to rotation vectors (3, ...) of at most half a turn."""
+    trace = rotations[0, 0] + rotations[1, 1] + rotations[2, 2]
+    # twice the sine times the axis
+    swept = torch.stack(
+        [rotations[2, 1] - rotations[1, 2], rotations[0, 2] - rotations[2, 0], rotations[1, 0] - rotations[0, 1]]
+    )
+    # near half a turn the sine vanishes: there the axis is a column of R + R^T + (1 - trace) E, which is 4 q q^T
+    squares = rotations + rotations.transpose(0, 1)
+    diagonal = torch.stack([rotations[0, 0], rotations[1, 1], rotations[2, 2]])
+    largest = diagonal.argmax(0)
+    eye = torch.eye(3, device=rotations.device).reshape(3, 3, *[1] * (rotations.dim() - 2))
+    columns = squares + (1 - trace) * eye
+    column = torch.where(largest == 0, columns[0], torch.where(largest == 1, columns[1], columns[2]))
+    column = column * torch.where((column * swept).sum(0) < 0, -1.0, 1.0)
+    axis = torch.where(trace < -0.9, column, swept)
+    angle = torch.atan2(swept.square().sum(0).sqrt(), trace - 1)
+    length = axis.square().sum(0).clamp_min(1e-20).sqrt()
+    return axis / length * angle
 
 
 @dataclass(frozen=True)

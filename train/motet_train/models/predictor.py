@@ -9,8 +9,6 @@ Letters in shapes: B rows, L seed frames, C channels of the contract, D of them 
 predicted, K output polynomials, P functions of the past, N predicted frames, H hidden units.
 """
 
-from abc import abstractmethod
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -58,36 +56,6 @@ class Block(nn.Module):
         """(B, H) to (B, H)."""
         out: Tensor = x + self.layers(x)
         return out
-
-
-class MirroredPredictor(Net):
-    """A net that predicts frames from seed frames (B, L, C), and the same for their mirror image."""
-
-    mirrored: Tensor
-    signs: Tensor
-
-    def __init__(self, channels: int, seen: int, mirrored: Sequence[int], signs: Sequence[float]) -> None:
-        super().__init__(seen)
-        constants(
-            self,
-            mirrored=torch.tensor(mirrored or range(channels)),
-            signs=torch.tensor(signs or [1.0] * channels),
-        )
-
-    @abstractmethod
-    def plain(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the next (B, N, C), without the mirror image: what is trained."""
-
-    def mirror(self, frames: Tensor) -> Tensor:
-        """Frames (B, T, C) with left and right exchanged."""
-        return frames[..., self.mirrored] * self.signs
-
-    def on_both_sides(self, predict: Callable[[Tensor], Tensor], frames: Tensor) -> tuple[Tensor, Tensor]:
-        """What ``predict`` makes of frames (B, L, C), and of their mirror image, mirrored back: (B, N, C) each."""
-        # rows and their mirror images in one batch, side by side
-        predicted = predict(torch.stack([frames, self.mirror(frames)], dim=1).flatten(0, 1))
-        both = torch.unflatten(predicted, 0, (-1, 2))
-        return both[:, 0], self.mirror(both[:, 1])
 
 
 class Trajectory(nn.Module):
@@ -141,7 +109,7 @@ def polynomials(points: Tensor, count: int) -> Tensor:
     return basis
 
 
-class Predictor(MirroredPredictor):
+class Predictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
     mean, scale: (D,) of the kept channels; a held channel is seen as its difference to the last frame over its scale.
@@ -152,9 +120,11 @@ class Predictor(MirroredPredictor):
     kept: Tensor
     relative: Tensor
     placing: Tensor
+    mirrored: Tensor
+    signs: Tensor
 
     def __init__(self, config: PredictorConfig) -> None:
-        super().__init__(config.channels, len(config.kept), config.mirrored, config.signs)
+        super().__init__(len(config.kept))
         self.config = config
         self.trajectory = Trajectory(config)
         kept = list(config.kept)
@@ -163,7 +133,13 @@ class Predictor(MirroredPredictor):
             kept=torch.tensor(kept),
             relative=(torch.arange(len(kept)) < config.held).float(),
             placing=torch.eye(config.channels)[kept[config.held :]],
+            mirrored=torch.tensor(config.mirrored or range(config.channels)),
+            signs=torch.tensor(config.signs or [1.0] * config.channels),
         )
+
+    def mirror(self, frames: Tensor) -> Tensor:
+        """Frames (B, T, C) with left and right exchanged."""
+        return frames[..., self.mirrored] * self.signs
 
     def plain(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the next (B, N, C), without the mirror image: what is trained."""
@@ -180,8 +156,11 @@ class Predictor(MirroredPredictor):
         """Frames (B, L, C) to the next (B, N, C): the mean of those for them and for their mirror image."""
         if not self.config.mirrored:
             return self.plain(frames)
-        plain, mirrored = self.on_both_sides(self.plain, frames)
-        return (plain + mirrored) / 2
+        # rows and their mirror images in one batch, side by side
+        both = torch.stack([frames, self.mirror(frames)], dim=1).flatten(0, 1)
+        predicted = torch.unflatten(self.plain(both), 0, (-1, 2))
+        mean: Tensor = (predicted[:, 0] + self.mirror(predicted[:, 1])) / 2
+        return mean
 
     def graphs(self) -> Graphs:
         """The encoder and the step, each with its contract."""

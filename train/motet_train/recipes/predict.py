@@ -2,14 +2,14 @@
 
 from dataclasses import asdict, replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import GradientLearner, Term, Terms
-from motet_train.models.figure_predictor import VELOCITIES, FigurePredictor, FigurePredictorConfig
+from motet_train.models.figure_predictor import FigurePredictor, FigurePredictorConfig, error_signs
+from motet_train.models.figure_predictor import possible as possible_frames
 from motet_train.models.kinematics import smooth_length, vector_figure_of
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import ADAMW, AUGMENTED, Job, Recipe, Visits
@@ -35,7 +35,7 @@ FIGURE_RECIPE = Recipe(
     "figure-trajectory",
     "free_run",
     FigurePredictorConfig(0),
-    ("channels", "figure", "mirrored", "signs", "doubts"),
+    ("channels", "figure", "doubts"),
     replace(
         PREDICTOR_TRAINING, steps=3000, every=1000, batch=128, learning_rate=1.5e-3, average=0.995, precision="bfloat16"
     ),
@@ -45,11 +45,8 @@ FIGURE_RECIPE = Recipe(
 
 RECIPES = {"default": DEFAULT, "files": FIGURE_RECIPE}
 
-MEASURED_WINDOWS = 4096
-"""Training windows whose mean and scale are those of a figure's predictor."""
-
-LEAST_SCALE = 1e-4
-"""Added to scales, in metres and radians, so that what hardly varies is not made large."""
+MARKER_WEIGHT = 0.25
+"""Weight of the mean distance of markers in the loss, against that of joints."""
 
 
 def train_predict(material: Material, job: Job) -> Run:
@@ -136,21 +133,18 @@ def _channel_loss(net: Predictor, windows: Tensor, weights: Tensor) -> Terms:
 
 
 def _figure_learner(material: Material, job: Job) -> GradientLearner[FigurePredictor]:
-    """Learns where joints are in windows after their seed, and from held-out windows its expected errors."""
+    """Learns where points of a figure are after the seed of a window, and from held-out windows its expected errors."""
     contract = material.contract
     net = FigurePredictor(
         job.recipe.sized(
             channels=len(contract.channels),
             figure=vector_figure_of(contract),
             doubts=bool(material.mirrored) and len(material.validation) > 0,
-            mirrored=material.mirrored,
-            signs=material.signs,
         )
     )
     config = net.config
     seed = config.seed_frames
     windows = Windows(material, seed + config.frames, **asdict(job.recipe.visits), seed=seed)
-    _measured(net, windows)
     held_out = windows.along(material.validation, 25).to(job.device) if config.doubts else None
     learner = GradientLearner(
         net.to(job.device),
@@ -162,38 +156,31 @@ def _figure_learner(material: Material, job: Job) -> GradientLearner[FigurePredi
     return learner
 
 
-@torch.no_grad()
-def _measured(net: FigurePredictor, windows: Windows) -> None:
-    """Set what a net takes for usual by training windows: mean and scale of what it sees, and sizes of true steps."""
-    drawn = windows.draw(MEASURED_WINDOWS, np.random.default_rng(0))
-    seed = drawn[:, : net.config.seed_frames]
-    seen = net.seen(seed)
-    net.measure_by(seen.mean(0).double().numpy(), (seen.std(0) + LEAST_SCALE).double().numpy())
-    steps = net.steps_to(drawn[:, net.config.seed_frames :], seed[:, -1:])
-    net.reach.copy_(steps.square().mean(0).sqrt() + LEAST_SCALE)
-
-
 def _figure_loss(net: FigurePredictor, windows: Tensor) -> Terms:
-    """The mean distance of joints from their true places, how it changes from frame to frame, and a little of the
-    channels' distance, or turns about bones' own axes would not count."""
-    seed = windows[:, : net.config.seed_frames]
-    truth = windows[:, net.config.seed_frames :]
-    predicted = net.plain(seed)
-    apart = net.places(predicted) - net.places(truth)
-    losses = smooth_length(apart, 1e-8).mean((1, 2)) + smooth_length(apart.diff(dim=1), 1e-8).mean((1, 2))
-    turned = smooth_length((predicted - truth)[..., VELOCITIES:], 1e-6).mean(1)
-    return (Term(losses + 0.01 * turned, len(windows)),)
+    """The mean distance of joints from their true places, how it changes from frame to frame, and the same of markers,
+    which count less, and show how bones turn about themselves."""
+    seed = net.config.seed_frames
+    with torch.autocast(windows.device.type, enabled=False):
+        points = net.points(possible_frames(windows), seed - 1)
+    apart = net.points_after(points[:, :seed]).float() - points[:, seed:]
+    lengths = smooth_length(apart, 1e-8).mean(1) + smooth_length(apart.diff(dim=1), 1e-8).mean(1)
+    joints = net.points.joints
+    losses = lengths[:, :joints].mean(1) + MARKER_WEIGHT * lengths[:, joints:].mean(1)
+    return (Term(losses, len(windows)),)
 
 
 @torch.no_grad()
 def _error_head_fitted(net: FigurePredictor, held_out: Tensor) -> dict[str, float]:
     """Fit a net's expected errors to windows that it was not trained on; their mean joint error in centimetres."""
     net.eval()
-    windows = torch.cat([held_out, net.mirror(held_out)])
-    seed = windows[:, : net.config.seed_frames]
-    truth = windows[:, net.config.seed_frames :]
-    predicted, disagreement = net.with_disagreement(seed)
-    errors = (net.places(predicted) - net.places(truth)).norm(dim=-1).mean(-1)
+    seed = net.config.seed_frames
+    frames = held_out[:, :seed]
+    predicted, disagreement = net.with_disagreement(frames)
+    points = net.points(torch.cat([frames, predicted], dim=1), seed - 1)
+    true_points = net.points(held_out, seed - 1)
+    joints = net.points.joints
+    errors = (points - true_points)[:, seed:, :joints].norm(dim=-1).mean(-1)
+    past = points[:, :seed]
     assert net.doubt is not None
-    net.doubt.fit(net.error_signs(seed, predicted, disagreement), errors)
+    net.doubt.fit(error_signs(past.diff(dim=1), points[:, seed:] - past[:, -1:], disagreement), errors)
     return {"validation": round(100 * float(errors.mean()), 4)}
