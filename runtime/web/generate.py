@@ -45,6 +45,7 @@ MODULES = (
     "motet.generate.continue_codes",
     "motet.generate.memory",
     "motet.generate.model",
+    "motet.generate.reading",
     "motet.models.control",
     "motet.models.describe",
     "motet.models.language",

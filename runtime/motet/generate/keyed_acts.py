@@ -3,6 +3,7 @@ figure that stands, walks, or does anything else."""
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -167,9 +168,11 @@ class Order(NamedTuple):
     stems: frozenset[str]
     particles: frozenset[str]
 
-    def fit(self, words: Sequence[str]) -> tuple[int, int, str, str]:
-        """Rises with how much it says of a sentence's words: in stems, then in words themselves."""
-        return len(self.stems), len(set(words).intersection(self.sentence.split())), self.name, self.sentence
+    def fit(self, words: Sequence[str]) -> tuple[int, int, bool, str, str]:
+        """Rises with how much it says of a sentence's words: in stems, in words, and as often as these."""
+        of_order = self.sentence.split()
+        is_whole = Counter(words) == Counter(of_order)
+        return len(self.stems), len(set(words).intersection(of_order)), is_whole, self.name, self.sentence
 
 
 def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:

@@ -21,8 +21,12 @@ DIRECTION = re.compile(
     r"\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b",
     re.IGNORECASE,
 )
-OTHER_SIDE = re.compile(r"(?:the|your|his|her|their) (left|right)(?: one)?", re.IGNORECASE)
-OBJECT = re.compile(r"\b(?:an?|the) (\w+)", re.IGNORECASE)
+OTHER_SIDE = re.compile(
+    r"(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
+)
+OBJECT = re.compile(
+    r"\b(?:an?|the) (\w+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over)\w+)?)", re.IGNORECASE
+)
 LOW = re.compile(r"\b(?:sit|kneel|lie|lay|crouch|squat|knee)\w*", re.IGNORECASE)
 AROUND = re.compile(r"\b(?:turn\w* (?:a?round|180)|half turn)", re.IGNORECASE)
 ADDRESSEE = re.compile(
@@ -173,7 +177,7 @@ def _after(before: str, part: str) -> str:
     side = OTHER_SIDE.fullmatch(part)
     if side and re.search(r"\b(?:left|right)\b", before):
         return re.sub(r"\b(?:left|right)\b", side[1], before)
-    thing = OBJECT.search(before)
+    thing = OBJECT.search(SUBJECT.sub("", before, count=1))
     if thing and re.match(r"\w+ it\b", part):
         return re.sub(r"\bit\b", f"the {thing[1]}", part, count=1)
     if re.fullmatch(r"stands?", part) and LOW.search(before):

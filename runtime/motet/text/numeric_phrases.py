@@ -37,6 +37,9 @@ UNIT_SPELLINGS: tuple[tuple[Kind, float, str], ...] = (
 )
 """Units of numbers: the kind, its amount in a unit, and the spellings of the unit."""
 
+REPEATED = "jump|hop|clap|nod|kick|punch|jab|squat|bow|stomp|spin|wave"
+"""Acts that may be said as often as they are to be done."""
+
 SPELLED = "|".join([*NUMBER_WORDS, "hundred"])
 MEASURES = "|".join(unit for kind, _, unit in UNIT_SPELLINGS if kind in ("metres", "steps", "seconds"))
 REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] = (
@@ -55,6 +58,7 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (r"\b(?:a )?dozen\b", "12"),
     (r"\btwice\b(?! as\b)", "2 times"),
     (r"\bthrice\b", "3 times"),
+    (rf"\b({REPEATED})(?:[ ,]+\1\b)+", lambda match: f"{match[1]} {len(re.findall(match[1], match[0]))} times"),
     (r"(?<= )x ?(\d+)\b", r"\1 times"),
     (r"(?<!at )\bonce\b(?! more| again)", "1 time"),
     (r"\b(?:a )?single\b", "1"),
@@ -119,7 +123,9 @@ MOVING = re.compile(
 SIDE_PHRASES = re.compile(
     r"\b(?:(left|anti-?clockwise|counter-?clockwise)|(right|clockwise))\b(?! (?:arm|hand|fist|leg|foot|knee|side of))"
 )
-PACE_PHRASES = re.compile(r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly))\b")
+PACE_PHRASES = re.compile(
+    r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly|hastily|hurriedly|swiftly|abruptly))\b"
+)
 SLOWER = 0.75
 FASTER = 1.3
 

@@ -201,10 +201,14 @@ export const memorySettings = {
 
 // motet.generate.model
 export const GENERATE = {
-  FAR_LESS: -100,
-  NEVER: -1000000000,
   STANDING_SECONDS: 0.8,
   STANDS: "a person stands still",
+} as const;
+
+// motet.generate.reading
+export const READING = {
+  FAR_LESS: -100,
+  NEVER: -1000000000,
 } as const;
 
 // motet.models.control

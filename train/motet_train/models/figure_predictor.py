@@ -1,8 +1,8 @@
 """A predictor of figures: where points of a figure were, to where they will be, and from there to its frames.
 
-A residual MLP sees the joints and a marker of each bone in all seed frames, from above the last frame's ground and in
-its facing, and gives their steps from the last frame as weights of a few cosines of time. The answer is the mean of
-that for the seed and of that for its mirror image, with each bone at its length and aimed at the point of its child.
+A few residual MLPs see the joints and a marker of each bone in all seed frames, from above the last frame's ground and
+in its facing, and each gives their steps from the last frame as weights of a few cosines of time. The answer is their
+mean for the seed and for its mirror image, with each bone at its length and aimed at the point of its child.
 (Rotations along chains of bones, learnt in place of points, are predicted worse: docs/results/predict.md.)
 
 Letters in shapes: B rows, L seed frames, C channels of the contract, P points, N predicted frames, H hidden units, W
@@ -37,18 +37,19 @@ STEP_SCALE = 20.0
 class FigurePredictorConfig:
     """The figure, and sizes of the net. figure: see :class:`motet_train.models.kinematics.VectorFigure`.
 
-    channels: C. waves: W. doubts: whether the net has an :class:`ErrorHead`, which needs the mirror image.
+    channels: C. members: MLPs whose answers are averaged. waves: W. doubts: whether the net has an :class:`ErrorHead`,
+    which needs the mirror image.
     """
 
     channels: int
     figure: VectorFigure = field(default_factory=VectorFigure)
     seed_frames: int = 10
     frames: int = 25
+    members: int = 3
     waves: int = 8
-    hidden: int = 512
+    hidden: int = 320
     blocks: int = 3
     dropout: float = 0.1
-    unseen: float = 0.05
     doubts: bool = False
 
 
@@ -132,6 +133,21 @@ def _likeliest_law(signs: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
     return fitted[:, :-1], fitted[:, -1]
 
 
+class Member(nn.Module):
+    """An MLP from D numbers to as many times W weights."""
+
+    def __init__(self, seen: int, weights: int, config: FigurePredictorConfig) -> None:
+        super().__init__()
+        self.inward = nn.Linear(seen, config.hidden)
+        self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
+        self.outward = zero_linear(config.hidden, weights)
+
+    def forward(self, seen: Tensor) -> Tensor:
+        """(B, D) to (B, weights)."""
+        weights: Tensor = self.outward(self.blocks(self.inward(seen)))
+        return weights
+
+
 class FigurePredictor(Net):
     """Seed frames (B, L, C) to the next frames (B, N, C), both in the contract's units.
 
@@ -147,10 +163,8 @@ class FigurePredictor(Net):
         self.config = config
         self.points = VectorPoints(config.figure)
         numbers = 3 * len(self.points.parents)
-        self.unseen = nn.Dropout(config.unseen)
-        self.inward = nn.Linear(numbers * config.seed_frames, config.hidden)
-        self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
-        self.outward = zero_linear(config.hidden, numbers * config.waves)
+        sizes = (numbers * config.seed_frames, numbers * config.waves)
+        self.members = nn.ModuleList(Member(*sizes, config) for _ in range(config.members))
         self.doubt = ErrorHead(config.frames) if config.doubts else None
 
         # steps grow with time, so that those of early frames are small
@@ -163,15 +177,19 @@ class FigurePredictor(Net):
         seen: Tensor = self.points(possible(frames), frames.shape[1] - 1)
         return seen
 
-    def points_after(self, seen: Tensor) -> Tensor:
-        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), by themselves: this is trained."""
+    def each_after(self, seen: Tensor) -> list[Tensor]:
+        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3) by each member: this is trained."""
         last = seen[:, -1:]
         inputs = torch.cat([PLACE_SCALE * last.flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
-        hidden: Tensor = self.blocks(self.inward(self.unseen(inputs)))
-        weights = torch.unflatten(self.outward(hidden), 1, (self.config.waves, -1))
-        steps = torch.unflatten(self.cosines @ weights, 2, (-1, 3))
-        moved: Tensor = last + steps
-        return moved
+        answers = []
+        for member in self.members:
+            weights = torch.unflatten(member(inputs), 1, (self.config.waves, -1))
+            answers.append(last + torch.unflatten(self.cosines @ weights, 2, (-1, 3)))
+        return answers
+
+    def points_after(self, seen: Tensor) -> Tensor:
+        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), without the mirror image."""
+        return torch.stack(self.each_after(seen)).mean(0)
 
     def points_on_both_sides(self, seen: Tensor) -> tuple[Tensor, Tensor]:
         """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), the mean of those for them and for their mirror

@@ -37,9 +37,16 @@ FIGURE_RECIPE = Recipe(
     FigurePredictorConfig(0),
     ("channels", "figure", "doubts"),
     replace(
-        PREDICTOR_TRAINING, steps=3000, every=1000, batch=128, learning_rate=1.5e-3, average=0.995, precision="bfloat16"
+        PREDICTOR_TRAINING,
+        steps=7000,
+        every=1000,
+        batch=128,
+        learning_rate=7e-4,
+        weight_decay=0.001,
+        cosine=False,
+        average=0.998,
     ),
-    AUGMENTED,
+    replace(AUGMENTED, warp=0.0),
 )
 """For motion files of a figure."""
 
@@ -162,10 +169,12 @@ def _figure_loss(net: FigurePredictor, windows: Tensor) -> Terms:
     seed = net.config.seed_frames
     with torch.autocast(windows.device.type, enabled=False):
         points = net.points(possible_frames(windows), seed - 1)
-    apart = net.points_after(points[:, :seed]).float() - points[:, seed:]
-    lengths = smooth_length(apart, 1e-8).mean(1) + smooth_length(apart.diff(dim=1), 1e-8).mean(1)
     joints = net.points.joints
-    losses = lengths[:, :joints].mean(1) + MARKER_WEIGHT * lengths[:, joints:].mean(1)
+    losses = torch.zeros(len(windows), device=windows.device)
+    for answer in net.each_after(points[:, :seed]):
+        apart = answer.float() - points[:, seed:]
+        lengths = smooth_length(apart, 1e-8).mean(1) + smooth_length(apart.diff(dim=1), 1e-8).mean(1)
+        losses = losses + lengths[:, :joints].mean(1) + MARKER_WEIGHT * lengths[:, joints:].mean(1)
     return (Term(losses, len(windows)),)
 
 

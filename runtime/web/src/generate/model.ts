@@ -1,16 +1,13 @@
-import { GENERATE, continuationSettings, familiaritySettings, memorySettings } from "../generated.js";
+import {
+  GENERATE,
+  READING,
+  continuationSettings,
+  familiaritySettings,
+  memorySettings,
+} from "../generated.js";
 import type { Bundle, Manifest } from "../bundle/bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
-import {
-  ADDRESSEE,
-  FUNCTION_WORDS,
-  partsOf,
-  sentencesOf,
-  stem,
-  SUBJECT,
-  THEN,
-  verbsOf,
-} from "../text/clauses.js";
+import { ADDRESSEE, FUNCTION_WORDS, partsOf, sentencesOf, stem, SUBJECT, verbsOf } from "../text/clauses.js";
 import { Commands } from "./commands.js";
 import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
 import { BundleError, DecodingError, TextError } from "../errors.js";
@@ -161,12 +158,11 @@ export class GenerateModel extends LanguageModel {
     return parts.flat();
   }
 
-  /** Whether parts are shown one by one: the likeliest action lacks some, or all are commands and not one together, or one comes after. */
+  /** Whether parts are shown one by one: the likeliest action lacks some, or all are commands and not one together. */
   private async splits(sentence: string, parts: string[]): Promise<boolean> {
     if (await this.lacks(sentence)) return true;
     if (this.commands.act(sentence) !== undefined) return false;
-    const areCommands = parts.map((part) => this.commands.act(part) !== undefined);
-    return areCommands.every(Boolean) || (THEN.test(sentence) && areCommands.some(Boolean));
+    return parts.every((part) => this.commands.act(part) !== undefined);
   }
 
   /** Whether the likeliest action lacks something of a sentence. */
@@ -231,7 +227,7 @@ export class GenerateModel extends LanguageModel {
       );
     const shown = this.shownAs(sentence, context.indexOf(Math.max(...context)), context);
     if (shown.lacking.length) throw new TextError(leftOut(sentence, shown));
-    return context.map((value, action) => (this.lacking(sentence, action).length ? GENERATE.NEVER : value));
+    return context.map((value, action) => (this.lacking(sentence, action).length ? READING.NEVER : value));
   }
 
   /** The same by noise that is given for each motion. */
@@ -332,8 +328,8 @@ export class GenerateModel extends LanguageModel {
       const command = this.commands.action(nearest.join(" "));
       if (this.lacking(text, command).length < lacking.length + doubtful + lacksCommand) act = command;
     }
-    const meant = new Float32Array(this.commands.first + this.commands.acts.length).fill(GENERATE.NEVER);
-    meant.set(act === undefined ? context : context.map((value) => value + GENERATE.FAR_LESS));
+    const meant = new Float32Array(this.commands.first + this.commands.acts.length).fill(READING.NEVER);
+    meant.set(act === undefined ? context : context.map((value) => value + READING.FAR_LESS));
     if (act !== undefined) meant[act] = 0;
     return meant;
   }

@@ -1,13 +1,14 @@
 /* Sentences that ask for several things in a row, as parts: docs/reference/bundle.md, "Several things in one text". */
 import { CLAUSES } from "../generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
-/** Words between things that are done one after the other. */
-export const THEN =
+const THEN =
   /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
 const DIRECTION =
   /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
-const OTHER_SIDE = /^(?:the|your|his|her|their) (left|right)(?: one)?$/iu;
-const OBJECT = /\b(?:an?|the) ([\p{L}\p{N}_]+)/iu;
+const OTHER_SIDE =
+  /^(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
+const OBJECT =
+  /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over)[\p{L}\p{N}_]+)?)/iu;
 const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
 const AROUND = /\b(?:turn\w* (?:a?round|180)|half turn)/iu;
 /** Who is told to do something. */
@@ -81,7 +82,7 @@ function after(before: string, part: string): string {
   }
   const side = OTHER_SIDE.exec(part);
   if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
-  const thing = OBJECT.exec(before);
+  const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
   if (/^stands?$/u.test(part) && LOW.test(before)) return `${part} up`;
   if (AROUND.test(before)) return part.replace(/^(walks?|runs?|goe?s?|jogs?) back\b/u, "$1 forward");
