@@ -3,7 +3,6 @@ figure that stands, walks, or does anything else."""
 
 import math
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -169,9 +168,9 @@ class Order(NamedTuple):
     particles: frozenset[str]
 
     def fit(self, words: Sequence[str]) -> tuple[int, int, bool, str, str]:
-        """Rises with how much it says of a sentence's words: in stems, in words, and as often as these."""
+        """Rises with how much it says of a sentence's words: in stems, in words, and all in their order."""
         of_order = self.sentence.split()
-        is_whole = Counter(words) == Counter(of_order)
+        is_whole = list(words) == of_order
         return len(self.stems), len(set(words).intersection(of_order)), is_whole, self.name, self.sentence
 
 

@@ -322,17 +322,18 @@ class SentenceModel(GenerateModel):
             return quantities
         if self._commands.act(quantities.text) is not None:
             return quantities
-        (verb, *_) = SUBJECT.sub("", text).lower().split()
         shown = self._shown_as(quantities.text)
-        shows_verb = stem(verb) in map(stem, shown.action.split())
-        return quantities if shows_verb and not shown.lacking else replace(quantities, text=text)
+        verb, verb_shown = (SUBJECT.sub("", sentence).lower().split()[0] for sentence in (text, shown.action))
+        does_it = stem(verb) == stem(verb_shown) and not shown.lacking
+        return quantities if does_it else replace(quantities, text=text)
 
     def _on_the_spot(self, quantities: Quantities) -> Quantities:
         """Quantities whose text is a turn on the spot, where that is a command, whoever turns; else as they are."""
         if "degrees" not in quantities.amounts:
             return quantities
         opening = SUBJECT.match(quantities.spot)
-        for turn in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
+        for spot in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
+            turn = PACE_PHRASES.sub("", spot).strip()
             if self._commands.act(turn) is not None:
                 return replace(quantities, text=turn)
         return quantities

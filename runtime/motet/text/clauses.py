@@ -45,8 +45,8 @@ FUNCTION_WORDS = frozenset((
 
 # fmt: off
 POLITE_WORDS = frozenset((
-    "a", "again", "an", "and", "do", "does", "finally", "first", "just", "make", "makes", "my", "next", "now", "please",
-    "take", "takes", "the", "then", "to", "your",
+    "a", "again", "an", "and", "do", "does", "finally", "first", "her", "his", "its", "just", "make", "makes", "my",
+    "next", "now", "please", "take", "takes", "the", "their", "then", "to", "your",
 ))
 """Words that make no difference to a command."""
 # fmt: on

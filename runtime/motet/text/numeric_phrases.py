@@ -58,7 +58,7 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (r"\b(?:a )?dozen\b", "12"),
     (r"\btwice\b(?! as\b)", "2 times"),
     (r"\bthrice\b", "3 times"),
-    (rf"\b({REPEATED})(?:[ ,]+\1\b)+", lambda match: f"{match[1]} {len(re.findall(match[1], match[0]))} times"),
+    (rf"^({REPEATED})(?:[ ,]+\1)+$", lambda match: f"{match[1]} {len(re.findall(match[1], match[0]))} times"),
     (r"(?<= )x ?(\d+)\b", r"\1 times"),
     (r"(?<!at )\bonce\b(?! more| again)", "1 time"),
     (r"\b(?:a )?single\b", "1"),

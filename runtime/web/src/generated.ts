@@ -603,7 +603,7 @@ export const WARPING = {
 // motet.text.clauses
 export const CLAUSES = {
   FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first", "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on", "or", "person", "she", "somebody", "someone", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your"],
-  POLITE_WORDS: ["a", "again", "an", "and", "do", "does", "finally", "first", "just", "make", "makes", "my", "next", "now", "please", "take", "takes", "the", "then", "to", "your"],
+  POLITE_WORDS: ["a", "again", "an", "and", "do", "does", "finally", "first", "her", "his", "its", "just", "make", "makes", "my", "next", "now", "please", "take", "takes", "the", "their", "then", "to", "your"],
 } as const;
 
 // motet.text.vocabulary

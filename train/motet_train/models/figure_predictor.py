@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
 from motet_train.models.kinematics import VectorFigure, VectorPoints
@@ -63,8 +64,7 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     takes it and on what way, and how much its answers so far differ from those to the mirrored question.
 
     All in metres. past: (B, L - 1, P, 3), the steps of points between seed frames. steps: (B, N, P, 3) predicted, from
-    the last frame. disagreement: (B, N), how far the points are from those predicted for the mirrored seed and mirrored
-    back.
+    the last frame. disagreement: (B, N), as :meth:`FigurePredictor.with_disagreement` gives it.
     """
     # how the figure moves before, and how it is predicted to
     shared = [size(past[:, -1]), size(past).mean(1), size(past.diff(dim=1)[:, -2:]).mean(1)]
@@ -134,18 +134,27 @@ def _likeliest_law(signs: Tensor, errors: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class Member(nn.Module):
-    """An MLP from D numbers to as many times W weights."""
+    """An MLP from D numbers to W weights for each number of P points."""
 
-    def __init__(self, seen: int, weights: int, config: FigurePredictorConfig) -> None:
+    def __init__(self, seen: int, numbers: int, config: FigurePredictorConfig) -> None:
         super().__init__()
         self.inward = nn.Linear(seen, config.hidden)
         self.blocks = nn.Sequential(*(Block(config.hidden, config.dropout) for _ in range(config.blocks)))
-        self.outward = zero_linear(config.hidden, weights)
+        self.outward = zero_linear(config.hidden, config.waves * numbers)
 
-    def forward(self, seen: Tensor) -> Tensor:
-        """(B, D) to (B, weights)."""
-        weights: Tensor = self.outward(self.blocks(self.inward(seen)))
-        return weights
+    def forward(self, seen: Tensor, points: VectorPoints | None = None) -> Tensor:
+        """(B, D) to (B, W P 3). points: give weights of vectors between points and their parents.
+
+        The difference is made of the layer: between points metres apart it would magnify their last bits.
+        """
+        hidden = self.blocks(self.inward(seen))
+        weight: Tensor = self.outward.weight
+        bias: Tensor = self.outward.bias
+        if points is not None:
+            shape = (-1, len(points.parents), 3)
+            weight = points.from_parents(torch.unflatten(weight, 0, shape), dim=1).flatten(0, 2)
+            bias = points.from_parents(torch.unflatten(bias, 0, shape), dim=1).flatten()
+        return functional.linear(hidden, weight, bias)
 
 
 class FigurePredictor(Net):
@@ -163,8 +172,8 @@ class FigurePredictor(Net):
         self.config = config
         self.points = VectorPoints(config.figure)
         numbers = 3 * len(self.points.parents)
-        sizes = (numbers * config.seed_frames, numbers * config.waves)
-        self.members = nn.ModuleList(Member(*sizes, config) for _ in range(config.members))
+        seen = numbers * config.seed_frames
+        self.members = nn.ModuleList(Member(seen, numbers, config) for _ in range(config.members))
         self.doubt = ErrorHead(config.frames) if config.doubts else None
 
         # steps grow with time, so that those of early frames are small
@@ -179,35 +188,36 @@ class FigurePredictor(Net):
 
     def each_after(self, seen: Tensor) -> list[Tensor]:
         """Points (B, L, P, 3) to those of the next frames (B, N, P, 3) by each member: this is trained."""
-        last = seen[:, -1:]
-        inputs = torch.cat([PLACE_SCALE * last.flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
-        answers = []
-        for member in self.members:
-            weights = torch.unflatten(member(inputs), 1, (self.config.waves, -1))
-            answers.append(last + torch.unflatten(self.cosines @ weights, 2, (-1, 3)))
-        return answers
+        inputs = self._inputs(seen)
+        return [seen[:, -1:] + self._steps(member(inputs)) for member in self.members]
 
-    def points_after(self, seen: Tensor) -> Tensor:
-        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), without the mirror image."""
-        return torch.stack(self.each_after(seen)).mean(0)
+    def _inputs(self, seen: Tensor) -> Tensor:
+        """What members see (B, D) of points (B, L, P, 3)."""
+        last = seen[:, -1]
+        return torch.cat([PLACE_SCALE * last.flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
 
-    def points_on_both_sides(self, seen: Tensor) -> tuple[Tensor, Tensor]:
-        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3), the mean of those for them and for their mirror
-        image; and how far (B, N) these are apart, in metres."""
-        if not self.config.figure.partners:
-            alone = self.points_after(seen)
-            return alone, torch.zeros_like(alone[..., 0, 0])
-        # rows and their mirror images in one batch, side by side
-        both = torch.stack([seen, self.points.mirror(seen)], dim=1).flatten(0, 1)
-        after = torch.unflatten(self.points_after(both), 0, (-1, 2))
-        plain = after[:, 0]
-        mirrored = self.points.mirror(after[:, 1])
-        return (plain + mirrored) / 2, size((plain - mirrored) / 2)
+    def _steps(self, weights: Tensor) -> Tensor:
+        """Weights (B, W P 3) of cosines as steps (B, N, P, 3)."""
+        return torch.unflatten(self.cosines @ torch.unflatten(weights, 1, (self.config.waves, -1)), 2, (-1, 3))
+
+    def vectors_after(self, seen: Tensor) -> Tensor:
+        """Points (B, L, P, 3) to the steps (B, N, P, 3) of vectors from their parents: the mean of the members."""
+        inputs = self._inputs(seen)
+        weights = torch.stack([member(inputs, self.points) for member in self.members])
+        return self._steps(weights.mean(0))
 
     def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them."""
-        points, apart = self.points_on_both_sides(self.seen(frames))
-        return self.points.frames(points, frames[:, -1:]), apart
+        """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them: the root
+        mean square of differences between vectors, in metres."""
+        seen = self.seen(frames)
+        # rows and their mirror images in one batch, side by side
+        both = torch.stack([seen, self.points.mirror(seen)], dim=1).flatten(0, 1)
+        steps = torch.unflatten(self.vectors_after(both), 0, (-1, 2))
+        plain = steps[:, 0]
+        mirrored = self.points.mirror(steps[:, 1])
+        last = self.points.from_parents(seen[:, -1:])
+        vectors = torch.cat([last, last + (plain + mirrored) / 2], dim=1)
+        return self.points.frames(vectors, frames[:, -1:]), size((plain - mirrored) / 2)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, L, C) to the next (B, N, C)."""

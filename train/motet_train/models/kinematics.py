@@ -274,14 +274,23 @@ class VectorPoints(nn.Module):
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / fps
         return torch.stack([x, root[..., 3], z], dim=-1)
 
-    def frames(self, points: Tensor, last: Tensor) -> Tensor:
-        """Points (B, N, P, 3), seen from the frame before them, to frames (B, N, D) that are as near as bones allow.
+    def from_parents(self, points: Tensor, dim: int = -2) -> Tensor:
+        """Points (..., P, ...) as vectors from their parents; that of the root stays."""
+        parents = [max(parent, 0) for parent in self.parents]
+        root = points.narrow(dim, 0, 1)
+        others = points - _at(points, parents, dim=dim)
+        return torch.cat([root, others.narrow(dim, 1, len(parents) - 1)], dim=dim)
 
-        last: (B, 1, D) that frame, whose other channels stay.
+    def frames(self, vectors: Tensor, last: Tensor) -> Tensor:
+        """The frames (B, N, D) that are as near to points as bones allow.
+
+        vectors: (B, 1 + N, P, 3) of the points from their parents in the last frame before and in these, all seen from
+        it. last: (B, 1, D) that frame, whose other channels stay.
         """
-        count = points.shape[1]
-        rotations = self._aimed(points.flatten(0, 1).permute(2, 1, 0))
-        root = self._root(points[:, :, 0], torch.unflatten(rotations[:, :, 0], -1, (-1, count)))
+        count = vectors.shape[1] - 1
+        rotations = torch.unflatten(self._aimed(vectors.flatten(0, 1).permute(2, 1, 0)), -1, (-1, 1 + count))
+        root = self._root(vectors[:, :, 0], rotations[:, :, 0])
+        rotations = rotations[..., 1:].flatten(3)
 
         # rotations of the bones seen from their parents
         parents = _places_in(self.figure.bones, [self.figure.parents[bone] for bone in self.figure.bones[1:]])
@@ -294,49 +303,52 @@ class VectorPoints(nn.Module):
         columns = range(last.shape[-1])
         return _at(values, [known.index(n) if n in known else len(known) + n for n in columns], dim=-1)
 
-    def _aimed(self, points: Tensor) -> Tensor:
-        """Rotations (3, 3, K, n) in the world of the bones of points (3, P, n), from the root outwards: each bone is
-        aimed from where it is at the point of its child."""
+    def _aimed(self, vectors: Tensor) -> Tensor:
+        """Rotations (3, 3, K, n) in the world of the bones of points, by vectors (3, P, n) from their parents.
+
+        From the root outwards each bone is aimed at the point of its child from where its joint has come to be.
+        """
         bones = self.figure.bones
         level = [0]
-        places = points[:, :1]
+        apart = torch.zeros_like(vectors[:, :1])  # of the points of joints from where these are
         order: list[int] = []
         rotations: list[Tensor] = []
         while inner := [joint for joint in level if joint in bones]:
             # the bones of this depth, their rotations
             rows = _places_in(bones, inner)
-            starts = _at(places, _places_in(level, inner), dim=1)
-            aims = _at(points, [self.aims[row] for row in rows], dim=1) - starts
-            across = _at(points, [self.markers[row] for row in rows], dim=1) - _at(points, inner, dim=1)
+            apart = _at(apart, _places_in(level, inner), dim=1)
+            aims = _at(vectors, [self.aims[row] for row in rows], dim=1) + apart
+            across = _at(vectors, [self.markers[row] for row in rows], dim=1)
             turned = product(axes_to_rotmat(torch.cat([aims, across])), _at(self.rest, rows))
             order += rows
             rotations.append(turned)
 
-            # and where their children are
+            # and how far the points of their children are from these
             level = [joint for joint in range(self.joints) if self.parents[joint] in inner]
             rows = [inner.index(self.parents[joint]) for joint in level]
             if level:
-                offsets = self.offsets[level].T[:, None, :, None]
-                places = _at(starts, rows, dim=1) + product(_at(turned, rows), offsets)[:, 0]
+                offsets = product(_at(turned, rows), self.offsets[level].T[:, None, :, None])[:, 0]
+                apart = _at(apart, rows, dim=1) + _at(vectors, level, dim=1) - offsets
         return _at(torch.cat(rotations, dim=2), _places_in(order, range(len(bones))))
 
     def _root(self, places: Tensor, rotations: Tensor) -> Tensor:
-        """The root block (B, N, 6) by places (B, N, 3) and rotations (3, 3, B, N) of the root."""
+        """The root block (B, N, 6) by places (B, 1 + N, 3) and rotations (3, 3, B, 1 + N) of the root, the first of the
+        frame before."""
         fps = self.figure.fps
-        pitch = torch.asin((-rotations[1, 2]).clamp(-1, 1))
-        roll = torch.atan2(rotations[1, 0], rotations[1, 1])
-        # how far it turns since the frame before, at first since it faced z
+        pitch = torch.asin((-rotations[1, 2]).clamp(-1, 1))[:, 1:]
+        roll = torch.atan2(rotations[1, 0], rotations[1, 1])[:, 1:]
+        # how far it turns since the frame before
         sin, cos = functional.normalize(torch.stack([rotations[0, 2], rotations[2, 2]]), dim=0, eps=1e-6)
-        sin_before = functional.pad(sin[:, :-1], (1, 0))
-        cos_before = functional.pad(cos[:, :-1], (1, 0), value=1.0)
+        sin_before = sin[:, :-1]
+        cos_before = cos[:, :-1]
+        sin = sin[:, 1:]
+        cos = cos[:, 1:]
         turn = torch.atan2(sin * cos_before - cos * sin_before, cos * cos_before + sin * sin_before)
         # and goes, as it faced then
-        x, y, z = places.unbind(-1)
-        x = x - functional.pad(x[:, :-1], (1, 0))
-        z = z - functional.pad(z[:, :-1], (1, 0))
+        x, _, z = places.diff(dim=1).unbind(-1)
         forward = x * sin_before + z * cos_before
         left = x * cos_before - z * sin_before
-        return torch.stack([forward * fps, left * fps, turn * fps, y, pitch, roll], dim=-1)
+        return torch.stack([forward * fps, left * fps, turn * fps, places[:, 1:, 1], pitch, roll], dim=-1)
 
 
 def _aim(bone: int, parents: Sequence[int], partners: Sequence[int]) -> int:
