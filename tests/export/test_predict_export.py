@@ -42,7 +42,7 @@ def run() -> Run:
     net = FigurePredictor(config)
     with torch.no_grad():
         for parameter in net.parameters():
-            parameter.add_(0.05 * torch.randn_like(parameter))
+            parameter.add_(0.03 * torch.randn_like(parameter))
     assert net.doubt is not None
     net.doubt.weight.uniform_(-0.5, 0.5)
     return Run({**predict_manifest("figure-trajectory", 3, 6), "config": asdict(config)}, net)
@@ -53,7 +53,7 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
     assert set(report["runs"]) >= {"horizon", "beyond"}
     for name, rung in report.items():
         if "bound" in rung:
-            assert rung["error"] <= (rung["bound"] if name.endswith(".far") else 1e-5), name
+            assert rung["error"] <= rung["bound"] <= (1e-2 if name.endswith(".far") else 1e-3), name
     bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(Manifest.from_json(run.manifest), run.torch_graphs())
     assert isinstance(bundle, PredictModel)
     seeds = 0.3 * np.random.default_rng(0).normal(size=(7, 10, CHANNELS))

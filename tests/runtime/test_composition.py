@@ -46,6 +46,28 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
     assert all(part in sentence for part in found)
 
 
+@pytest.mark.parametrize(
+    ("sentence", "parts"),
+    [
+        ("look up, then down", ["look up", "look down"]),
+        ("kick with the left foot, then with the right", ["kick with the left foot", "kick with the right foot"]),
+        ("carry a heavy box and drop it", ["carry a heavy box", "drop the heavy box"]),
+        ("he sits, then stands", ["he sits", "stands up"]),
+        ("turn around, then walk back", ["turn around", "walk forward"]),
+        ("walk, then back", ["walk", "back"]),  # no direction that it could take the place of
+        ("wave, then drop it", ["wave", "drop it"]),
+        ("walk slowly and after he sits down", ["walk slowly", "he sits down"]),
+        ("raise the arms and hold for 3 seconds", ["raise the arms and hold for 3 seconds"]),
+    ],
+)
+def test_a_part_is_read_in_full(sentence: str, parts: list[str]) -> None:
+    assert parts_of(sentence, VERBS | set(map(stem, ("carry", "drop", "sit", "stand", "hold")))) == parts
+
+
+def test_who_is_told_is_no_act() -> None:
+    assert sentences_of("Robot, turn left. Hey dude, wave!") == ["turn left", "wave"]
+
+
 def test_texts_are_cut_into_sentences_but_not_numbers() -> None:
     assert sentences_of("He walks 1.5 metres. He turns;\nhe sits!") == ["He walks 1.5 metres", "He turns", "he sits"]
 

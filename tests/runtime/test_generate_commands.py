@@ -94,6 +94,24 @@ def test_a_turn_without_a_gait_is_on_the_spot(model: CodesModel, text: str, degr
     assert np.linalg.norm(places - places[0], axis=1).max() < 0.8
 
 
+def test_commands_may_be_misspelt_and_have_a_pace(model: CodesModel) -> None:
+    assert model.likeliest("wlak forward").action == "a person walks forward"
+    for text, act, pace in (
+        ("stands up quickly", "a person stands up", 1.3),
+        ("turns around slowly", "a person turns around", 0.75),
+    ):
+        assert model.likeliest(text).action == act
+        assert model.quantities(text).amounts["pace"] == pace
+
+
+def test_who_stands_still_after_a_walk_does_not_go_on(model: CodesModel) -> None:
+    for seed in range(3):
+        story = model.story(["walk", "stand still"], seed=seed)
+        places = positions(story.motion)[-20:]
+        speeds = np.linalg.norm(np.diff(places, axis=0), axis=2) * 30
+        assert speeds.mean() < 0.15
+
+
 def test_parts_are_commands_too(model: CodesModel) -> None:
     assert model.parts("sit down, stand up again") == ["sit down", "stand up again"]
     assert model.parts("walk forwards 2 meters and stop") == ["walk forwards 2 meters", "stop"]

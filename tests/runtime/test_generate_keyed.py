@@ -10,7 +10,7 @@ import motet
 import motet.keyed
 from motet.errors import TextWarning, collected
 from motet.figures.humanoid import HUMANOID
-from motet.generate.keyed_acts import act_named, act_within, without_subject
+from motet.generate.keyed_acts import STANDS, act_named, act_within, without_subject
 from motet.keyed.shipped import LIBRARY, TEXTS
 from motet.motion.kinematics import global_transforms
 
@@ -246,6 +246,40 @@ def test_no_act_lasts_longer_than_it_may(model: motet.CodesModel) -> None:
 )
 def test_what_is_done_again_or_otherwise_is_a_part(model: motet.CodesModel, sentence: str, parts: list[str]) -> None:
     assert model.parts(sentence) == parts
+
+
+@pytest.mark.parametrize(
+    ("words", "hand"), [("with the left hand", "left_hand"), ("with your right hand", "right_hand")]
+)
+def test_an_act_is_done_with_the_hand_that_is_named(model: motet.CodesModel, words: str, hand: str) -> None:
+    for act in ("knock", "drink a cup of tea"):
+        named = model._keyed(f"{act} {words}")
+        assert named is not None
+        assert not named.lacking
+        assert named.base == STANDS
+        hands = set[str]()
+        for key in named.act.keys:
+            hands |= key.hands.keys()
+        assert hands == {hand}
+
+
+def test_an_act_of_the_hands_is_done_over_one_of_the_legs(model: motet.CodesModel) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        (generated,) = model.generate("marching in place while clapping")
+    assert generated.action == "clap, march"
+    _, places = global_transforms(generated.motion)
+    feet = places[:, [HUMANOID.index("leftFoot"), HUMANOID.index("rightFoot")], 1]
+    assert (np.ptp(feet, axis=0) > 0.15).all()
+    hands = places[:, HUMANOID.index("leftHand_end")] - places[:, HUMANOID.index("rightHand_end")]
+    assert np.linalg.norm(hands, axis=1).min() < 0.2
+
+
+def test_numbers_and_repeated_words_are_counted(model: motet.CodesModel) -> None:
+    assert model._keyed("clap x3") == model._keyed("clap three times")
+    assert model.quantities("jump jump jump").amounts == {"times": 3}
+    assert model.parts("jab jab cross") == ["punch left", "punch left", "punch right"]
+    assert model.parts("jab cross") == ["punch left", "punch right"]
 
 
 def test_sentences_mean_other_texts(model: motet.CodesModel) -> None:

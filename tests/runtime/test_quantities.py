@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet.errors import TextError, TextWarning
+from motet.errors import TextError, TextWarning, collected
 from motet.figures.humanoid import HUMANOID, T_POSE
 from motet.generate.codes import Writer
 from motet.generate.model import CodesModel, Story
@@ -73,6 +73,14 @@ def test_what_is_no_quantity_of_the_whole_figure_stays_as_it_is(sentence: str) -
     found = quantities_of(sentence)
     assert found.amounts == {}
     assert found.text == sentence
+
+
+def test_an_act_that_is_not_counted_is_not_drawn_for_ever(model: CodesModel) -> None:
+    with collected(TextWarning) as messages:
+        (motion,) = model.generate("roll forward 2 times over 20 metres")
+    assert motion.requested == {"times": 2, "metres": 20}
+    assert motion.motion.duration < 20
+    assert any("cannot be counted" in str(message) for message in messages)
 
 
 @pytest.mark.parametrize("sentence", ["-3 jumps", "10^9 steps", "0 steps", "walk -2 metres", "jump 1.5 times", "5 km"])

@@ -302,9 +302,8 @@ class Teller:
             frames = self._decoded(codes, context)
             # It ends with what is requested, or where as many draws have never shown the act.
             seen = Seen.of(self.contract, frames)
-            in_vain = (
-                "times" in quantities.amounts and rounds - least_rounds >= times - 1 and not seen.done(quantities.act)
-            )
+            shows_act = bool(quantities.act and seen.done(quantities.act))
+            in_vain = "times" in quantities.amounts and rounds - least_rounds >= times - 1 and not shows_act
             if over or in_vain or enough(seen, quantities):
                 break
         frames = fitted(self.contract, frames, quantities)

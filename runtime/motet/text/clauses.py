@@ -25,7 +25,8 @@ OTHER_SIDE = re.compile(
     r"(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
 )
 OBJECT = re.compile(
-    r"\b(?:an?|the) (\w+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over)\w+)?)", re.IGNORECASE
+    r"\b(?:an?|the) (\w+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|\d|\w+ly\b)\w+)?)",
+    re.IGNORECASE,
 )
 LOW = re.compile(r"\b(?:sit|kneel|lie|lay|crouch|squat|knee)\w*", re.IGNORECASE)
 AROUND = re.compile(r"\b(?:turn\w* (?:a?round|180)|half turn)", re.IGNORECASE)

@@ -8,10 +8,9 @@ const DIRECTION =
 const OTHER_SIDE =
   /^(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const OBJECT =
-  /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over)[\p{L}\p{N}_]+)?)/iu;
+  /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
 const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
 const AROUND = /\b(?:turn\w* (?:a?round|180)|half turn)/iu;
-/** Who is told to do something. */
 export const ADDRESSEE =
   /^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+/iu;
 const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
@@ -65,7 +64,7 @@ export function partsOf(sentence: string, verbs: Set<string>): string[] {
   return inFull(pieces.flatMap((piece) => beforeVerbs(piece, verbs)));
 }
 
-/** Parts with what they leave out since the part before says it: "look up", "down" looks down. */
+/** Parts with the words that they share with the part before: "look up", "down". */
 function inFull(parts: string[]): string[] {
   const full: string[] = [];
   for (const part of parts) {
