@@ -21,7 +21,7 @@ from motet.errors import BundleError, MotetError
 SMALLEST_QUANTISED = 256
 """Smallest number of elements of a tensor that is stored in fewer bits."""
 
-SMALLEST_SHARED = 1024
+SMALLEST_SHARED = 1 << 16
 """Smallest number of bytes of a weight that several graphs share."""
 
 Content = tuple[int, tuple[int, ...], bytes]

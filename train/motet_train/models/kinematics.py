@@ -287,24 +287,24 @@ class VectorPoints(nn.Module):
         vectors: (B, 1 + N, P, 3) of the points from their parents in the last frame before and in these, all seen from
         it. last: (B, 1, D) that frame, whose other channels stay.
         """
-        count = vectors.shape[1] - 1
-        rotations = torch.unflatten(self._aimed(vectors.flatten(0, 1).permute(2, 1, 0)), -1, (-1, 1 + count))
+        rows = vectors.permute(3, 2, 0, 1)
+        rotations = self._aimed(rows)
         root = self._root(vectors[:, :, 0], rotations[:, :, 0])
-        rotations = rotations[..., 1:].flatten(3)
+        rotations = rotations[..., 1:]
 
         # rotations of the bones seen from their parents
         parents = _places_in(self.figure.bones, [self.figure.parents[bone] for bone in self.figure.bones[1:]])
         local = product(_at(rotations, parents).transpose(0, 1), rotations[:, :, 1:])
-        vectors = torch.unflatten(rotmat_to_rotvec(local).permute(2, 1, 0).flatten(1), 0, (-1, count))
+        maps = rotmat_to_rotvec(local).permute(2, 3, 1, 0).flatten(2)
 
         # each channel from the root block, the maps or the last frame
-        values = torch.cat([root, vectors, last.expand(-1, count, -1)], dim=-1)
+        values = torch.cat([root, maps, last.expand(-1, root.shape[1], -1)], dim=-1)
         known = [*self.root, *self.vectors]
         columns = range(last.shape[-1])
         return _at(values, [known.index(n) if n in known else len(known) + n for n in columns], dim=-1)
 
     def _aimed(self, vectors: Tensor) -> Tensor:
-        """Rotations (3, 3, K, n) in the world of the bones of points, by vectors (3, P, n) from their parents.
+        """Rotations (3, 3, K, ...) in the world of the bones of points, by vectors (3, P, ...) from their parents.
 
         From the root outwards each bone is aimed at the point of its child from where its joint has come to be.
         """
@@ -319,7 +319,7 @@ class VectorPoints(nn.Module):
             apart = _at(apart, _places_in(level, inner), dim=1)
             aims = _at(vectors, [self.aims[row] for row in rows], dim=1) + apart
             across = _at(vectors, [self.markers[row] for row in rows], dim=1)
-            turned = product(axes_to_rotmat(torch.cat([aims, across])), _at(self.rest, rows))
+            turned = product(axes_to_rotmat(torch.cat([aims, across])), _at(self.rest, rows)[..., None])
             order += rows
             rotations.append(turned)
 
@@ -327,7 +327,7 @@ class VectorPoints(nn.Module):
             level = [joint for joint in range(self.joints) if self.parents[joint] in inner]
             rows = [inner.index(self.parents[joint]) for joint in level]
             if level:
-                offsets = product(_at(turned, rows), self.offsets[level].T[:, None, :, None])[:, 0]
+                offsets = product(_at(turned, rows), self.offsets[level].T[:, None, :, None, None])[:, 0]
                 apart = _at(apart, rows, dim=1) + _at(vectors, level, dim=1) - offsets
         return _at(torch.cat(rotations, dim=2), _places_in(order, range(len(bones))))
 
@@ -335,15 +335,16 @@ class VectorPoints(nn.Module):
         """The root block (B, N, 6) by places (B, 1 + N, 3) and rotations (3, 3, B, 1 + N) of the root, the first of the
         frame before."""
         fps = self.figure.fps
-        pitch = torch.asin((-rotations[1, 2]).clamp(-1, 1))[:, 1:]
-        roll = torch.atan2(rotations[1, 0], rotations[1, 1])[:, 1:]
+        ahead = (rotations[0, 2].square() + rotations[2, 2].square()).sqrt()
+        pitch = _angle(-rotations[1, 2], ahead)[:, 1:]
+        roll = _angle(rotations[1, 0], rotations[1, 1])[:, 1:]
         # how far it turns since the frame before
         sin, cos = functional.normalize(torch.stack([rotations[0, 2], rotations[2, 2]]), dim=0, eps=1e-6)
         sin_before = sin[:, :-1]
         cos_before = cos[:, :-1]
         sin = sin[:, 1:]
         cos = cos[:, 1:]
-        turn = torch.atan2(sin * cos_before - cos * sin_before, cos * cos_before + sin * sin_before)
+        turn = _angle(sin * cos_before - cos * sin_before, cos * cos_before + sin * sin_before)
         # and goes, as it faced then
         x, _, z = places.diff(dim=1).unbind(-1)
         forward = x * sin_before + z * cos_before
@@ -358,6 +359,18 @@ def _aim(bone: int, parents: Sequence[int], partners: Sequence[int]) -> int:
         if parent == bone and (in_the_middle or partners[bone] != bone):
             return joint
     return -1
+
+
+def _angle(sine: Tensor, cosine: Tensor) -> Tensor:
+    """Angles (..., N) in radians by multiples of their sines and cosines.
+
+    Each row of N is filled up to a multiple of 16, which kernels compute at once: they compute what is left over in
+    another way, and so a row would depend on how many there are.
+    """
+    count = sine.shape[-1]
+    spare = -count % 16
+    filled = torch.atan2(functional.pad(sine, (0, spare)), functional.pad(cosine, (0, spare), value=1.0))
+    return filled[..., :count]
 
 
 def _turn(angle: Tensor, axis: int) -> Tensor:
@@ -403,7 +416,7 @@ def rotmat_to_rotvec(rotations: Tensor) -> Tensor:
     column = torch.where(largest == 0, columns[0], torch.where(largest == 1, columns[1], columns[2]))
     column = column * torch.where((column * swept).sum(0) < 0, -1.0, 1.0)
     axis = torch.where(trace < -0.9, column, swept)
-    angle = torch.atan2(swept.square().sum(0).sqrt(), trace - 1)
+    angle = _angle(swept.square().sum(0).sqrt(), trace - 1)
     length = axis.square().sum(0).clamp_min(1e-20).sqrt()
     return axis / length * angle
 
