@@ -184,7 +184,7 @@ def _after(before: str, part: str) -> str:
     if re.fullmatch(r"stands?", part) and LOW.search(before):
         return f"{part} up"
     if AROUND.search(before):
-        return re.sub(r"^(walks?|runs?|goe?s?|jogs?) back\b", r"\1 forward", part)
+        return re.sub(r"^(walks?|goe?s?) back\b", r"\1 forward", part)
     return part
 
 
@@ -194,7 +194,7 @@ def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:
     for match in ALSO.finditer(text):
         done = re.findall(r"\w+", text[start : match.start()].lower())
         following = SUBJECT.sub("", text[match.end() :], count=1).lower()
-        opened = re.match(r"(?!back (?!up|away|off)|holds? (?:\w+ )?for)\w+", following)
+        opened = re.match(r"(?!back (?!up|away|off)|holds? (?:\w+ )?for|(?:left|right)\b)\w+", following)
         if opened and stem(opened[0]) in verbs and any(stem(word) in verbs for word in done):
             yield text[start : match.start()]
             start = match.end()

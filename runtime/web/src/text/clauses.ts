@@ -84,7 +84,7 @@ function after(before: string, part: string): string {
   const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
   if (/^stands?$/u.test(part) && LOW.test(before)) return `${part} up`;
-  if (AROUND.test(before)) return part.replace(/^(walks?|runs?|goe?s?|jogs?) back\b/u, "$1 forward");
+  if (AROUND.test(before)) return part.replace(/^(walks?|goe?s?) back\b/u, "$1 forward");
   return part;
 }
 
@@ -98,12 +98,13 @@ function beforeVerbs(text: string, verbs: Set<string>): string[] {
         .slice(start, index)
         .toLowerCase()
         .match(/[\p{L}\p{N}_]+/gu) ?? [];
-    const opened = /^(?!back (?!up|away|off)|holds? (?:[\p{L}\p{N}_]+ )?for)[\p{L}\p{N}_]+/u.exec(
-      text
-        .slice(index + separator.length)
-        .replace(SUBJECT, "")
-        .toLowerCase(),
-    );
+    const opened =
+      /^(?!back (?!up|away|off)|holds? (?:[\p{L}\p{N}_]+ )?for|(?:left|right)\b)[\p{L}\p{N}_]+/u.exec(
+        text
+          .slice(index + separator.length)
+          .replace(SUBJECT, "")
+          .toLowerCase(),
+      );
     if (!opened || !verbs.has(stem(opened[0])) || !done.some((word) => verbs.has(stem(word)))) continue;
     parts.push(text.slice(start, index));
     start = index + separator.length;
