@@ -193,8 +193,8 @@ class VectorPoints(nn.Module):
 
     offsets: Tensor
     rest: Tensor
+    seen_from_aims: Tensor
     ground: Tensor
-    sides: Tensor
     plane: Tensor
 
     def __init__(self, figure: VectorFigure) -> None:
@@ -227,15 +227,24 @@ class VectorPoints(nn.Module):
         self.partners = partners
         in_rest = torch.tensor(offsets)
         aimed = torch.cat([in_rest[self.aims].T, in_rest[self.markers].T])
+        rest = axes_to_rotmat(aimed).transpose(0, 1)[..., None]
+        # where joints are from their parents, in axes along the aims of these
+        rows = [max(0, self._row(parent)) for parent in figure.parents]
+        seen_from_aims = product(_at(rest, rows), in_rest[: self.joints].T[:, None, :, None])
         constants(
             self,
             offsets=in_rest,
-            rest=axes_to_rotmat(aimed).transpose(0, 1)[..., None],
+            rest=rest[..., None],
+            seen_from_aims=seen_from_aims[..., None],
             ground=torch.tensor([1.0, 0.0, 1.0]),
             plane=torch.tensor([-1.0, 1.0, 1.0]),
         )
         self.root = list(figure.root)
         self.vectors = list(figure.vectors)
+
+    def _row(self, joint: int) -> int:
+        """The number of the bone of a joint, -1 where it has none."""
+        return self.figure.bones.index(joint) if joint in self.figure.bones else -1
 
     def mirror(self, points: Tensor) -> Tensor:
         """Points (..., P, 3) with left and right exchanged."""
@@ -312,24 +321,24 @@ class VectorPoints(nn.Module):
         level = [0]
         apart = torch.zeros_like(vectors[:, :1])  # of the points of joints from where these are
         order: list[int] = []
-        rotations: list[Tensor] = []
+        aimed: list[Tensor] = []
         while inner := [joint for joint in level if joint in bones]:
-            # the bones of this depth, their rotations
+            # the bones of this depth, along their aims
             rows = _places_in(bones, inner)
             apart = _at(apart, _places_in(level, inner), dim=1)
             aims = _at(vectors, [self.aims[row] for row in rows], dim=1) + apart
             across = _at(vectors, [self.markers[row] for row in rows], dim=1)
-            turned = product(axes_to_rotmat(torch.cat([aims, across])), _at(self.rest, rows)[..., None])
+            along = axes_to_rotmat(torch.cat([aims, across]))
             order += rows
-            rotations.append(turned)
+            aimed.append(along)
 
             # and how far the points of their children are from these
             level = [joint for joint in range(self.joints) if self.parents[joint] in inner]
             rows = [inner.index(self.parents[joint]) for joint in level]
             if level:
-                offsets = product(_at(turned, rows), self.offsets[level].T[:, None, :, None, None])[:, 0]
+                offsets = product(_at(along, rows), _at(self.seen_from_aims, level))[:, 0]
                 apart = _at(apart, rows, dim=1) + _at(vectors, level, dim=1) - offsets
-        return _at(torch.cat(rotations, dim=2), _places_in(order, range(len(bones))))
+        return product(_at(torch.cat(aimed, dim=2), _places_in(order, range(len(bones)))), self.rest)
 
     def _root(self, places: Tensor, rotations: Tensor) -> Tensor:
         """The root block (B, N, 6) by places (B, 1 + N, 3) and rotations (3, 3, B, 1 + N) of the root, the first of the
