@@ -194,6 +194,7 @@ class VectorPoints(nn.Module):
     offsets: Tensor
     rest: Tensor
     seen_from_aims: Tensor
+    lengths: Tensor
     ground: Tensor
     plane: Tensor
 
@@ -236,6 +237,7 @@ class VectorPoints(nn.Module):
             offsets=in_rest,
             rest=rest[..., None],
             seen_from_aims=seen_from_aims[..., None],
+            lengths=in_rest.norm(dim=1)[None, :, None, None],
             ground=torch.tensor([1.0, 0.0, 1.0]),
             plane=torch.tensor([-1.0, 1.0, 1.0]),
         )
@@ -296,15 +298,11 @@ class VectorPoints(nn.Module):
         vectors: (B, 1 + N, P, 3) of the points from their parents in the last frame before and in these, all seen from
         it. last: (B, 1, D) that frame, whose other channels stay.
         """
-        rows = vectors.permute(3, 2, 0, 1)
-        rotations = self._aimed(rows)
-        root = self._root(vectors[:, :, 0], rotations[:, :, 0])
-        rotations = rotations[..., 1:]
-
-        # rotations of the bones seen from their parents
+        rotations = self._aimed(vectors.permute(3, 2, 0, 1))
         parents = _places_in(self.figure.bones, [self.figure.parents[bone] for bone in self.figure.bones[1:]])
-        local = product(_at(rotations, parents).transpose(0, 1), rotations[:, :, 1:])
-        maps = rotmat_to_rotvec(local).permute(2, 3, 1, 0).flatten(2)
+        local = product(_at(rotations, parents).transpose(0, 1), rotations[:, :, 1:])[..., 1:]
+        root, maps = self._root_and_maps(vectors[:, :, 0], rotations[:, :, 0], local)
+        maps = maps.permute(2, 3, 1, 0).flatten(2)
 
         # each channel from the root block, the maps or the last frame
         values = torch.cat([root, maps, last.expand(-1, root.shape[1], -1)], dim=-1)
@@ -321,44 +319,67 @@ class VectorPoints(nn.Module):
         level = [0]
         apart = torch.zeros_like(vectors[:, :1])  # of the points of joints from where these are
         order: list[int] = []
-        aimed: list[Tensor] = []
+        all_aims: list[Tensor] = []
         while inner := [joint for joint in level if joint in bones]:
-            # the bones of this depth, along their aims
+            # the aims of the bones of this depth
             rows = _places_in(bones, inner)
-            apart = _at(apart, _places_in(level, inner), dim=1)
-            aims = _at(vectors, [self.aims[row] for row in rows], dim=1) + apart
-            across = _at(vectors, [self.markers[row] for row in rows], dim=1)
-            along = axes_to_rotmat(torch.cat([aims, across]))
+            targets = [self.aims[row] for row in rows]
+            aims = _at(vectors, targets, dim=1) + _at(apart, _places_in(level, inner), dim=1)
             order += rows
-            aimed.append(along)
+            all_aims.append(aims)
 
-            # and how far the points of their children are from these
+            # how far the points of their children are from these: of one that is aimed at, by the bone's length alone
             level = [joint for joint in range(self.joints) if self.parents[joint] in inner]
+            if not level:
+                break
             rows = [inner.index(self.parents[joint]) for joint in level]
-            if level:
-                offsets = product(_at(along, rows), _at(self.seen_from_aims, level))[:, 0]
-                apart = _at(apart, rows, dim=1) + _at(vectors, level, dim=1) - offsets
-        return product(_at(torch.cat(aimed, dim=2), _places_in(order, range(len(bones)))), self.rest)
+            if [targets[row] for row in rows] == level:
+                reached = functional.normalize(aims, dim=0, eps=1e-6) * self.lengths[:, targets]
+                apart = _at(aims - reached, rows, dim=1)
+            else:
+                across = _at(vectors, [self.markers[bones.index(joint)] for joint in inner], dim=1)
+                along = _at(axes_to_rotmat(torch.cat([aims, across])), rows)
+                offsets = product(along, _at(self.seen_from_aims, level))[:, 0]
+                starts = _at(vectors, level, dim=1) + _at(aims - _at(vectors, targets, dim=1), rows, dim=1)
+                apart = starts - offsets
+        aimed = torch.cat(
+            [
+                _at(torch.cat(all_aims, dim=1), _places_in(order, range(len(bones))), dim=1),
+                _at(vectors, self.markers, dim=1),
+            ]
+        )
+        return product(axes_to_rotmat(aimed), self.rest)
 
-    def _root(self, places: Tensor, rotations: Tensor) -> Tensor:
-        """The root block (B, N, 6) by places (B, 1 + N, 3) and rotations (3, 3, B, 1 + N) of the root, the first of the
-        frame before."""
+    def _root_and_maps(self, places: Tensor, rotations: Tensor, local: Tensor) -> tuple[Tensor, Tensor]:
+        """The root block (B, N, 6) and the maps (3, K - 1, B, N) of the other bones.
+
+        places, rotations: (B, 1 + N, 3) and (3, 3, B, 1 + N) of the root, the first of the frame before. local: (3, 3,
+        K - 1, B, N), rotations seen from the parents.
+        """
         fps = self.figure.fps
-        ahead = (rotations[0, 2].square() + rotations[2, 2].square()).sqrt()
-        pitch = _angle(-rotations[1, 2], ahead)[:, 1:]
-        roll = _angle(rotations[1, 0], rotations[1, 1])[:, 1:]
-        # how far it turns since the frame before
+        now = rotations[..., 1:]
         sin, cos = functional.normalize(torch.stack([rotations[0, 2], rotations[2, 2]]), dim=0, eps=1e-6)
         sin_before = sin[:, :-1]
         cos_before = cos[:, :-1]
         sin = sin[:, 1:]
         cos = cos[:, 1:]
-        turn = _angle(sin * cos_before - cos * sin_before, cos * cos_before + sin * sin_before)
-        # and goes, as it faced then
+
+        # pitch, roll, how far the root turns since the frame before, and the angles of maps
+        ahead = (now[0, 2].square() + now[2, 2].square()).sqrt()
+        turn_sine = sin * cos_before - cos * sin_before
+        turn_cosine = cos * cos_before + sin * sin_before
+        axis, sine, cosine = _turned(local)
+        sines = torch.stack([-now[1, 2], now[1, 0], turn_sine])
+        cosines = torch.stack([ahead, now[1, 1], turn_cosine])
+        angles = _angle(torch.cat([sines, sine]), torch.cat([cosines, cosine]))
+        pitch, roll, turn = angles[:3]
+
+        # the root goes as it faced before
         x, _, z = places.diff(dim=1).unbind(-1)
         forward = x * sin_before + z * cos_before
         left = x * cos_before - z * sin_before
-        return torch.stack([forward * fps, left * fps, turn * fps, places[:, 1:, 1], pitch, roll], dim=-1)
+        root = torch.stack([forward * fps, left * fps, turn * fps, places[:, 1:, 1], pitch, roll], dim=-1)
+        return root, axis * angles[3:]
 
 
 def _aim(bone: int, parents: Sequence[int], partners: Sequence[int]) -> int:
@@ -410,24 +431,27 @@ def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
 
 
 def rotmat_to_rotvec(rotations: Tensor) -> Tensor:
-    """Matrices (3, 3, ...) to rotation vectors (3, ...) of at most half a turn."""
+    """Matrices (3, 3, ..., N) to rotation vectors (3, ..., N) of at most half a turn."""
+    axis, sine, cosine = _turned(rotations)
+    return axis * _angle(sine, cosine)
+
+
+def _turned(rotations: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Of matrices (3, 3, ...) the axis (3, ...), and twice the sine and the cosine (...) of the angle."""
     trace = rotations[0, 0] + rotations[1, 1] + rotations[2, 2]
-    # twice the sine times the axis
     swept = torch.stack(
         [rotations[2, 1] - rotations[1, 2], rotations[0, 2] - rotations[2, 0], rotations[1, 0] - rotations[0, 1]]
     )
     # near half a turn the sine vanishes: there the axis is a column of R + R^T + (1 - trace) E, which is 4 q q^T
-    squares = rotations + rotations.transpose(0, 1)
     diagonal = torch.stack([rotations[0, 0], rotations[1, 1], rotations[2, 2]])
     largest = diagonal.argmax(0)
     eye = torch.eye(3, device=rotations.device).reshape(3, 3, *[1] * (rotations.dim() - 2))
-    columns = squares + (1 - trace) * eye
+    columns = rotations + rotations.transpose(0, 1) + (1 - trace) * eye
     column = torch.where(largest == 0, columns[0], torch.where(largest == 1, columns[1], columns[2]))
     column = column * torch.where((column * swept).sum(0) < 0, -1.0, 1.0)
     axis = torch.where(trace < -0.9, column, swept)
-    angle = _angle(swept.square().sum(0).sqrt(), trace - 1)
     length = axis.square().sum(0).clamp_min(1e-20).sqrt()
-    return axis / length * angle
+    return axis / length, swept.square().sum(0).sqrt(), trace - 1
 
 
 @dataclass(frozen=True)
