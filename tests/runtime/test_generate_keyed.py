@@ -275,6 +275,13 @@ def test_an_act_of_the_hands_is_done_over_one_of_the_legs(model: motet.CodesMode
     assert np.linalg.norm(hands, axis=1).min() < 0.2
 
 
+@pytest.mark.parametrize("sentence", ["robot, " * 3000 + "walk", "wave " + "for 3 seconds " * 2000])
+def test_long_sentences_are_refused_before_they_are_read(model: motet.CodesModel, sentence: str) -> None:
+    for read in (model.parts, model.quantities, model.likeliest, model.understood, model.generate):
+        with pytest.raises(motet.TextError, match="letters, but at most 2000"):
+            read(sentence)
+
+
 def test_numbers_and_repeated_words_are_counted(model: motet.CodesModel) -> None:
     assert model._keyed("clap x3") == model._keyed("clap three times")
     assert model.quantities("jump jump jump").amounts == {"times": 3}

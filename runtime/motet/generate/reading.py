@@ -48,6 +48,7 @@ from motet.text.clauses import (
     verbs_of,
 )
 from motet.text.numeric_phrases import PACE_PHRASES, Quantities, known_turns, quantities_of
+from motet.text.vocabulary import MAX_WORDS, check_length
 
 DONE = re.compile(r"(?:ing|ed|[^s]s)$")
 """The ending of a word for an action."""
@@ -143,20 +144,29 @@ class SentenceModel(GenerateModel):
         """The act by key poses that a sentence names; None where there is none, or, of one that is not small, where the
         sentence is a command or a recorded action has all its words, those of the act in its own sentence, and shows no
         more. A sentence may say more than the act, where the likeliest recorded action leaves out more of it."""
+        check_length(sentence)
         if self.contract.skeleton != HUMANOID or sentence in self._sentences:
+            return None
+        if len(self.vocabulary.rules.words(sentence)) > MAX_WORDS:  # it will be refused
             return None
         text, amounts = counted(sentence)
         if amounts.keys() != {"seconds"}:
-            return self._keyed_usual(sentence)
-        act = self._keyed(HELD.sub("", text))
+            return self._keyed_by_hand(sentence)
+        text = HELD.sub("", text)
+        act = None if text in self._sentences else self._keyed_by_hand(text)
         return replace(act, seconds=amounts["seconds"]) if act and not act.is_other_text else None
 
-    def _keyed_usual(self, sentence: str) -> NamedAct | None:
-        """The act of a sentence that does not say how long it lasts: :meth:`_keyed_act`."""
+    def _keyed_by_hand(self, sentence: str) -> NamedAct | None:
+        """The act of a sentence that does not say how long it lasts, done with the hand that it names, if it is one of
+        either hand."""
         if hand := HAND.search(sentence):
-            act = self._keyed_usual(HAND.sub("", sentence, count=1))
+            act = self._keyed_usual(HAND.sub("", sentence))
             if act and act.act.mirrored:
                 return act.with_hand(hand[1])
+        return self._keyed_usual(sentence)
+
+    def _keyed_usual(self, sentence: str) -> NamedAct | None:
+        """The act of a sentence with neither: :meth:`_keyed_act`."""
         words = self.vocabulary.rules.words(sentence)
         act = self._keyed_counted(sentence) or act_named(words)
         if act is None:

@@ -147,6 +147,12 @@ NEW_MODEL_RULES = TextRules()
 """The rules for training new models."""
 
 
+def check_length(sentence: str) -> None:
+    """TextError for a sentence of more than :data:`MAX_LETTERS` letters."""
+    if len(sentence) > MAX_LETTERS:
+        raise TextError(f"the sentence has {len(sentence)} letters, but at most {MAX_LETTERS} are allowed")
+
+
 @dataclass(frozen=True)
 class Vocabulary:
     """The words a model knows: a word's place is its id. TextError unless PAD, SOS, EOS and UNK are the first, and each
@@ -206,16 +212,15 @@ class Vocabulary:
         TextError for a sentence without words, one without a known word, and one of more than :data:`MAX_WORDS` words
         or :data:`MAX_LETTERS` letters.
         """
-        if len(sentence) > MAX_LETTERS:
-            raise TextError(f"the sentence has {len(sentence)} letters, but at most {MAX_LETTERS} are allowed")
-        # each word as it is known, by its stem, or as the nearest spelling
+        check_length(sentence)
         words = self.rules.words(sentence)
-        meant = list(map(self.meant, words))
-        unknown = [word for word, known in zip(words, meant, strict=True) if not known]
         if not words:
             raise TextError(f"the sentence {sentence!r} has no words")
         if len(words) > MAX_WORDS:
             raise TextError(f"the sentence has {len(words)} words, but at most {MAX_WORDS} are allowed: {sentence!r}")
+        # each word as it is known, by its stem, or as the nearest spelling
+        meant = list(map(self.meant, words))
+        unknown = [word for word, known in zip(words, meant, strict=True) if not known]
         if len(unknown) == len(words):
             examples = ", ".join(self.words[len(SPECIALS) : len(SPECIALS) + 20])
             raise TextError(f"the model, for English, knows no word of {sentence!r}; it knows words such as {examples}")
