@@ -13,7 +13,7 @@ from motet.steering.sentence_acts import SaidActs
 
 SENTENCES = {
     "a person waves": (),
-    "a person steps over a puddle": ("puddle",),
+    "a person walks to the window": ("window",),
     "he plays slowly while kicking a ball": ("slowly",),
     "a person turns 90 degrees left": (),
     "a person waves and then he kicks a ball slowly": ("slowly",),
@@ -53,8 +53,8 @@ def whole(parts: list[Shown]) -> Shown:
 
 def test_python_tells_what_is_left_out(shown: dict[str, list[Shown]], model: CodesModel) -> None:
     assert {text: whole(parts).lacking for text, parts in shown.items()} == SENTENCES
-    with pytest.warns(TextWarning, match="leaves out 'puddle'") as caught:
-        model.generate("a person steps over a puddle", seconds=SECONDS)
+    with pytest.warns(TextWarning, match="leaves out 'window'") as caught:
+        model.generate("a person walks to the window", seconds=SECONDS)
     assert {one.filename for one in caught} == {__file__}
 
 
@@ -129,8 +129,8 @@ def test_strict_draws_only_actions_that_leave_out_nothing(model: CodesModel) -> 
 
 def test_a_text_that_is_refused_leaves_the_others(tmp_path: object) -> None:
     result = run(
-        "generate", "a person steps over a puddle", "a person waves", "--strict", "--json", "-o", f"{tmp_path}/a.npz"
+        "generate", "a person walks to the window", "a person waves", "--strict", "--json", "-o", f"{tmp_path}/a.npz"
     )
     assert result.exit_code == 1
     assert [row["input"] for row in json.loads(result.stdout)] == ["a person waves"]
-    assert "leaves out 'puddle'" in result.stderr
+    assert "leaves out 'window'" in result.stderr

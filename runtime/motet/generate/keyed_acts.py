@@ -54,7 +54,7 @@ LIMB_STEMS = BODY_STEMS | frozenset(map(stem, ("leg", "foot", "feet", "elbow", "
 HELD = re.compile(r",? and holds?(?: (?:it|that|still|there|the pose|the position|this))?$")
 """Words of a sentence that says how long its last pose stays."""
 
-HAND = re.compile(r" ?\b(?:with|in|using) (?:the |your |his |her |their |my |its )?(left|right) (?:hand|arm)\b")
+HAND_NAMED = re.compile(r" ?\b(?:with|in|using) (?:the |your |his |her |their |my |its )?(left|right) (?:hand|arm)\b")
 """The hand that an act is done with."""
 
 STANDING = re.compile(r"standing(?: up| still| there)?")
@@ -136,8 +136,7 @@ class NamedAct:
         """The act repeated more often, if it can be and is shorter than some seconds, or with its longest pose held
         longer, if it cannot; or played up to twice as fast, if it lasts longer. seconds: 0 for its usual length."""
         if seconds > self.act.seconds(seed) and self.act.repeat is None:
-            keys = held_longer(self.act.keys, seconds - self.act.seconds(seed))
-            return replace(self, act=replace(self.act, keys=keys))
+            return self._held(seconds - self.act.seconds(seed))
         seconds = seconds or max(self.act.seconds(seed), WALKED_SECONDS if self.goes else 0.0)
         shortfall = seconds - self.act.seconds(seed)
         if shortfall > 0 and self.act.repeat and not self.times:
@@ -146,6 +145,10 @@ class NamedAct:
         faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / ACT_FPS, 1 / ACT_FPS), 1, MOST_HURRIED)
         slowest, fastest = faster * np.array(self.act.speed)
         return replace(self, act=replace(self.act, speed=(slowest, fastest)))
+
+    def _held(self, seconds: float) -> "NamedAct":
+        """The act with its longest pose held some seconds longer."""
+        return replace(self, act=replace(self.act, keys=held_longer(self.act.keys, seconds)))
 
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
         """Frames (T, D) of what is below the act, in the contract's channels, that do the act, too."""

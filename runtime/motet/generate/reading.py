@@ -21,7 +21,7 @@ from motet.generate.base import FamiliaritySettings, GenerateModel, Understood
 from motet.generate.commands import Commands
 from motet.generate.keyed_acts import (
     BOTH_SIDES,
-    HAND,
+    HAND_NAMED,
     HELD,
     LIMB_STEMS,
     STANDING,
@@ -159,8 +159,8 @@ class SentenceModel(GenerateModel):
     def _keyed_by_hand(self, sentence: str) -> NamedAct | None:
         """The act of a sentence that does not say how long it lasts, done with the hand that it names, if it is one of
         either hand."""
-        if hand := HAND.search(sentence):
-            act = self._keyed_usual(HAND.sub("", sentence))
+        if hand := HAND_NAMED.search(sentence):
+            act = self._keyed_usual(HAND_NAMED.sub("", sentence))
             if act and act.act.mirrored:
                 return act.with_hand(hand[1])
         return self._keyed_usual(sentence)
@@ -199,16 +199,24 @@ class SentenceModel(GenerateModel):
             if not (leaves_out or (named and self._commands.act(below) is not None)):
                 continue
             act = named or act_within(words)
-            if act and STANDING.fullmatch(below):
-                return act
-            legs = act_named(without_subject(below.split()))
-            if act and act.leaves_legs and legs and not (legs.leaves_legs or legs.is_other_text):
-                return replace(act, legs=legs)
-            is_limb = stems_of(below.split()) <= BOTH_SIDES | LIMB_STEMS
-            has_verb = not is_limb and any(stem(word) in self._verbs for word in below.split())
-            if act and act.leaves_legs and has_verb and not self._leaves_out(below):
-                return replace(act, below=below)
+            laid_over = self._laid_over(act, below) if act else None
+            if laid_over is not None:
+                return laid_over
         return None
+
+    def _laid_over(self, act: NamedAct, below: str) -> NamedAct | None:
+        """An act over what a clause says; None where it cannot be, or the clause says nothing that is known."""
+        if STANDING.fullmatch(below):
+            return act
+        if not act.leaves_legs:
+            return None
+        words = below.split()
+        legs = act_named(without_subject(words))
+        if legs and not (legs.leaves_legs or legs.is_other_text):
+            return replace(act, legs=legs)
+        is_limb = stems_of(words) <= BOTH_SIDES | LIMB_STEMS
+        has_verb = not is_limb and any(stem(word) in self._verbs for word in words)
+        return replace(act, below=below) if has_verb and not self._leaves_out(below) else None
 
     def _leaves_out(self, sentence: str) -> bool:
         """Whether a sentence has an unknown word, or its likeliest action or command leaves out a word."""
@@ -318,11 +326,15 @@ class SentenceModel(GenerateModel):
                 if not (self.unknown(text) or self.lacking(text)):
                     quantities = replace(quantities, text=text)
                     break
-        if "pace" in quantities.amounts and not any(map(PACE_PHRASES.fullmatch, self.lacking(quantities.text))):
-            amounts = dict(quantities.amounts)
-            del amounts["pace"]
-            quantities = replace(quantities, amounts=amounts)
-        return quantities
+        return self._without_own_pace(quantities)
+
+    def _without_own_pace(self, quantities: Quantities) -> Quantities:
+        """Quantities without a pace that their likeliest action has already."""
+        if "pace" not in quantities.amounts or any(map(PACE_PHRASES.fullmatch, self.lacking(quantities.text))):
+            return quantities
+        amounts = dict(quantities.amounts)
+        del amounts["pace"]
+        return replace(quantities, amounts=amounts)
 
     def _paced(self, quantities: Quantities) -> Quantities:
         """Quantities whose text is a command without its pace, unless the likeliest action does what that says: to

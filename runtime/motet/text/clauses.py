@@ -21,7 +21,7 @@ DIRECTION = re.compile(
     r"\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b",
     re.IGNORECASE,
 )
-OTHER_SIDE = re.compile(
+SIDE_ALONE = re.compile(
     r"(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
 )
 OBJECT = re.compile(
@@ -175,7 +175,7 @@ def _after(before: str, part: str) -> str:
     directions = list(DIRECTION.finditer(before))
     if directions and DIRECTION.fullmatch(part):
         return before[: directions[-1].start()] + part + before[directions[-1].end() :]
-    side = OTHER_SIDE.fullmatch(part)
+    side = SIDE_ALONE.fullmatch(part)
     if side and re.search(r"\b(?:left|right)\b", before):
         return re.sub(r"\b(?:left|right)\b", side[1], before)
     thing = OBJECT.search(SUBJECT.sub("", before, count=1))

@@ -21,10 +21,13 @@ from motet_train.models.kinematics import VectorFigure, VectorPoints
 from motet_train.models.net import Graphs, Net, Part, constants, float_rows, zero_linear
 from motet_train.models.predictor import Block, step_graph
 
-ERROR_FLOOR = 1e-4
+ERROR_FLOOR = 1e-3
 """Metres added to a sign of an error before its logarithm."""
 
-LARGEST_INPUT = 100.0
+LARGEST_SIGN = 10.0
+"""Metres that an error, and a sign of it, count as at most: no figure goes as far within a horizon."""
+
+LARGEST_INPUT = 25.0
 """Numbers of frames further from 0, in metres, radians, and these a second, are no motion, and count as this."""
 
 PLACE_SCALE = 3.0
@@ -71,7 +74,7 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     way = size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1]))).cumsum(1)
     by_frame = [size(steps), disagreement.cumsum(1), way]
     at_all_frames = [sign[:, None].expand(disagreement.shape) for sign in shared]
-    return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1) + ERROR_FLOOR)
+    return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1).clamp_max(LARGEST_SIGN) + ERROR_FLOOR)
 
 
 def size(points: Tensor) -> Tensor:
@@ -97,7 +100,7 @@ class ErrorHead(nn.Module):
 
     def forward(self, logarithms: Tensor) -> Tensor:
         """(B, N, S) to metres (B, N)."""
-        return torch.exp((logarithms * self.weight).sum(-1) + self.bias)
+        return torch.exp(((logarithms * self.weight).sum(-1) + self.bias).clamp_max(math.log(LARGEST_SIGN)))
 
     @torch.no_grad()
     def fit(self, logarithms: Tensor, errors: Tensor) -> None:

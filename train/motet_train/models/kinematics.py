@@ -178,8 +178,8 @@ def vector_figure_of(contract: MotionContract) -> VectorFigure:
 MARKER = 0.1
 """Metres from a bone's joint to its marker."""
 
-UP = (0.0, MARKER, 0.0)
-AHEAD = (0.0, 0.0, MARKER)
+MARKER_UP = (0.0, MARKER, 0.0)
+MARKER_AHEAD = (0.0, 0.0, MARKER)
 """Where markers are, in the axes of their bones."""
 
 
@@ -212,13 +212,13 @@ class VectorPoints(nn.Module):
         for bone, aim in zip(figure.bones, self.aims, strict=True):
             self.markers.append(len(parents))
             parents.append(bone)
-            x, y, z = figure.offsets[aim] if aim >= 0 else UP
-            offsets.append(UP if abs(z) > max(abs(x), abs(y)) else AHEAD)
+            x, y, z = figure.offsets[aim] if aim >= 0 else MARKER_UP
+            offsets.append(MARKER_UP if abs(z) > max(abs(x), abs(y)) else MARKER_AHEAD)
         for row, bone in enumerate(figure.bones):
             if self.aims[row] < 0:
                 self.aims[row] = len(parents)
                 parents.append(bone)
-                offsets.append(UP)
+                offsets.append(MARKER_UP)
 
         # those of the other side: of a bone's points those of its partner
         others = [figure.bones.index(partners[bone]) for bone in figure.bones]
@@ -306,9 +306,12 @@ class VectorPoints(nn.Module):
 
         # each channel from the root block, the maps or the last frame
         values = torch.cat([root, maps, last.expand(-1, root.shape[1], -1)], dim=-1)
+        return _at(values, self._sources(last.shape[-1]), dim=-1)
+
+    def _sources(self, channels: int) -> list[int]:
+        """Where each channel is among the root block, the maps, and the channels of the last frame."""
         known = [*self.root, *self.vectors]
-        columns = range(last.shape[-1])
-        return _at(values, [known.index(n) if n in known else len(known) + n for n in columns], dim=-1)
+        return [known.index(n) if n in known else len(known) + n for n in range(channels)]
 
     def _aimed(self, vectors: Tensor) -> Tensor:
         """Rotations (3, 3, K, ...) in the world of the bones of points, by vectors (3, P, ...) from their parents.

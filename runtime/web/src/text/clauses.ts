@@ -5,7 +5,7 @@ const THEN =
   /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
 const DIRECTION =
   /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
-const OTHER_SIDE =
+const SIDE_ALONE =
   /^(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const OBJECT =
   /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
@@ -79,7 +79,7 @@ function after(before: string, part: string): string {
   if (direction && part.match(DIRECTION)?.[0] === part) {
     return before.slice(0, direction.index) + part + before.slice(direction.index + direction[0].length);
   }
-  const side = OTHER_SIDE.exec(part);
+  const side = SIDE_ALONE.exec(part);
   if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
   const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);

@@ -21,6 +21,7 @@ from motet.motion.skeleton import partners_of
 from motet.representation.contract import named
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import length
+from motet_train.models.figure_predictor import PLACE_SCALE, STEP_SCALE
 from motet_train.models.net import zero_linear
 from motet_train.models.predictor import Block
 
@@ -42,12 +43,6 @@ AVERAGED = 0.995
 
 HIDDEN = 512
 BLOCKS = 3
-
-PLACE_SCALE = 3.0
-"""Factor on metres, so that inputs are of the order of 1."""
-
-STEP_SCALE = 20.0
-"""Factor on metres a frame, likewise."""
 
 ACROSS = [HUMANOID.index(sided(side, "UpperLeg")) for side in LEFT_RIGHT]
 """Left and right hip joint: the facing is at right angles to the line through them."""
