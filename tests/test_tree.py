@@ -10,7 +10,7 @@ FOLDERS = {"motet": ROOT / "runtime", "motet_export": ROOT / "export", "motet_tr
 LARGE_FUNCTION = 250
 """Nodes of the syntax tree, which no layout of lines can change, above which a function counts as large."""
 
-MOST_LARGE_FUNCTIONS = 80
+MOST_LARGE_FUNCTIONS = 75
 """Of the whole tree, as many as there were when this measure was introduced; only ever lowered."""
 
 BANNED = frozenset({"found", "one", "own", "told", "said", "given", "asked", "how", "who", "those"})

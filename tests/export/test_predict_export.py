@@ -53,7 +53,9 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
     assert set(report["runs"]) >= {"horizon", "beyond"}
     for name, rung in report.items():
         if "bound" in rung:
-            assert rung["error"] <= rung["bound"] <= (1e-2 if name.endswith(".far") else 1e-3), name
+            # bones that are aimed at points amplify rounding
+            bound = {"encoder.one_step": 3e-4, "runs": 1e-4}.get(name, 1e-5)
+            assert rung["error"] <= (rung["bound"] if name.endswith(".far") else bound), name
     bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(Manifest.from_json(run.manifest), run.torch_graphs())
     assert isinstance(bundle, PredictModel)
     seeds = 0.3 * np.random.default_rng(0).normal(size=(7, 10, CHANNELS))

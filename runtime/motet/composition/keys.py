@@ -78,8 +78,7 @@ class Moves:
         root[:, 1:2] += _swell(rises, len(root), reach)
 
         # The rotation of each joint.
-        joints = set[int]().union(*(key.turns for key in keys.values()))
-        for joint in joints:
+        for joint in set[int]().union(*(key.turns for key in keys.values())):
             rotations = {frame: key.turns[joint] for frame, key in keys.items() if joint in key.turns}
             turns[:, joint] = _turned(turns[:, joint], rotations, reach)
         return Moves(turns, root, moves.facing)

@@ -1,7 +1,6 @@
 """Acts by key poses (:mod:`motet.keyed`) as generated motions: which sentences name one, and how it is laid over a
 figure that stands, walks, or does anything else."""
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -135,20 +134,15 @@ class NamedAct:
     def lasting(self, seconds: float, seed: int) -> "NamedAct":
         """The act repeated more often, if it can be and is shorter than some seconds, or with its longest pose held
         longer, if it cannot; or played up to twice as fast, if it lasts longer. seconds: 0 for its usual length."""
-        if seconds > self.act.seconds(seed) and self.act.repeat is None:
-            return self._held(seconds - self.act.seconds(seed))
-        seconds = seconds or max(self.act.seconds(seed), WALKED_SECONDS if self.goes else 0.0)
-        shortfall = seconds - self.act.seconds(seed)
-        if shortfall > 0 and self.act.repeat and not self.times:
-            times = self.act.repeat.times[0] + math.ceil(shortfall / self.act.repeat.every[0])
-            return replace(self, act=replace(self.act, repeat=replace(self.act.repeat, times=(times, times))))
-        faster = np.clip(self.act.seconds(seed) / max(seconds - 2 / ACT_FPS, 1 / ACT_FPS), 1, MOST_HURRIED)
+        usual = self.act.seconds(seed)
+        if seconds > usual and self.act.repeat is None:
+            return replace(self, act=replace(self.act, keys=held_longer(self.act.keys, seconds - usual)))
+        seconds = seconds or max(usual, WALKED_SECONDS if self.goes else 0.0)
+        if seconds > usual and self.act.repeat and not self.times:
+            return replace(self, act=replace(self.act, repeat=self.act.repeat.longer(seconds - usual)))
+        faster = np.clip(usual / max(seconds - 2 / ACT_FPS, 1 / ACT_FPS), 1, MOST_HURRIED)
         slowest, fastest = faster * np.array(self.act.speed)
         return replace(self, act=replace(self.act, speed=(slowest, fastest)))
-
-    def _held(self, seconds: float) -> "NamedAct":
-        """The act with its longest pose held some seconds longer."""
-        return replace(self, act=replace(self.act, keys=held_longer(self.act.keys, seconds)))
 
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
         """Frames (T, D) of what is below the act, in the contract's channels, that do the act, too."""

@@ -215,13 +215,12 @@ class CodesModel(SentenceModel):
         # A row for each hypothesis of each context, and its action.
         count = settings["hypotheses"]
         noise_of_rows = apart(noise, count)
-        contexts = np.repeat(contexts, count, axis=0)
-        actions = drawn_actions(self.source, contexts, noise_of_rows, settings["certainty"])
+        actions = drawn_actions(self.source, np.repeat(contexts, count, axis=0), noise_of_rows, settings["certainty"])
         # Codes, up to the end of a motion or as many as the seconds take.
         seconds = settings["seconds"]
-        longest = max(1, self.codec.steps(seconds or settings["max_seconds"]))
+        steps = self.codec.steps(seconds or settings["max_seconds"])
         writer = Writer(self.source, noise_of_rows, CodesSettings(**settings))
-        motions = draw_codes(writer, actions, longest, exactly=seconds > 0)
+        motions = draw_codes(writer, actions, max(1, steps), exactly=seconds > 0)
         # Frames, those beyond the seconds cut off.
         last = max(1, round(seconds * self.fps)) if seconds else None
         samples = []

@@ -1,5 +1,6 @@
 """Key poses: what the parts of the body do at a time."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -50,17 +51,25 @@ class Repeat:
     every: Span
     times: tuple[int, int]
 
+    def longer(self, seconds: float) -> "Repeat":
+        """As often as takes some seconds more than at least."""
+        times = self.times[0] + math.ceil(seconds / self.every[0])
+        return replace(self, times=(times, times))
+
 
 def held_longer(keys: tuple[Key, ...], seconds: float) -> tuple[Key, ...]:
     """Keys of which the one that is held longest, if any is held, stays some seconds longer, and those after it come
     as much later."""
-    longest = max(range(len(keys)), key=lambda number: keys[number].hold[1])
-    low, high = keys[longest].hold
-    if not high:
+    held = max(keys, key=lambda key: key.hold[1])
+    if not held.hold[1]:
         return keys
-    held = replace(keys[longest], hold=(low + seconds, high + seconds))
-    later = [replace(key, at=(key.at[0] + seconds, key.at[1] + seconds)) for key in keys[longest + 1 :]]
-    return (*keys[:longest], held, *later)
+    place = keys.index(held)
+    later = [replace(key, at=_longer(key.at, seconds)) for key in keys[place + 1 :]]
+    return (*keys[:place], replace(held, hold=_longer(held.hold, seconds)), *later)
+
+
+def _longer(span: Span, seconds: float) -> Span:
+    return span[0] + seconds, span[1] + seconds
 
 
 def mirrored_keys(keys: Iterable[Key]) -> tuple[Key, ...]:

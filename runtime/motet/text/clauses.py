@@ -166,12 +166,12 @@ def _in_full(parts: Iterable[str]) -> list[str]:
     "throw it" throws the ball, who sits and then stands stands up, and who turns around and walks back goes forward."""
     full: list[str] = []
     for part in parts:
-        before = full[-1] if full else ""
-        full.append(_after(before, part) if before else part)
+        full.append(_after(full[-1], part) if full else part)
     return full
 
 
 def _after(before: str, part: str) -> str:
+    """A part in full, by the one before it."""
     directions = list(DIRECTION.finditer(before))
     if directions and DIRECTION.fullmatch(part):
         return before[: directions[-1].start()] + part + before[directions[-1].end() :]

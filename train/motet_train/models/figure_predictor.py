@@ -57,11 +57,6 @@ class FigurePredictorConfig:
     doubts: bool = False
 
 
-def possible(frames: Tensor) -> Tensor:
-    """Frames (..., C) with each number within what a motion can have."""
-    return frames.clamp(-LARGEST_INPUT, LARGEST_INPUT)
-
-
 def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
     """Logarithms (B, N, S) of what an error is judged by: how fast and how unevenly the figure moves, how far the net
     takes it and on what way, and how much its answers so far differ from those to the mirrored question.
@@ -79,8 +74,7 @@ def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
 
 def size(points: Tensor) -> Tensor:
     """The root mean square (...) over the numbers of points (..., P, 3)."""
-    root_mean: Tensor = (points.square().mean((-2, -1)) + 1e-12).sqrt()
-    return root_mean
+    return torch.sqrt(points.square().mean((-2, -1)) + 1e-12)
 
 
 class ErrorHead(nn.Module):
@@ -154,7 +148,7 @@ class Member(nn.Module):
         weight: Tensor = self.outward.weight
         bias: Tensor = self.outward.bias
         if points is not None:
-            shape = (-1, len(points.parents), 3)
+            shape = (-1, len(points.tree.parents), 3)
             weight = points.from_parents(torch.unflatten(weight, 0, shape), dim=1).flatten(0, 2)
             bias = points.from_parents(torch.unflatten(bias, 0, shape), dim=1).flatten()
         return functional.linear(hidden, weight, bias)
@@ -174,7 +168,7 @@ class FigurePredictor(Net):
         super().__init__(config.channels)
         self.config = config
         self.points = VectorPoints(config.figure)
-        numbers = 3 * len(self.points.parents)
+        numbers = 3 * len(self.points.tree.parents)
         seen = numbers * config.seed_frames
         self.members = nn.ModuleList(Member(seen, numbers, config) for _ in range(config.members))
         self.doubt = ErrorHead(config.frames) if config.doubts else None
@@ -185,29 +179,18 @@ class FigurePredictor(Net):
         constants(self, cosines=waves * (time + 1) * (3 / config.frames / PLACE_SCALE))
 
     def seen(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) as points (B, L, P, 3), seen from the last one."""
-        seen: Tensor = self.points(possible(frames), frames.shape[1] - 1)
+        """Frames (B, L or more, C) as points (B, L or more, P, 3), seen from the last seed frame."""
+        seen: Tensor = self.points(frames.clamp(-LARGEST_INPUT, LARGEST_INPUT), self.config.seed_frames - 1)
         return seen
 
-    def each_after(self, seen: Tensor) -> list[Tensor]:
-        """Points (B, L, P, 3) to those of the next frames (B, N, P, 3) by each member: this is trained."""
-        inputs = self._inputs(seen)
-        return [seen[:, -1:] + self._steps(member(inputs)) for member in self.members]
+    def steps(self, seen: Tensor, points: VectorPoints | None = None) -> Tensor:
+        """Points (B, L, P, 3) to their steps (M, B, N, P, 3) from the last seed frame by each of M members.
 
-    def _inputs(self, seen: Tensor) -> Tensor:
-        """What members see (B, D) of points (B, L, P, 3)."""
-        last = seen[:, -1]
-        return torch.cat([PLACE_SCALE * last.flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
-
-    def _steps(self, weights: Tensor) -> Tensor:
-        """Weights (B, W P 3) of cosines as steps (B, N, P, 3)."""
-        return torch.unflatten(self.cosines @ torch.unflatten(weights, 1, (self.config.waves, -1)), 2, (-1, 3))
-
-    def vectors_after(self, seen: Tensor) -> Tensor:
-        """Points (B, L, P, 3) to the steps (B, N, P, 3) of vectors from their parents: the mean of the members."""
-        inputs = self._inputs(seen)
-        weights = torch.stack([member(inputs, self.points) for member in self.members])
-        return self._steps(weights.mean(0))
+        points: give the steps of vectors from the parents of points.
+        """
+        inputs = torch.cat([PLACE_SCALE * seen[:, -1].flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
+        weights = torch.stack([member(inputs, points) for member in self.members])
+        return torch.unflatten(self.cosines @ torch.unflatten(weights, 2, (self.config.waves, -1)), 3, (-1, 3))
 
     def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them: the root
@@ -215,24 +198,34 @@ class FigurePredictor(Net):
         seen = self.seen(frames)
         # rows and their mirror images in one batch, side by side
         both = torch.stack([seen, self.points.mirror(seen)], dim=1).flatten(0, 1)
-        steps = torch.unflatten(self.vectors_after(both), 0, (-1, 2))
+        steps = torch.unflatten(self.steps(both, self.points).mean(0), 0, (-1, 2))
         plain = steps[:, 0]
         mirrored = self.points.mirror(steps[:, 1])
-        last = self.points.from_parents(seen[:, -1:])
-        vectors = torch.cat([last, last + (plain + mirrored) / 2], dim=1)
-        return self.points.frames(vectors, frames[:, -1:]), size((plain - mirrored) / 2)
+        return self._frames_after(frames, seen, (plain + mirrored) / 2), size((plain - mirrored) / 2)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Frames (B, L, C) to the next (B, N, C)."""
-        return self.with_disagreement(frames)[0]
+        """Frames (B, L, C) to the next (B, N, C): by the mean for them and for their mirror image, where sides are
+        known."""
+        if self.config.figure.partners:
+            return self.with_disagreement(frames)[0]
+        seen = self.seen(frames)
+        return self._frames_after(frames, seen, self.steps(seen, self.points).mean(0))
+
+    def _frames_after(self, frames: Tensor, seen: Tensor, steps: Tensor) -> Tensor:
+        """The frames (B, N, C) to which steps (B, N, P, 3) of vectors lead from frames (B, L, C) and their points."""
+        last = self.points.from_parents(seen[:, -1:])
+        return self.points.frames(torch.cat([last, last + steps], dim=1), frames[:, -1:])
+
+    def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
+        """The signs (B, N, S) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
+        points = self.seen(torch.cat([frames, trajectory], dim=1))
+        past = points[:, : self.config.seed_frames]
+        return error_signs(past.diff(dim=1), points[:, self.config.seed_frames :] - past[:, -1:], disagreement)
 
     def expected_error(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
         """The expected error (B, N) in metres, from frames (B, L, C) and what :meth:`with_disagreement` gives."""
         assert self.doubt is not None
-        count = self.config.seed_frames
-        points = self.points(possible(torch.cat([frames, trajectory], dim=1)), count - 1)
-        past = points[:, :count]
-        expected: Tensor = self.doubt(error_signs(past.diff(dim=1), points[:, count:] - past[:, -1:], disagreement))
+        expected: Tensor = self.doubt(self.error_signs(frames, trajectory, disagreement))
         return expected
 
     def graphs(self) -> Graphs:

@@ -3,7 +3,7 @@
 Letters in shapes: B rows, T frames, D channels, J joints, K of them with rotations of their own.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -183,114 +183,125 @@ MARKER_AHEAD = (0.0, 0.0, MARKER)
 """Where markers are, in the axes of their bones."""
 
 
-class VectorPoints(nn.Module):
-    """Points that tell how a figure in ``root_vectors`` stands: P in all, the J joints, then for each bone a marker
-    that shows how it is turned about itself, and a tip for a bone without a child to aim at.
+@dataclass(frozen=True)
+class MarkedTree:
+    """The tree of P points: the J joints of a figure, then for each of its K bones a marker, which shows how it is
+    turned about itself, and a tip for a bone without a child to aim at.
 
-    A bone is aimed at its first child, one in the middle if the bone is, or at its tip. Its rotation follows from that
-    and from its marker.
+    parents, offsets: of the points, as those of joints. aims: of each bone the point that it is aimed at, its first
+    child, one in the middle if the bone is, or its tip. markers: of each bone its marker. partners: for each point that
+    on the other side, or itself.
+    """
+
+    parents: Sequence[int]
+    offsets: Sequence[tuple[float, ...]]
+    aims: Mapping[int, int]
+    markers: Mapping[int, int]
+    partners: Sequence[int]
+
+
+def marked_tree(figure: VectorFigure) -> MarkedTree:
+    """The tree of a figure with markers and tips."""
+    joints = len(figure.parents)
+    partners = figure.partners or range(joints)
+    aims = {bone: _aim(bone, figure.parents, partners) for bone in figure.bones}
+    tips = [bone for bone, aim in aims.items() if aim < 0]
+    markers = {bone: joints + row for row, bone in enumerate(aims)}
+    for row, bone in enumerate(tips):
+        aims[bone] = joints + len(aims) + row
+    offsets = [*figure.offsets, *[MARKER_AHEAD] * len(aims), *[MARKER_UP] * len(tips)]
+    for bone, marker in markers.items():
+        x, y, z = offsets[aims[bone]]
+        if abs(z) > abs(x) + abs(y):  # a marker is across the way to the child
+            offsets[marker] = MARKER_UP
+    # of a bone's points those of its partner are on the other side
+    sides = [*partners, *(markers[partners[bone]] for bone in markers), *(aims[partners[bone]] for bone in tips)]
+    return MarkedTree([*figure.parents, *markers, *tips], offsets, aims, markers, sides)
+
+
+def _aim(bone: int, parents: Sequence[int], partners: Sequence[int]) -> int:
+    """The child that a bone is aimed at; -1 where there is none."""
+    for joint, parent in enumerate(parents):
+        in_the_middle = partners[joint] == joint
+        if parent == bone and (in_the_middle or partners[bone] != bone):
+            return joint
+    return -1
+
+
+class VectorPoints(nn.Module):
+    """Points that tell how a figure in ``root_vectors`` stands: those of its :class:`MarkedTree`.
+
+    The rotation of a bone follows from the point that it is aimed at and from its marker.
     """
 
     offsets: Tensor
     rest: Tensor
-    seen_from_aims: Tensor
-    lengths: Tensor
-    ground: Tensor
+    offsets_along_aims: Tensor
     plane: Tensor
 
     def __init__(self, figure: VectorFigure) -> None:
         super().__init__()
         self.figure = figure
-        parents = list(figure.parents)
-        offsets = list(figure.offsets)
-        partners = list(figure.partners or range(len(parents)))
-        self.joints = len(parents)
-
-        # a marker for each bone, across the way to its child, and a tip where it has none
-        self.aims = [_aim(bone, parents, partners) for bone in figure.bones]
-        self.markers: list[int] = []
-        for bone, aim in zip(figure.bones, self.aims, strict=True):
-            self.markers.append(len(parents))
-            parents.append(bone)
-            x, y, z = figure.offsets[aim] if aim >= 0 else MARKER_UP
-            offsets.append(MARKER_UP if abs(z) > max(abs(x), abs(y)) else MARKER_AHEAD)
-        for row, bone in enumerate(figure.bones):
-            if self.aims[row] < 0:
-                self.aims[row] = len(parents)
-                parents.append(bone)
-                offsets.append(MARKER_UP)
-
-        # those of the other side: of a bone's points those of its partner
-        others = [figure.bones.index(partners[bone]) for bone in figure.bones]
-        partners += [self.markers[other] for other in others]
-        partners += [self.aims[other] for aim, other in zip(self.aims, others, strict=True) if aim >= self.joints]
-        self.parents = tuple(parents)
-        self.partners = partners
-        in_rest = torch.tensor(offsets)
-        aimed = torch.cat([in_rest[self.aims].T, in_rest[self.markers].T])
-        rest = axes_to_rotmat(aimed).transpose(0, 1)[..., None]
+        self.joints = len(figure.parents)
+        self.tree = marked_tree(figure)
+        self.aims = list(self.tree.aims.values())
+        self.markers = list(self.tree.markers.values())
+        self.bone_parents = _places_in(figure.bones, [figure.parents[bone] for bone in figure.bones[1:]])
+        offsets = torch.tensor(self.tree.offsets)
+        at_rest = torch.cat([offsets[self.aims].T, offsets[self.markers].T])
+        rest = axes_to_rotmat(at_rest).transpose(0, 1)[..., None]
+        parents = _places_in(figure.bones, [max(parent, 0) for parent in figure.parents])
         # where joints are from their parents, in axes along the aims of these
-        rows = [max(0, self._row(parent)) for parent in figure.parents]
-        seen_from_aims = product(_at(rest, rows), in_rest[: self.joints].T[:, None, :, None])
+        along = product(_at(rest, parents), offsets[: self.joints].T[:, None, :, None])
         constants(
             self,
-            offsets=in_rest,
+            offsets=offsets,
             rest=rest[..., None],
-            seen_from_aims=seen_from_aims[..., None],
-            lengths=in_rest.norm(dim=1)[None, :, None, None],
-            ground=torch.tensor([1.0, 0.0, 1.0]),
+            offsets_along_aims=along[..., None],
             plane=torch.tensor([-1.0, 1.0, 1.0]),
         )
-        self.root = list(figure.root)
-        self.vectors = list(figure.vectors)
-
-    def _row(self, joint: int) -> int:
-        """The number of the bone of a joint, -1 where it has none."""
-        return self.figure.bones.index(joint) if joint in self.figure.bones else -1
 
     def mirror(self, points: Tensor) -> Tensor:
         """Points (..., P, 3) with left and right exchanged."""
-        return _at(points, self.partners, dim=-2) * self.plane
+        return _at(points, self.tree.partners, dim=-2) * self.plane
 
     def forward(self, frames: Tensor, last: int) -> Tensor:
         """Frames (B, T, D) in the contract's units to points (B, T, P, 3) in metres.
 
         The origin is on the ground below the root in frame ``last``, and the figure faces z there.
         """
-        root = frames[..., self.root]
+        root = _at(frames, self.figure.root, dim=-1)
         facing = root[..., 2].cumsum(1) / self.figure.fps
         facing = facing - facing[:, last, None]
-        path = self._path(root, facing)
-        path = path - self.ground * path[:, last, None]
-        return self._points(frames, facing) + path[..., None, :]
+        return self._points(frames, facing) + self._path(root, facing, last)[..., None, :]
 
     def _points(self, frames: Tensor, facing: Tensor) -> Tensor:
         """Points (B, T, P, 3) around the root, by its rotation and those of all other bones."""
-        root = frames[..., self.root]
+        root = _at(frames, self.figure.root, dim=-1)
         turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
         # bones without a map turn with their parents: they see a column of zeros
         bones = self.figure.bones
-        vectors = functional.pad(frames, (0, 1))[..., self.vectors].reshape(-1, len(bones) - 1, 3)
+        vectors = _at(functional.pad(frames, (0, 1)), self.figure.vectors, dim=-1).reshape(-1, len(bones) - 1, 3)
         local = torch.cat([turned.reshape(3, 3, 1, -1), rotvec_to_rotmat(vectors.permute(2, 1, 0))], dim=2)
-        points = forward_kinematics(self.parents, self.offsets, local, bones)
+        points = forward_kinematics(self.tree.parents, self.offsets, local, bones)
         return points.reshape(*frames.shape[:-1], -1, 3)
 
-    def _path(self, root: Tensor, facing: Tensor) -> Tensor:
-        """Places (B, T, 3) of the root by its channels (B, T, 6): it goes where it faced in the frame before."""
+    def _path(self, root: Tensor, facing: Tensor, last: int) -> Tensor:
+        """Places (B, T, 3) of the root by its channels (B, T, 6), seen from frame ``last``: it goes where it faced in
+        the frame before."""
         fps = self.figure.fps
         before = facing - root[..., 2] / fps
         sin = before.sin()
         cos = before.cos()
         x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / fps
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / fps
-        return torch.stack([x, root[..., 3], z], dim=-1)
+        return torch.stack([x - x[:, last, None], root[..., 3], z - z[:, last, None]], dim=-1)
 
     def from_parents(self, points: Tensor, dim: int = -2) -> Tensor:
         """Points (..., P, ...) as vectors from their parents; that of the root stays."""
-        parents = [max(parent, 0) for parent in self.parents]
-        root = points.narrow(dim, 0, 1)
-        others = points - _at(points, parents, dim=dim)
-        return torch.cat([root, others.narrow(dim, 1, len(parents) - 1)], dim=dim)
+        parents = self.tree.parents[1:]
+        others = points.narrow(dim, 1, len(parents)) - _at(points, parents, dim=dim)
+        return torch.cat([points.narrow(dim, 0, 1), others], dim=dim)
 
     def frames(self, vectors: Tensor, last: Tensor) -> Tensor:
         """The frames (B, N, D) that are as near to points as bones allow.
@@ -299,10 +310,12 @@ class VectorPoints(nn.Module):
         it. last: (B, 1, D) that frame, whose other channels stay.
         """
         rotations = self._aimed(vectors.permute(3, 2, 0, 1))
-        parents = _places_in(self.figure.bones, [self.figure.parents[bone] for bone in self.figure.bones[1:]])
-        local = product(_at(rotations, parents).transpose(0, 1), rotations[:, :, 1:])[..., 1:]
-        root, maps = self._root_and_maps(vectors[:, :, 0], rotations[:, :, 0], local)
-        maps = maps.permute(2, 3, 1, 0).flatten(2)
+        local = product(_at(rotations, self.bone_parents).transpose(0, 1), rotations[:, :, 1:])[..., 1:]
+        ahead = torch.stack([rotations[0, 2, 0], rotations[2, 2, 0]])
+        heading = functional.normalize(ahead, dim=0, eps=1e-6)  # its sine and cosine
+        angles, axis = _angles(rotations[:, :, 0], heading, local)
+        root = self._root(vectors[:, :, 0], heading, angles)
+        maps = (axis * angles[3:]).permute(2, 3, 1, 0).flatten(2)
 
         # each channel from the root block, the maps or the last frame
         values = torch.cat([root, maps, last.expand(-1, root.shape[1], -1)], dim=-1)
@@ -310,7 +323,7 @@ class VectorPoints(nn.Module):
 
     def _sources(self, channels: int) -> list[int]:
         """Where each channel is among the root block, the maps, and the channels of the last frame."""
-        known = [*self.root, *self.vectors]
+        known = [*self.figure.root, *self.figure.vectors]
         return [known.index(n) if n in known else len(known) + n for n in range(channels)]
 
     def _aimed(self, vectors: Tensor) -> Tensor:
@@ -322,76 +335,64 @@ class VectorPoints(nn.Module):
         level = [0]
         apart = torch.zeros_like(vectors[:, :1])  # of the points of joints from where these are
         order: list[int] = []
-        all_aims: list[Tensor] = []
+        aims: list[Tensor] = []
         while inner := [joint for joint in level if joint in bones]:
-            # the aims of the bones of this depth
-            rows = _places_in(bones, inner)
-            targets = [self.aims[row] for row in rows]
-            aims = _at(vectors, targets, dim=1) + _at(apart, _places_in(level, inner), dim=1)
-            order += rows
-            all_aims.append(aims)
+            # the aims of the bones of this depth, and how far the points of their children are from these
+            apart = _at(apart, _places_in(level, inner), dim=1)
+            aims.append(_at(vectors, [self.tree.aims[bone] for bone in inner], dim=1) + apart)
+            order += inner
+            level = [joint for joint in range(self.joints) if self.figure.parents[joint] in inner]
+            if level:
+                apart = self._apart(vectors, aims[-1], inner, level)
+        axes = [_at(torch.cat(aims, dim=1), _places_in(order, bones), dim=1), _at(vectors, self.markers, dim=1)]
+        return product(axes_to_rotmat(torch.cat(axes)), self.rest)
 
-            # how far the points of their children are from these: of one that is aimed at, by the bone's length alone
-            level = [joint for joint in range(self.joints) if self.parents[joint] in inner]
-            if not level:
-                break
-            rows = [inner.index(self.parents[joint]) for joint in level]
-            if [targets[row] for row in rows] == level:
-                reached = functional.normalize(aims, dim=0, eps=1e-6) * self.lengths[:, targets]
-                apart = _at(aims - reached, rows, dim=1)
-            else:
-                across = _at(vectors, [self.markers[bones.index(joint)] for joint in inner], dim=1)
-                along = _at(axes_to_rotmat(torch.cat([aims, across])), rows)
-                offsets = product(along, _at(self.seen_from_aims, level))[:, 0]
-                starts = _at(vectors, level, dim=1) + _at(aims - _at(vectors, targets, dim=1), rows, dim=1)
-                apart = starts - offsets
-        aimed = torch.cat(
-            [
-                _at(torch.cat(all_aims, dim=1), _places_in(order, range(len(bones))), dim=1),
-                _at(vectors, self.markers, dim=1),
-            ]
-        )
-        return product(axes_to_rotmat(aimed), self.rest)
+    def _apart(self, vectors: Tensor, aims: Tensor, bones: list[int], children: list[int]) -> Tensor:
+        """How far (3, C, ...) the points of the children of R bones are from where these come to be.
 
-    def _root_and_maps(self, places: Tensor, rotations: Tensor, local: Tensor) -> tuple[Tensor, Tensor]:
-        """The root block (B, N, 6) and the maps (3, K - 1, B, N) of the other bones.
-
-        places, rotations: (B, 1 + N, 3) and (3, 3, B, 1 + N) of the root, the first of the frame before. local: (3, 3,
-        K - 1, B, N), rotations seen from the parents.
+        vectors: as :meth:`_aimed` takes them. aims: (3, R, ...) of the bones.
         """
+        targets = [self.tree.aims[bone] for bone in bones]
+        parents = _places_in(bones, [self.figure.parents[child] for child in children])
+        # a child that is aimed at is on the aim, by the bone's length
+        if [targets[parent] for parent in parents] == children:
+            reached = functional.normalize(aims, dim=0, eps=1e-6) * self.offsets_along_aims[0][:, targets]
+            return _at(aims - reached, parents, dim=1)
+        # the others turn with the bone
+        markers = [self.tree.markers[bone] for bone in bones]
+        along = axes_to_rotmat(torch.cat([aims, _at(vectors, markers, dim=1)]))
+        turned = product(_at(along, parents), _at(self.offsets_along_aims, children))[:, 0]
+        starts = _at(aims - _at(vectors, targets, dim=1), parents, dim=1)
+        return starts + _at(vectors, children, dim=1) - turned
+
+    def _root(self, places: Tensor, heading: Tensor, angles: Tensor) -> Tensor:
+        """The root block (B, N, 6) by places (B, 1 + N, 3) and headings (2, B, 1 + N) of the root, the first of the
+        frame before; and by pitch, roll and turn, the first three of (.., B, N) angles."""
         fps = self.figure.fps
-        now = rotations[..., 1:]
-        sin, cos = functional.normalize(torch.stack([rotations[0, 2], rotations[2, 2]]), dim=0, eps=1e-6)
-        sin_before = sin[:, :-1]
-        cos_before = cos[:, :-1]
-        sin = sin[:, 1:]
-        cos = cos[:, 1:]
-
-        # pitch, roll, how far the root turns since the frame before, and the angles of maps
-        ahead = (now[0, 2].square() + now[2, 2].square()).sqrt()
-        turn_sine = sin * cos_before - cos * sin_before
-        turn_cosine = cos * cos_before + sin * sin_before
-        axis, sine, cosine = _turned(local)
-        sines = torch.stack([-now[1, 2], now[1, 0], turn_sine])
-        cosines = torch.stack([ahead, now[1, 1], turn_cosine])
-        angles = _angle(torch.cat([sines, sine]), torch.cat([cosines, cosine]))
         pitch, roll, turn = angles[:3]
-
-        # the root goes as it faced before
+        # it goes as it faced before
+        sin, cos = heading[..., :-1]
         x, _, z = places.diff(dim=1).unbind(-1)
-        forward = x * sin_before + z * cos_before
-        left = x * cos_before - z * sin_before
-        root = torch.stack([forward * fps, left * fps, turn * fps, places[:, 1:, 1], pitch, roll], dim=-1)
-        return root, axis * angles[3:]
+        forward = (x * sin + z * cos) * fps
+        left = (x * cos - z * sin) * fps
+        return torch.stack([forward, left, turn * fps, places[:, 1:, 1], pitch, roll], dim=-1)
 
 
-def _aim(bone: int, parents: Sequence[int], partners: Sequence[int]) -> int:
-    """The child that a bone is aimed at; -1 where there is none."""
-    for joint, parent in enumerate(parents):
-        in_the_middle = partners[joint] == joint
-        if parent == bone and (in_the_middle or partners[bone] != bone):
-            return joint
-    return -1
+def _angles(root: Tensor, heading: Tensor, local: Tensor) -> tuple[Tensor, Tensor]:
+    """The root's pitch, roll and turn since the frame before, and the angles of the other bones (3 + K - 1, B, N); and
+    the axes (3, K - 1, B, N) of these.
+
+    root: (3, 3, B, 1 + N), its rotations, the first of the frame before. heading: (2, B, 1 + N), the sine and cosine of
+    where it faces. local: (3, 3, K - 1, B, N), rotations seen from the parents. All angles are computed at once.
+    """
+    sin_before, cos_before = heading[..., :-1]
+    sin, cos = heading[..., 1:]
+    now = root[..., 1:]
+    ahead = (now[0, 2].square() + now[2, 2].square()).sqrt()
+    sines = torch.stack([-now[1, 2], now[1, 0], sin * cos_before - cos * sin_before])
+    cosines = torch.stack([ahead, now[1, 1], cos * cos_before + sin * sin_before])
+    axis, sine, cosine = _turned(local)
+    return _angle(torch.cat([sines, sine]), torch.cat([cosines, cosine])), axis
 
 
 def _angle(sine: Tensor, cosine: Tensor) -> Tensor:
@@ -433,28 +434,26 @@ def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
     return eye + angle.sin() / angle * cross + (1 - angle.cos()) / squared * product(cross, cross)
 
 
-def rotmat_to_rotvec(rotations: Tensor) -> Tensor:
-    """Matrices (3, 3, ..., N) to rotation vectors (3, ..., N) of at most half a turn."""
-    axis, sine, cosine = _turned(rotations)
-    return axis * _angle(sine, cosine)
-
-
 def _turned(rotations: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Of matrices (3, 3, ...) the axis (3, ...), and twice the sine and the cosine (...) of the angle."""
-    trace = rotations[0, 0] + rotations[1, 1] + rotations[2, 2]
+    diagonal = torch.stack([rotations[0, 0], rotations[1, 1], rotations[2, 2]])
+    trace = diagonal.sum(0)
     swept = torch.stack(
         [rotations[2, 1] - rotations[1, 2], rotations[0, 2] - rotations[2, 0], rotations[1, 0] - rotations[0, 1]]
     )
-    # near half a turn the sine vanishes: there the axis is a column of R + R^T + (1 - trace) E, which is 4 q q^T
-    diagonal = torch.stack([rotations[0, 0], rotations[1, 1], rotations[2, 2]])
+    # near half a turn the sine vanishes, and an axis along it
+    column = _column(rotations, diagonal)
+    to_its_side = torch.where((column * swept).sum(0) < 0, -1.0, 1.0)
+    axis = torch.where(trace < -0.9, column * to_its_side, swept)
+    return functional.normalize(axis, dim=0, eps=1e-10), swept.square().sum(0).sqrt(), trace - 1
+
+
+def _column(rotations: Tensor, diagonal: Tensor) -> Tensor:
+    """The column (3, ...) of R + R^T + (1 - trace) E, which is 4 q q^T, with the largest number on the diagonal."""
+    eye = torch.eye(3, device=rotations.device).reshape(3, 3, *[1] * (diagonal.dim() - 1))
+    columns = rotations + rotations.transpose(0, 1) + (1 - diagonal.sum(0)) * eye
     largest = diagonal.argmax(0)
-    eye = torch.eye(3, device=rotations.device).reshape(3, 3, *[1] * (rotations.dim() - 2))
-    columns = rotations + rotations.transpose(0, 1) + (1 - trace) * eye
-    column = torch.where(largest == 0, columns[0], torch.where(largest == 1, columns[1], columns[2]))
-    column = column * torch.where((column * swept).sum(0) < 0, -1.0, 1.0)
-    axis = torch.where(trace < -0.9, column, swept)
-    length = axis.square().sum(0).clamp_min(1e-20).sqrt()
-    return axis / length, swept.square().sum(0).sqrt(), trace - 1
+    return torch.where(largest == 0, columns[0], torch.where(largest == 1, columns[1], columns[2]))
 
 
 @dataclass(frozen=True)

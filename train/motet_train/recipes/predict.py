@@ -8,8 +8,7 @@ from torch import Tensor
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
 from motet_train.descent import GradientLearner, Term, Terms
-from motet_train.models.figure_predictor import FigurePredictor, FigurePredictorConfig, error_signs
-from motet_train.models.figure_predictor import possible as possible_frames
+from motet_train.models.figure_predictor import FigurePredictor, FigurePredictorConfig
 from motet_train.models.kinematics import smooth_length, vector_figure_of
 from motet_train.models.predictor import Predictor, PredictorConfig
 from motet_train.recipes.recipe import ADAMW, AUGMENTED, Job, Recipe, Visits
@@ -142,10 +141,11 @@ def _channel_loss(net: Predictor, windows: Tensor, weights: Tensor) -> Terms:
 def _figure_learner(material: Material, job: Job) -> GradientLearner[FigurePredictor]:
     """Learns where points of a figure are after the seed of a window, and from held-out windows its expected errors."""
     contract = material.contract
+    figure = vector_figure_of(contract)
     net = FigurePredictor(
         job.recipe.sized(
             channels=len(contract.channels),
-            figure=vector_figure_of(contract),
+            figure=figure if material.mirrored else replace(figure, partners=()),
             doubts=bool(material.mirrored) and len(material.validation) > 0,
         )
     )
@@ -168,13 +168,12 @@ def _figure_loss(net: FigurePredictor, windows: Tensor) -> Terms:
     which count less, and show how bones turn about themselves."""
     seed = net.config.seed_frames
     with torch.autocast(windows.device.type, enabled=False):
-        points = net.points(possible_frames(windows), seed - 1)
+        points = net.seen(windows)
+    apart = points[:, seed - 1 : seed] + net.steps(points[:, :seed]).float() - points[:, seed:]
+    # by member, row and point
+    lengths = smooth_length(apart, 1e-8).mean(2) + smooth_length(apart.diff(dim=2), 1e-8).mean(2)
     joints = net.points.joints
-    losses = torch.zeros(len(windows), device=windows.device)
-    for answer in net.each_after(points[:, :seed]):
-        apart = answer.float() - points[:, seed:]
-        lengths = smooth_length(apart, 1e-8).mean(1) + smooth_length(apart.diff(dim=1), 1e-8).mean(1)
-        losses = losses + lengths[:, :joints].mean(1) + MARKER_WEIGHT * lengths[:, joints:].mean(1)
+    losses = (lengths[..., :joints].mean(2) + MARKER_WEIGHT * lengths[..., joints:].mean(2)).sum(0)
     return (Term(losses, len(windows)),)
 
 
@@ -185,11 +184,8 @@ def _error_head_fitted(net: FigurePredictor, held_out: Tensor) -> dict[str, floa
     seed = net.config.seed_frames
     frames = held_out[:, :seed]
     predicted, disagreement = net.with_disagreement(frames)
-    points = net.points(torch.cat([frames, predicted], dim=1), seed - 1)
-    true_points = net.points(held_out, seed - 1)
-    joints = net.points.joints
-    errors = (points - true_points)[:, seed:, :joints].norm(dim=-1).mean(-1)
-    past = points[:, :seed]
+    apart = net.seen(torch.cat([frames, predicted], dim=1)) - net.seen(held_out)
+    errors = apart[:, seed:, : net.points.joints].norm(dim=-1).mean(-1)
     assert net.doubt is not None
-    net.doubt.fit(error_signs(past.diff(dim=1), points[:, seed:] - past[:, -1:], disagreement), errors)
+    net.doubt.fit(net.error_signs(frames, predicted, disagreement), errors)
     return {"validation": round(100 * float(errors.mean()), 4)}
