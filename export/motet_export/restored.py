@@ -58,13 +58,14 @@ def _renamed(tensors: Tensors, net: Net) -> Tensors:
 
 
 def _copy_arrays(state: dict[str, torch.Tensor], bundle: Bundle) -> None:
-    """Copy the normalisation and the tables, which are not in graphs."""
+    """Copy the normalisation and the tables, which are not in graphs; of a memory without the steps of commands, which
+    follow those of the net."""
     motion = bundle.manifest.motion
     for name, values in (("mean", motion.mean), ("scale", motion.std)):
         if len(state[name]) == len(values):
             state[name].copy_(torch.from_numpy(values))
     for name in bundle.manifest.tables.keys() & state.keys():
-        state[name].copy_(torch.from_numpy(bundle.table(name).copy()))
+        state[name].copy_(torch.from_numpy(bundle.table(name)[: len(state[name])].copy()))
 
 
 def _restore(
@@ -90,7 +91,7 @@ def _restore(
         if weight.numel() > like.numel():
             # a bias followed by zeros
             weight = weight[:, None, : like.shape[-1]]
-        elif random[tensor].tobytes() != like.numpy().tobytes():
+        elif not np.array_equal(random[tensor], like.numpy()):
             weight = weight.mT
         # a scale of 0 is stored as the infinity by which the exporter divides
         state[name].copy_(torch.where(weight.isinf(), 0, weight))

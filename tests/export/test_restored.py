@@ -10,7 +10,7 @@ import torch
 from test_codes_export import run
 
 from motet.bundle.bundle import Bundle
-from motet_export.bundles import export_run, parity_of
+from motet_export.bundles import export_run, parity_of, renew_golden
 from motet_export.exporter import ExportError, export_graph, round_weights
 from motet_export.restored import restored
 from motet_train.runs import Run
@@ -67,6 +67,18 @@ def test_every_weight_of_16_bits_is_found_again(tmp_path: Path) -> None:
     round_weights(run_of_16_bits.model)
     check_equal(found, run_of_16_bits)
     parity_of(found, bundle)
+
+
+def test_the_steps_of_commands_are_no_weights(given: Run, bundle: Bundle, tmp_path: Path) -> None:
+    table = tmp_path / "commands.toml"
+    table.write_text(
+        '[[command]]\nsentence = "walk"\ntexts = ["walk"]\n'
+        "[[command.motion]]\ncuts = [{ action = 0, take = 0, first = 2, stop = 8 }]\n"
+    )
+    renew_golden(bundle, tmp_path / "commanded.zip", table)
+    commanded = Bundle.open(tmp_path / "commanded.zip")
+    assert len(commanded.table("memory")) == len(bundle.table("memory")) + 7
+    check_equal(restored(commanded), given)
 
 
 def test_8_bit_weights_are_not_those_that_were_trained(tmp_path: Path) -> None:

@@ -40,6 +40,16 @@ def test_contexts(motions: list[Motion]) -> None:
     check_equal(generator.embed(SENTENCES), [generator.embed([one])[0] for one in SENTENCES])
 
 
+@pytest.mark.parametrize("count", [3, 13])
+def test_vectors(count: int) -> None:
+    model = load("search")
+    contract = model.contract
+    rng = np.random.default_rng(2)
+    walks = contract.mean + contract.std * 0.05 * rng.normal(size=(count, 40, len(contract.channels))).cumsum(axis=1)
+    motions = [contract.motion(walk) for walk in walks]
+    check_equal(model.embed(motions), [model.embed(motion) for motion in motions])
+
+
 @pytest.mark.parametrize("name", ["generate", "language-to-motion"])
 def test_generated_motions(name: str) -> None:
     model = load(name)
@@ -63,6 +73,15 @@ def test_predicted_frames() -> None:
     for frame in found[:, : model.horizon].swapaxes(0, 1):
         given, state = advance(model.graphs["step"], state, {})
         np.testing.assert_array_equal(given["frame"], frame)
+
+
+def test_expected_errors() -> None:
+    model = load("predict")
+    contract = model.contract
+    rng = np.random.default_rng(1)
+    walks = contract.mean + contract.std * 0.05 * rng.normal(size=(5, 30, len(contract.channels))).cumsum(axis=1)
+    motions = [contract.motion(walk) for walk in walks]
+    check_equal(model.expected_errors(motions), [model.expected_errors(motion) for motion in motions])
 
 
 @pytest.mark.parametrize("variety", [0.0, 1.0])

@@ -207,6 +207,7 @@ def test_doubt_finds_the_law_that_errors_follow() -> None:
     weight, bias = torch.tensor([0.5, 0, -0.2, 0.3, 0, 0.1]), torch.tensor([-3.0, -2.5, -2.0])
     mean = torch.exp((logarithms * weight).sum(-1) + bias)
     doubt = ErrorHead(3)
+    logarithms = logarithms.movedim(-1, 0)
     doubt.fit(logarithms, mean * torch.empty(4000, 3).exponential_())
     found = doubt(logarithms)
     assert float((found / mean).log().abs().mean()) < 0.08
@@ -220,9 +221,9 @@ def test_signs_grow_with_what_they_are_signs_of() -> None:
     alike = error_signs(past, steps, agreed)
     faster = error_signs(2 * past, steps, agreed)
     apart = error_signs(past, steps, agreed + 1)
-    assert (faster > alike).sum(dim=(0, 1)).tolist() == [15, 15, 15, 0, 0, 0]
-    assert (apart > alike).sum(dim=(0, 1)).tolist() == [0, 0, 0, 0, 15, 0]
-    torch.testing.assert_close(apart[..., 4], torch.log(torch.tensor([1.0, 2, 3]) + ERROR_FLOOR).expand(5, 3))
+    assert (faster > alike).sum(dim=(1, 2)).tolist() == [15, 15, 15, 0, 0, 0]
+    assert (apart > alike).sum(dim=(1, 2)).tolist() == [0, 0, 0, 0, 15, 0]
+    torch.testing.assert_close(apart[4], torch.log(torch.tensor([1.0, 2, 3]) + ERROR_FLOOR).expand(5, 3))
 
 
 SIDES = FigurePredictorConfig(
@@ -298,7 +299,7 @@ def test_a_figure_without_known_sides_has_no_mirror_image() -> None:
         torch.nn.init.normal_(member.outward.weight, std=0.01)
     frames = 0.3 * torch.randn(4, 10, 12)
     seen = net.eval().seen(frames)
-    points = seen[:, -1:] + net.steps(seen).mean(0)
+    points = seen[:, -1:] + net.steps(net.weights(seen).mean(0))
     vectors = net.points.from_parents(torch.cat([seen[:, -1:], points], dim=1))
     torch.testing.assert_close(net(frames), net.points.frames(vectors, frames[:, -1:]), atol=1e-3, rtol=1e-3)
 

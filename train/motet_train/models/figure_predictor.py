@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
-from motet_train.models.kinematics import VectorFigure, VectorPoints
+from motet_train.models.kinematics import VectorFigure, VectorPoints, in_whole_registers
 from motet_train.models.net import Graphs, Net, Part, constants, float_rows, zero_linear
 from motet_train.models.predictor import Block, step_graph
 
@@ -58,23 +58,30 @@ class FigurePredictorConfig:
 
 
 def error_signs(past: Tensor, steps: Tensor, disagreement: Tensor) -> Tensor:
-    """Logarithms (B, N, S) of what an error is judged by: how fast and how unevenly the figure moves, how far the net
+    """Logarithms (S, B, N) of what an error is judged by: how fast and how unevenly the figure moves, how far the net
     takes it and on what way, and how much its answers so far differ from those to the mirrored question.
 
     All in metres. past: (B, L - 1, P, 3), the steps of points between seed frames. steps: (B, N, P, 3) predicted, from
     the last frame. disagreement: (B, N), as :meth:`FigurePredictor.with_disagreement` gives it.
     """
     # how the figure moves before, and how it is predicted to
-    shared = [size(past[:, -1]), size(past).mean(1), size(past.diff(dim=1)[:, -2:]).mean(1)]
+    shared = [size(past[:, -1]), _mean_of_frames(size(past)), _mean_of_frames(size(past.diff(dim=1)[:, -2:]))]
     way = size(steps.diff(dim=1, prepend=torch.zeros_like(steps[:, :1]))).cumsum(1)
     by_frame = [size(steps), disagreement.cumsum(1), way]
     at_all_frames = [sign[:, None].expand(disagreement.shape) for sign in shared]
-    return torch.log(torch.stack([*at_all_frames, *by_frame], dim=-1).clamp_max(LARGEST_SIGN) + ERROR_FLOOR)
+    signs = torch.stack([*at_all_frames, *by_frame]).clamp_max(LARGEST_SIGN) + ERROR_FLOOR
+    return in_whole_registers(torch.log, signs)
 
 
 def size(points: Tensor) -> Tensor:
     """The root mean square (...) over the numbers of points (..., P, 3)."""
-    return torch.sqrt(points.square().mean((-2, -1)) + 1e-12)
+    norm: Tensor = torch.linalg.vector_norm(points, dim=(-2, -1))
+    return norm / math.sqrt(math.prod(points.shape[-2:]))
+
+
+def _mean_of_frames(sizes: Tensor) -> Tensor:
+    """(B, T) to (B,), one frame after the other: other sums of rows depend on their places in memory."""
+    return sizes.cumsum(1)[:, -1] / sizes.shape[1]
 
 
 class ErrorHead(nn.Module):
@@ -93,8 +100,9 @@ class ErrorHead(nn.Module):
         self.register_buffer("bias", torch.zeros(frames))
 
     def forward(self, logarithms: Tensor) -> Tensor:
-        """(B, N, S) to metres (B, N)."""
-        return torch.exp(((logarithms * self.weight).sum(-1) + self.bias).clamp_max(math.log(LARGEST_SIGN)))
+        """(S, B, N) to metres (B, N)."""
+        law = (logarithms * self.weight.T[:, None]).sum(0) + self.bias
+        return in_whole_registers(torch.exp, law.clamp_max(math.log(LARGEST_SIGN)))
 
     @torch.no_grad()
     def fit(self, logarithms: Tensor, errors: Tensor) -> None:
@@ -102,9 +110,10 @@ class ErrorHead(nn.Module):
 
         It is the likeliest one if errors are distributed exponentially, so their largest values do not lead it.
         """
-        middle = logarithms.mean(0)
-        spread = logarithms.std(0).clamp_min(1e-3)
-        weight, bias = _likeliest_law(((logarithms - middle) / spread).double(), errors)
+        signs = logarithms.movedim(0, -1)
+        middle = signs.mean(0)
+        spread = signs.std(0).clamp_min(1e-3)
+        weight, bias = _likeliest_law(((signs - middle) / spread).double(), errors)
         self.weight.copy_(weight / spread)
         self.bias.copy_(bias - (weight * middle / spread).sum(-1))
 
@@ -144,14 +153,11 @@ class Member(nn.Module):
 
         The difference is made of the layer: between points metres apart it would magnify their last bits.
         """
-        hidden = self.blocks(self.inward(seen))
-        weight: Tensor = self.outward.weight
-        bias: Tensor = self.outward.bias
+        layer = [self.outward.weight, self.outward.bias]
         if points is not None:
             shape = (-1, len(points.tree.parents), 3)
-            weight = points.from_parents(torch.unflatten(weight, 0, shape), dim=1).flatten(0, 2)
-            bias = points.from_parents(torch.unflatten(bias, 0, shape), dim=1).flatten()
-        return functional.linear(hidden, weight, bias)
+            layer = [points.from_parents(torch.unflatten(x, 0, shape), dim=1).flatten(0, 2) for x in layer]
+        return functional.linear(self.blocks(self.inward(seen)), *layer)
 
 
 class FigurePredictor(Net):
@@ -183,14 +189,18 @@ class FigurePredictor(Net):
         seen: Tensor = self.points(frames.clamp(-LARGEST_INPUT, LARGEST_INPUT), self.config.seed_frames - 1)
         return seen
 
-    def steps(self, seen: Tensor, points: VectorPoints | None = None) -> Tensor:
-        """Points (B, L, P, 3) to their steps (M, B, N, P, 3) from the last seed frame by each of M members.
+    def weights(self, seen: Tensor, points: VectorPoints | None = None) -> Tensor:
+        """Points (B, L, P, 3) to weights (M, B, W, P 3) of the cosines that steps are made of, by each of M members.
 
-        points: give the steps of vectors from the parents of points.
+        points: give those of vectors between points and their parents.
         """
         inputs = torch.cat([PLACE_SCALE * seen[:, -1].flatten(1), STEP_SCALE * seen.diff(dim=1).flatten(1)], dim=1)
         weights = torch.stack([member(inputs, points) for member in self.members])
-        return torch.unflatten(self.cosines @ torch.unflatten(weights, 2, (self.config.waves, -1)), 3, (-1, 3))
+        return torch.unflatten(weights, 2, (self.config.waves, -1))
+
+    def steps(self, weights: Tensor) -> Tensor:
+        """Weights (..., W, P 3) to steps (..., N, P, 3) from the last seed frame."""
+        return torch.unflatten(self.cosines @ weights, -1, (-1, 3))
 
     def with_disagreement(self, frames: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, L, C) to the next (B, N, C), and how far (B, N) their mirror image disagrees about them: the root
@@ -198,7 +208,7 @@ class FigurePredictor(Net):
         seen = self.seen(frames)
         # rows and their mirror images in one batch, side by side
         both = torch.stack([seen, self.points.mirror(seen)], dim=1).flatten(0, 1)
-        steps = torch.unflatten(self.steps(both, self.points).mean(0), 0, (-1, 2))
+        steps = torch.unflatten(self.steps(self.weights(both, self.points).mean(0)), 0, (-1, 2))
         plain = steps[:, 0]
         mirrored = self.points.mirror(steps[:, 1])
         return self._frames_after(frames, seen, (plain + mirrored) / 2), size((plain - mirrored) / 2)
@@ -209,7 +219,7 @@ class FigurePredictor(Net):
         if self.config.figure.partners:
             return self.with_disagreement(frames)[0]
         seen = self.seen(frames)
-        return self._frames_after(frames, seen, self.steps(seen, self.points).mean(0))
+        return self._frames_after(frames, seen, self.steps(self.weights(seen, self.points).mean(0)))
 
     def _frames_after(self, frames: Tensor, seen: Tensor, steps: Tensor) -> Tensor:
         """The frames (B, N, C) to which steps (B, N, P, 3) of vectors lead from frames (B, L, C) and their points."""
@@ -217,7 +227,7 @@ class FigurePredictor(Net):
         return self.points.frames(torch.cat([last, last + steps], dim=1), frames[:, -1:])
 
     def error_signs(self, frames: Tensor, trajectory: Tensor, disagreement: Tensor) -> Tensor:
-        """The signs (B, N, S) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
+        """The signs (S, B, N) of an error, from frames (B, L, C) and what :meth:`with_disagreement` gives for them."""
         points = self.seen(torch.cat([frames, trajectory], dim=1))
         past = points[:, : self.config.seed_frames]
         return error_signs(past.diff(dim=1), points[:, self.config.seed_frames :] - past[:, -1:], disagreement)

@@ -10,6 +10,7 @@ Letters in shapes: B rows, T frames, D channels, W words, S statistics, E number
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import torch
 from torch import Tensor, nn
@@ -17,7 +18,7 @@ from torch.nn import functional
 
 from motet.bundle.graph import GraphSpec
 from motet_train.data.batches import Pairs
-from motet_train.models.kinematics import EulerPlaces, Figure
+from motet_train.models.kinematics import EulerPlaces, Figure, in_whole_registers
 from motet_train.models.net import Graphs, Net, Part, before, float_rows, id_rows, normalised
 from motet_train.models.recurrent import WordEmbedding
 
@@ -103,9 +104,8 @@ class JointEmbedding(Net):
 
     def way(self, frames: Tensor, lengths: Tensor) -> Tensor:
         """Sums over frames (B, T, D) of lengths (B,) of the channels of the way, and of their sizes."""
-        rates = (
-            frames[..., : self.config.travelled] / self.scale[: self.config.travelled].clamp(min=DEVIATION_FLOOR) / 10
-        )
+        count = self.config.travelled
+        rates = frames[..., :count] / self.scale[:count].clamp(min=DEVIATION_FLOOR) / 10
         rates = torch.where(before(lengths, frames.shape[1])[..., None], rates, 0.0)
         return torch.cat([rates.sum(dim=1), rates.abs().sum(dim=1)], dim=1)
 
@@ -163,7 +163,8 @@ def of_frames(x: Tensor, lengths: Tensor) -> Tensor:
     square = _sum((x - mean[:, None]).square(), active) / count
     shown = torch.where(active[..., None], x, x[:, :1])
     means = torch.where(sizes > 0, sums / sizes.clamp(min=1), mean[:, None]).flatten(1)
-    return torch.cat([mean, (square + DEVIATION_FLOOR**2).sqrt(), shown.amin(dim=1), shown.amax(dim=1), means], dim=1)
+    deviation = _root(square + DEVIATION_FLOOR**2)
+    return torch.cat([mean, deviation, shown.amin(dim=1), shown.amax(dim=1), means], dim=1)
 
 
 def _thirds(lengths: Tensor, frames: int) -> Tensor:
@@ -178,8 +179,11 @@ def of_speeds(places: Tensor, lengths: Tensor) -> Tensor:
     """Places (B, T, 3 J) of joints to roots of their mean and greatest speeds (B, 2 J), per frame."""
     steps = torch.diff(places, dim=1, prepend=places[:, :1]).reshape(*places.shape[:2], -1, 3)
     active = before(lengths, places.shape[1])
-    speed = torch.where(active[..., None], (steps.square().sum(dim=-1) + DEVIATION_FLOOR**2).sqrt(), 0.0)
-    return torch.cat([_sum(speed, active) / lengths[:, None], speed.amax(dim=1)], dim=1).sqrt()
+    speed = torch.where(active[..., None], _root(steps.square().sum(dim=-1) + DEVIATION_FLOOR**2), 0.0)
+    return _root(torch.cat([_sum(speed, active) / lengths[:, None], speed.amax(dim=1)], dim=1))
+
+
+_root = partial(in_whole_registers, torch.sqrt)
 
 
 def _sum(x: Tensor, active: Tensor) -> Tensor:

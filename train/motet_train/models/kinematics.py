@@ -1,9 +1,12 @@
 """Forward kinematics in torch, for losses and features: where the joints of a figure are.
 
+In exported graphs lengths are ``vector_norm``, and there are no means along the last axis: some kernels compute square
+roots and sums by where a row lies in memory, so that its last bits would differ between batches.
+
 Letters in shapes: B rows, T frames, D channels, J joints, K of them with rotations of their own.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +16,7 @@ from torch.nn import functional
 
 from motet.figures.humanoid import LEFT_RIGHT, sided
 from motet.motion.kinematics import AXES
-from motet.motion.skeleton import END_SUFFIX, Joint, Skeleton, partners_of
+from motet.motion.skeleton import END_SUFFIX, partners_of
 from motet.representation.contract import MotionContract
 from motet.representation.root_block import ROOT_BLOCK, VECTOR_KINDS
 from motet.representation.root_sixd import SIXD_KINDS
@@ -273,12 +276,20 @@ class VectorPoints(nn.Module):
         root = _at(frames, self.figure.root, dim=-1)
         facing = root[..., 2].cumsum(1) / self.figure.fps
         facing = facing - facing[:, last, None]
-        return self._points(frames, facing) + self._path(root, facing, last)[..., None, :]
+        facing_before = facing - root[..., 2] / self.figure.fps
+        angles = torch.stack([facing, root[..., 4], root[..., 5], facing_before])
+        sin = in_whole_registers(torch.sin, angles)
+        cos = in_whole_registers(torch.cos, angles)
+        return self._points(frames, sin[:3], cos[:3]) + self._path(root, sin[3], cos[3], last)[..., None, :]
 
-    def _points(self, frames: Tensor, facing: Tensor) -> Tensor:
-        """Points (B, T, P, 3) around the root, by its rotation and those of all other bones."""
-        root = _at(frames, self.figure.root, dim=-1)
-        turned = product(product(_turn(facing, 1), _turn(root[..., 4], 0)), _turn(root[..., 5], 2))
+    def _points(self, frames: Tensor, sin: Tensor, cos: Tensor) -> Tensor:
+        """Points (B, T, P, 3) around the root, by its rotation and those of all other bones.
+
+        sin, cos: (3, B, T) of the root's facing, pitch and roll.
+        """
+        # facing, pitch and roll are about y, x and z: axes of a mirror image, about which angles count the other way
+        entries = euler_entries(-sin, cos)
+        turned = torch.stack([entries[place] for place in (4, 3, 5, 1, 0, 2, 7, 6, 8)])
         # bones without a map turn with their parents: they see a column of zeros
         bones = self.figure.bones
         vectors = _at(functional.pad(frames, (0, 1)), self.figure.vectors, dim=-1).reshape(-1, len(bones) - 1, 3)
@@ -286,13 +297,10 @@ class VectorPoints(nn.Module):
         points = forward_kinematics(self.tree.parents, self.offsets, local, bones)
         return points.reshape(*frames.shape[:-1], -1, 3)
 
-    def _path(self, root: Tensor, facing: Tensor, last: int) -> Tensor:
+    def _path(self, root: Tensor, sin: Tensor, cos: Tensor, last: int) -> Tensor:
         """Places (B, T, 3) of the root by its channels (B, T, 6), seen from frame ``last``: it goes where it faced in
-        the frame before."""
+        the frame before, by that angle's sine and cosine (B, T)."""
         fps = self.figure.fps
-        before = facing - root[..., 2] / fps
-        sin = before.sin()
-        cos = before.cos()
         x = (root[..., 0] * sin + root[..., 1] * cos).cumsum(1) / fps
         z = (root[..., 0] * cos - root[..., 1] * sin).cumsum(1) / fps
         return torch.stack([x - x[:, last, None], root[..., 3], z - z[:, last, None]], dim=-1)
@@ -388,50 +396,53 @@ def _angles(root: Tensor, heading: Tensor, local: Tensor) -> tuple[Tensor, Tenso
     sin_before, cos_before = heading[..., :-1]
     sin, cos = heading[..., 1:]
     now = root[..., 1:]
-    ahead = (now[0, 2].square() + now[2, 2].square()).sqrt()
-    sines = torch.stack([-now[1, 2], now[1, 0], sin * cos_before - cos * sin_before])
-    cosines = torch.stack([ahead, now[1, 1], cos * cos_before + sin * sin_before])
+    ahead = now[:, 2]
+    level = torch.linalg.vector_norm(ahead[::2], dim=0)
+    sines = torch.stack([-ahead[1], now[1, 0], sin * cos_before - cos * sin_before])
+    cosines = torch.stack([level, now[1, 1], cos * cos_before + sin * sin_before])
     axis, sine, cosine = _turned(local)
-    return _angle(torch.cat([sines, sine]), torch.cat([cosines, cosine])), axis
+    angles = in_whole_registers(torch.atan2, torch.cat([sines, sine]), torch.cat([cosines, cosine]))
+    return angles, axis
 
 
-def _angle(sine: Tensor, cosine: Tensor) -> Tensor:
-    """Angles (..., N) in radians by multiples of their sines and cosines.
+def in_whole_registers(function: Callable[..., Tensor], *inputs: Tensor) -> Tensor:
+    """An elementwise function of rows (..., N), each filled up with ones to a multiple of 16.
 
-    Each row of N is filled up to a multiple of 16, which kernels compute at once: they compute what is left over in
-    another way, and so a row would depend on how many there are.
+    Kernels compute 16 numbers at once, and what is left over in another way; so a row would depend on its batch.
     """
-    count = sine.shape[-1]
-    spare = -count % 16
-    filled = torch.atan2(functional.pad(sine, (0, spare)), functional.pad(cosine, (0, spare), value=1.0))
-    return filled[..., :count]
+    count = inputs[0].shape[-1]
+    filled = [functional.pad(x, (0, -count % 16), value=1.0) for x in inputs]
+    computed: Tensor = function(*filled)
+    return computed[..., :count]
 
 
-def _turn(angle: Tensor, axis: int) -> Tensor:
-    """Rotations (3, 3, ...) by angles (...) in radians about the axis 0, 1 or 2."""
-    unit = torch.ones_like(angle)
-    zero = torch.zeros_like(angle)
-    sin = angle.sin()
-    cos = angle.cos()
-    rows = {
-        0: (unit, zero, zero, zero, cos, -sin, zero, sin, cos),
-        1: (cos, zero, sin, zero, unit, zero, -sin, zero, cos),
-        2: (cos, -sin, zero, sin, cos, zero, zero, zero, unit),
-    }
-    return torch.unflatten(torch.stack(rows[axis]), 0, (3, 3))
+def euler_entries(sin: Tensor, cos: Tensor) -> list[Tensor]:
+    """The nine entries (...) of Rx Ry Rz, row by row, by the sines and cosines (3, ...) of the angles."""
+    sin_x, sin_y, sin_z = sin
+    cos_x, cos_y, cos_z = cos
+    sin_xz = sin_x * sin_z
+    cos_xz = cos_x * cos_z
+    sin_cos = sin_x * cos_z
+    cos_sin = cos_x * sin_z
+    first_row = [cos_y * cos_z, -cos_y * sin_z, sin_y]
+    second_row = [sin_y * sin_cos + cos_sin, cos_xz - sin_y * sin_xz, -sin_x * cos_y]
+    third_row = [sin_xz - sin_y * cos_xz, sin_y * cos_sin + sin_cos, cos_x * cos_y]
+    return first_row + second_row + third_row
 
 
 def rotvec_to_rotmat(vectors: Tensor) -> Tensor:
     """Rotation vectors (3, ...) to matrices (3, 3, ...) by Rodrigues' formula, with gradients at 0."""
     # a limit, not a sum: the exporter drops what is as small as that
-    squared = vectors.square().sum(0).clamp_min(1e-12)
-    angle = squared.sqrt()
+    angle: Tensor = torch.linalg.vector_norm(vectors, dim=0).clamp_min(1e-6)
+    squared = angle.square()
     x, y, z = vectors
     zero = torch.zeros_like(x)
     # the matrix of the cross product
     cross = torch.unflatten(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero]), 0, (3, 3))
     eye = torch.eye(3, dtype=vectors.dtype, device=vectors.device).reshape(3, 3, *[1] * angle.dim())
-    return eye + angle.sin() / angle * cross + (1 - angle.cos()) / squared * product(cross, cross)
+    sin = in_whole_registers(torch.sin, angle)
+    cos = in_whole_registers(torch.cos, angle)
+    return eye + sin / angle * cross + (1 - cos) / squared * product(cross, cross)
 
 
 def _turned(rotations: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -445,7 +456,7 @@ def _turned(rotations: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     column = _column(rotations, diagonal)
     to_its_side = torch.where((column * swept).sum(0) < 0, -1.0, 1.0)
     axis = torch.where(trace < -0.9, column * to_its_side, swept)
-    return functional.normalize(axis, dim=0, eps=1e-10), swept.square().sum(0).sqrt(), trace - 1
+    return functional.normalize(axis, dim=0, eps=1e-10), torch.linalg.vector_norm(swept, dim=0), trace - 1
 
 
 def _column(rotations: Tensor, diagonal: Tensor) -> Tensor:
@@ -478,7 +489,8 @@ def figure_of(contract: MotionContract) -> Figure:
     skeleton = contract.skeleton
     if contract.representation != "root_angles" or skeleton is None or skeleton.metres_per_unit is None:
         return Figure()
-    joints = _without_tips(skeleton)
+    joints = [joint for joint in skeleton.scaled(1.0).joints if not joint.name.endswith(END_SUFFIX)]
+    names = [joint.name for joint in joints]
     if any(any(joint.axis) for joint in joints):
         return Figure()
     orders = ["yxz"]
@@ -487,23 +499,12 @@ def figure_of(contract: MotionContract) -> Figure:
         orders.append(joint.order)
         columns.append(_columns(contract, [f"{joint.name}.r{axis}" for axis in joint.order]))
     return Figure(
-        tuple(_parents_among(joints, skeleton)),
+        tuple(names.index(skeleton.names[joint.parent]) if joint.parent >= 0 else -1 for joint in joints),
         tuple(joint.offset for joint in joints),
         tuple(orders),
         tuple(map(tuple, columns)),
         tuple(_columns(contract, ROOT_BLOCK)),
     )
-
-
-def _without_tips(skeleton: Skeleton) -> list[Joint]:
-    """The joints of a figure in metres, without the tips of its bones."""
-    return [joint for joint in skeleton.scaled(1.0).joints if not joint.name.endswith(END_SUFFIX)]
-
-
-def _parents_among(joints: Sequence[Joint], skeleton: Skeleton) -> list[int]:
-    """The index among some joints of each one's parent, -1 for the root, by their indices in the skeleton."""
-    names = [joint.name for joint in joints]
-    return [names.index(skeleton.names[joint.parent]) if joint.parent >= 0 else -1 for joint in joints]
 
 
 def _columns(contract: MotionContract, channels: Iterable[str]) -> list[int]:
@@ -551,17 +552,8 @@ class EulerPlaces(nn.Module):
     def _local(self, angles: Tensor) -> Tensor:
         """Rotations (3, 3, J, N) by angles (3, J, N) in radians about the axes in each joint's order: Rx Ry Rz with
         rows and columns in that order."""
-        sin_x, sin_y, sin_z = angles.sin()
-        cos_x, cos_y, cos_z = angles.cos()
-        sin_xz = sin_x * sin_z
-        cos_xz = cos_x * cos_z
-        sin_cos = sin_x * cos_z
-        cos_sin = cos_x * sin_z
-        # row by row
-        rows = [cos_y * cos_z, -cos_y * sin_z, sin_y]
-        rows += [sin_y * sin_cos + cos_sin, cos_xz - sin_y * sin_xz, -sin_x * cos_y]
-        rows += [sin_xz - sin_y * cos_xz, sin_y * cos_sin + sin_cos, cos_x * cos_y]
-        return torch.unflatten(torch.cat(rows).index_select(0, self.entries), 0, (3, 3, -1))
+        entries = torch.cat(euler_entries(angles.sin(), angles.cos()))
+        return torch.unflatten(entries.index_select(0, self.entries), 0, (3, 3, -1))
 
 
 def smooth_length(vectors: Tensor, least: float) -> Tensor:

@@ -169,7 +169,7 @@ def _figure_loss(net: FigurePredictor, windows: Tensor) -> Terms:
     seed = net.config.seed_frames
     with torch.autocast(windows.device.type, enabled=False):
         points = net.seen(windows)
-    apart = points[:, seed - 1 : seed] + net.steps(points[:, :seed]).float() - points[:, seed:]
+    apart = points[:, seed - 1 : seed] + net.steps(net.weights(points[:, :seed])).float() - points[:, seed:]
     # by member, row and point
     lengths = smooth_length(apart, 1e-8).mean(2) + smooth_length(apart.diff(dim=2), 1e-8).mean(2)
     joints = net.points.joints
