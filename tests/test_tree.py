@@ -87,7 +87,7 @@ CEILINGS = {
     "motet.draw": 11_300,
     "motet.figures": 32_100,
     "motet.formats": 35_900,
-    "motet.generate": 33_600,
+    "motet.generate": 33_900,
     "motet.keyed": 9_900,
     "motet.live": 4_900,
     "motet.models": 10_300,
@@ -98,7 +98,7 @@ CEILINGS = {
     "motet.search": 3_600,
     "motet.serve": 16_800,
     "motet.steering": 57_700,
-    "motet.text": 5_900,
+    "motet.text": 6_000,
     "motet_export": 12_300,
     "motet_train": 9_300,
     "motet_train.cli": 8_500,
@@ -106,7 +106,7 @@ CEILINGS = {
     "motet_train.evaluate": 53_300,
     "motet_train.models": 24_700,
     "motet_train.papers": 41_200,
-    "motet_train.recipes": 16_000,
+    "motet_train.recipes": 15_900,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

@@ -90,6 +90,7 @@ def typescript() -> str:
     sources = [path.read_text("utf-8") for path in sorted(TARGET.parent.rglob("*.ts")) if path != TARGET]
     used = {name for source in sources for name in re.findall(r"\b[A-Z_]+\.[A-Z_]+\b|\b[a-z]\w+Settings\b", source)}
     parts = ["/* Written by runtime/web/generate.py: do not edit. Units stand in the modules of Python. */\n"]
+    parts.append('import { ranges } from "./settings.js";\n')
     for module in map(import_module, MODULES):
         name = named(module)
         constants = list(constants_of(module, {use[1] for use in map(parted, used) if use[0] == name}))
@@ -98,11 +99,9 @@ def typescript() -> str:
         for title, kind in inspect.getmembers(module, inspect.isclass):
             label = title[0].lower() + title[1:]
             if label in used and kind.__module__ == module.__name__:
-                parts += [
-                    f"\n// {module.__name__}.{title}\nexport const {label} = {{\n",
-                    *fields_of(kind),
-                    "} as const;\n",
-                ]
+                opening, closing = ("ranges({", "});") if issubclass(kind, Settings) else ("{", "} as const;")
+                parts += [f"\n// {module.__name__}.{title}\nexport const {label} = {opening}\n", *fields_of(kind)]
+                parts.append(f"{closing}\n")
     return "".join(parts)
 
 

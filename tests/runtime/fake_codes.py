@@ -14,7 +14,7 @@ Array = NDArray[Any]
 MOVES, BODY, GROUPS, ACTIONS = 5, 4, 2, 3
 """Root moves, of which one more is the end, codes of each of the body's groups, and actions."""
 
-PARTS, KNOWN, NUMBERS = GROUPS + 1, 6, GROUPS + 1
+PARTS, KNOWN = GROUPS + 1, 6
 END, NULL_ACTION = MOVES, ACTIONS
 NEVER = -1e4
 
@@ -25,19 +25,22 @@ def numbers_of(codes: Array) -> Array:
 
 
 def step(seed: int = 0) -> FakeGraph:
-    """A recurrent step over codes that knows the action and its age."""
+    """A recurrent net over steps of codes, each with its action and its age."""
     rng = np.random.default_rng(seed)
     moves, body = rng.normal(size=(MOVES + 2, KNOWN)), rng.normal(size=(GROUPS, BODY, KNOWN))
     actions, ages = rng.normal(size=(ACTIONS + 1, KNOWN)), rng.normal(size=(64, KNOWN))
 
-    def run(codes: Array, action: Array, age: Array, state: Array) -> tuple[Array, Array, Array]:
-        seen = moves[codes[:, 0]] + sum(body[group][codes[:, group + 1]] for group in range(GROUPS))
-        following = np.tanh(0.6 * state + seen + ages[np.minimum(age, 63)])
-        return following + actions[action], numbers_of(codes), following
+    def run(codes: Array, action: Array, age: Array, state: Array) -> tuple[Array, Array]:
+        for step in range(codes.shape[1]):
+            seen = moves[codes[:, step, 0]] + ages[np.minimum(age[:, step], 63)]
+            for group in range(GROUPS):
+                seen = seen + body[group][codes[:, step, group + 1]]
+            state = np.tanh(0.6 * state + seen).astype(np.float32)
+        return state + actions[action[:, -1]], state
 
-    sizes = {"P": PARTS, "H": KNOWN, "L": NUMBERS}
-    given = {"codes": "*batch P", "action": "*batch", "age": "*batch", "state": "batch H"}
-    return FakeGraph(spec(given, {"known": "batch H", "numbers": "batch L", "next_state": "batch H"}, sizes), run)
+    sizes = {"P": PARTS, "H": KNOWN}
+    given = {"codes": "*batch steps P", "action": "*batch steps", "age": "*batch steps", "state": "batch H"}
+    return FakeGraph(spec(given, {"known": "batch H", "next_state": "batch H"}, sizes), run)
 
 
 def part(seed: int = 1, sharpness: float = 1.0, ending: float = 0.0) -> FakeGraph:

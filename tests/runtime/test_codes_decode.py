@@ -161,7 +161,7 @@ def naive_shares(action: int, recent: list[Array], age: int, ends: bool, done: f
 def test_a_memory_goes_on_where_the_past_resembles_the_present(age: int, ends: bool, done: float) -> None:
     """Amid all remembered places, as often at each as it is near."""
     known, rng = memory(), np.random.default_rng(age)
-    known = replace(known, keys={action: np.float32(CLOSE) * keys for action, keys in known.keys.items()})
+    known = replace(known, moves=np.float32(CLOSE) * known.moves, body=np.float32(CLOSE) * known.body)
     middle = CLOSE * np.mean([numbers_of(codes[:-1]).mean(axis=0) for _, codes in MOTIONS], axis=0)
     count = min(age or 3, SETTINGS.past_steps)
     recent = [(middle + 0.1 * rng.normal(size=middle.shape)).astype(np.float32) for _ in range(count)]
@@ -182,7 +182,7 @@ def naive_row(
     for length in range(longest):
         known = {}
         for who in (action, NULL_ACTION):
-            feeds = {"codes": np.array([last]), "action": np.array([who]), "age": np.array([age])}
+            feeds = {"codes": np.array([[last]]), "action": np.array([[who]]), "age": np.array([[age]])}
             out = given.step({**feeds, "state": states[who]})
             known[who], states[who] = out["known"], out["next_state"]
         uniform = rng.random((PARTS + 2,), np.float32)[2:]
@@ -224,7 +224,7 @@ def test_plain_drawing_is_ancestral_sampling() -> None:
     """With guidance 1 what is not told makes no difference: first steps come by the chain rule."""
     given, count = source(ending=-50.0), 3000
     found = draw_codes(Writer(given, rngs(*range(count)), PLAIN), np.full(count, 1), 1)
-    start = {"codes": np.array([[given.end + 1, 0, 0]]), "action": np.array([1]), "age": np.array([0])}
+    start = {"codes": np.array([[[given.end + 1, 0, 0]]]), "action": np.array([[1]]), "age": np.array([[0]])}
     known = given.step({**start, "state": np.zeros((1, KNOWN), np.float32)})["known"]
     seen: dict[tuple[int, ...], int] = {}
     for codes in found:
@@ -374,18 +374,18 @@ def test_an_action_takes_over_where_the_last_one_ends(seed: int) -> None:
     for _ in range(len(first) + 1):  # of the end, too
         rng.random((PARTS + 2,), np.float32)
     other = Writer(given, [rng], PLAIN)
-    other.state = _seen(given, first, ages)
-    other.last = np.tile(first[-1], (2, 1))
+    other.states = [_seen(given, first, ages)]
+    other.last = first[-1][None]
     assert [step[0].tolist() for _, step in drawn_steps(other, np.array([2]), 60)] == second
     assert second
 
 
 def _seen(given: Source, steps: list[Array], ages: list[int]) -> dict[str, Array]:
     """States of a writer that drew some steps for action 0, before the last of them is seen."""
-    last, state = np.array([[given.end + 1, 0, 0]] * 2), np.zeros((2, KNOWN), np.float32)
+    last, state = np.array([[[given.end + 1, 0, 0]]] * 2), np.zeros((2, KNOWN), np.float32)
     for age, following in zip(ages, steps, strict=False):
-        feeds = {"codes": last, "action": np.array([0, NULL_ACTION]), "age": np.full(2, age), "state": state}
-        state, last = given.step(feeds)["next_state"], np.tile(following, (2, 1))
+        feeds = {"codes": last, "action": np.array([[0], [NULL_ACTION]]), "age": np.full((2, 1), age), "state": state}
+        state, last = given.step(feeds)["next_state"], np.tile(following, (2, 1, 1))
     return {"state": state}
 
 
@@ -401,7 +401,32 @@ def test_what_was_done_before_is_gone_on_with() -> None:
     fed.see(codes[:2])
     state = np.zeros((2, KNOWN), np.float32)
     for before in ([given.end + 1, 0, 0], codes[0]):
-        feeds = {"codes": np.tile(before, (2, 1)), "action": np.full(2, NULL_ACTION), "age": np.zeros(2, np.int64)}
+        steps = np.tile(before, (2, 1, 1))
+        feeds = {"codes": steps, "action": np.full((2, 1), NULL_ACTION), "age": np.zeros((2, 1), np.int64)}
         state = given.step({**feeds, "state": state})["next_state"]
-    np.testing.assert_array_equal(fed.state["state"], state)
-    assert fed.last.tolist() == [codes[1].tolist()] * 2
+    fed._known(np.array([0]))
+    np.testing.assert_array_equal(fed.states[0]["state"], state)
+    assert fed.last.tolist() == [codes[1].tolist()]
+
+
+class Prompt(Writer):
+    """A writer whose net reads every step as it comes."""
+
+    def _advance(self, actions: Array) -> None:
+        super()._advance(actions)
+        self._known_of_all = super()._known(np.arange(len(self.states)))
+
+    def _known(self, rows: Array) -> Array:
+        return self._known_of_all[rows]
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.95])
+@pytest.mark.parametrize("exactly", [False, True])
+def test_a_net_that_reads_late_draws_what_it_draws_step_by_step(memory: float, exactly: bool) -> None:
+    given = source(sharpness=0.6)
+    drawing = replace(PLAIN, memory=memory, guidance=1.7)
+    actions = np.arange(8) % ACTIONS
+    late = draw_codes(Writer(given, rngs(*range(8)), drawing), actions, 40, exactly)
+    prompt = draw_codes(Prompt(given, rngs(*range(8)), drawing), actions, 40, exactly)
+    assert [codes.tolist() for codes in late] == [codes.tolist() for codes in prompt]
+    assert max(map(len, late)) > 6

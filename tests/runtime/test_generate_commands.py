@@ -85,7 +85,13 @@ def test_postures_begin_and_end_where_a_person_means(model: CodesModel) -> None:
 
 @pytest.mark.parametrize(
     ("text", "degrees"),
-    [("turn left 45 degrees", 45), ("turn right 90 degrees", -90), ("make a half turn to the left", 180)],
+    [
+        ("turn left 45 degrees", 45),
+        ("turn right 90 degrees", -90),
+        ("make a half turn to the left", 180),
+        ("180 turn", 180),
+        ("360 spin clockwise", -360),
+    ],
 )
 def test_a_turn_without_a_gait_is_on_the_spot(model: CodesModel, text: str, degrees: float) -> None:
     motion = shown(model, text)
@@ -132,6 +138,11 @@ def test_a_subject_makes_no_other_act_of_a_command(model: CodesModel) -> None:
     for sentence, order in (("a person kicks with the left leg", "kick with the left leg"), ("She sits.", "sit")):
         assert model.embed(sentence).argmax() == model.embed(order).argmax() > len(model.manifest.source["actions"])
     assert model.likeliest("a guest sits down on a chair").action == model.likeliest("sit down").action
+    assert model.likeliest("a boy kicks a ball").lacking == ()
+    # one that nobody recorded, with a warning, unless a recording has its verb
+    lying = model.likeliest("she lies on her left side")
+    assert (lying.action, lying.lacking) == ("a person lies down", ("left", "side"))
+    assert model.likeliest("a woman sleeps").action == "a person sleeps on the back"
 
 
 def test_commands_are_sets_of_stems_without_polite_words() -> None:

@@ -242,6 +242,8 @@ def test_no_act_lasts_longer_than_it_may(model: motet.CodesModel) -> None:
         ("draw a bow and release the arrow", ["draw a bow and release the arrow"]),
         ("salute twice", ["salute", "salute"]),  # its keys cannot be repeated
         ("He punches left and right. Then he bows.", ["punch left", "punch right", "he bows"]),
+        ("a right jab and a left cross", ["punch right", "punch left"]),
+        ("walk and look around", ["walk", "look around"]),  # a recording that glances around does not say that it walks
     ],
 )
 def test_what_is_done_again_or_otherwise_is_a_part(model: motet.CodesModel, sentence: str, parts: list[str]) -> None:
@@ -280,6 +282,22 @@ def test_long_sentences_are_refused_before_they_are_read(model: motet.CodesModel
     for read in (model.parts, model.quantities, model.likeliest, model.understood, model.generate):
         with pytest.raises(motet.TextError, match="letters, but at most 2000"):
             read(sentence)
+
+
+@pytest.mark.parametrize(("sentence", "pace"), [("slowly salute", 0.75), ("clap quickly", 1.3), ("salute", 1.0)])
+def test_an_act_is_done_in_the_pace_of_the_sentence(model: motet.CodesModel, sentence: str, pace: float) -> None:
+    named = model._keyed(sentence)
+    assert named is not None
+    assert not named.lacking
+    usual = motet.keyed.ours()[named.act.name]
+    assert named.act.speed == pytest.approx([pace * speed for speed in usual.speed])
+    assert named.act.seconds(3) == pytest.approx(usual.seconds(3) / pace, abs=0.1)
+
+
+def test_what_comes_with_an_act_is_not_below_it(model: motet.CodesModel) -> None:
+    named = model._keyed("wakes up with a start")
+    assert named is not None
+    assert (named.below, named.lacking) == ("", ("start",))
 
 
 def test_numbers_and_repeated_words_are_counted(model: motet.CodesModel) -> None:

@@ -11,7 +11,6 @@ from fake_codes import ACTIONS, END, MOVES, numbers_of, remembered, source
 
 from motet.generate.codes import CodesSettings
 from motet.generate.continue_codes import ContinuationSettings, Continuer, Pace
-from motet.generate.continue_codes import numbers_of as asked_numbers
 
 MOTIONS, RULES = remembered(), ContinuationSettings()
 DRAWING = CodesSettings(memory=0.5)
@@ -33,7 +32,7 @@ def drawn(pace: Pace, seed: int = 0, steps: int = 60, book: Any = BOOK) -> Any:
 
 def test_numbers_of_steps_are_those_of_the_memory() -> None:
     codes = MOTIONS[1][1][:-1]
-    np.testing.assert_array_equal(asked_numbers(source(), codes), numbers_of(codes))
+    np.testing.assert_array_equal(source().memory.numbers(codes), numbers_of(codes))
 
 
 def naive_distance(shown: Any, action: int) -> float:

@@ -91,6 +91,7 @@ def test_numbers_that_make_no_sense_are_refused(sentence: str, model: CodesModel
 
 def test_what_remains_is_what_is_done() -> None:
     assert quantities_of("a person takes two steps back").text == "a person walks back"
+    assert quantities_of("she retreats 2 steps").text == "she walks backwards"
     assert quantities_of("she walks 3 metres").text == "she walks forward"
     assert quantities_of("the man turns right 30 degrees").text == "the man walks and turns right"
     assert quantities_of("five jumping jacks").text == "jumping jacks"

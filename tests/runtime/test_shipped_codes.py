@@ -87,13 +87,14 @@ def test_a_writer_looks_back_at_a_window_of_steps(model: CodesModel) -> None:
     assert model.manifest.training["recipe"]["window"] == WINDOW
     drawing, noise = CodesSettings(top_p=0.9, guidance=1.5), [np.random.default_rng(3)]
     writer = Writer(model.source, noise, drawing)
-    past, last = np.zeros((2, 3, 6, 0, 64), np.float32), [[model.codec.moves + 1, 0, 0, 0]] * 2
+    past, last = np.zeros((2, 3, 6, 0, 64), np.float32), [[[model.codec.moves + 1, 0, 0, 0]]] * 2
     for age in range(WINDOW + 20):
-        told = {"codes": np.array(last), "action": np.array([7, model.source.null_action]), "age": np.full(2, age)}
-        past = model.graphs["step"]({**told, "past": past[:, :, :, -WINDOW:]})["next_past"]
+        told = {"codes": np.array(last), "action": np.array([[7], [model.source.null_action]])}
+        told |= {"age": np.full((2, 1), age), "past": past[:, :, :, -(WINDOW - 1) :]}
+        past = model.graphs["step"](told)["next_past"]
         writer.age[:] = age
-        last = [writer.draw(np.array([7]), ends=False)[0].tolist()] * 2
-        np.testing.assert_array_equal(writer.state["past"], past[:, :, :, -WINDOW:])
+        last = [writer.draw(np.array([7]), ends=False).tolist()] * 2
+        np.testing.assert_array_equal(writer.states[0]["past"], past)
 
 
 def test_what_is_counted_is_drawn_from_whole_recordings(model: CodesModel, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,10 +120,13 @@ def test_a_stream_may_last(model: CodesModel) -> None:
     for _, step in drawn_steps(writer, np.array([7]), 160, True):
         steps.append(step)
         pieces.append(decoder.push(step))
-        state = [*writer.state.values(), *writer.recent, writer.last, *writer._before[1].values()]
+        before = writer._before[1]
+        state = [writer.states[0]["past"], before[0]["past"], *writer.recent, writer.last]
+        for unread in writer.steps:
+            state += unread.values()
         kept.append(sum(array.nbytes for array in state) + sum(step.nbytes for step in decoder.codes))
-    assert max(kept[WINDOW:]) == kept[WINDOW + 2]
-    assert kept[-1] < 2**21
+    assert max(kept) == max(kept[: 2 * WINDOW])
+    assert max(kept) < 2**21
     pieces.append(decoder.finish())
     np.testing.assert_array_equal(np.concatenate(pieces), model.codec.frames_of(np.concatenate(steps)))
 

@@ -247,6 +247,7 @@ def test_a_misspelt_word_is_the_nearest_one_where_that_is_clear() -> None:
     assert corrected("kiks", [*words, "kinks"]) == ""  # kicks or kinks
     assert corrected("kiks", ["kicks"], ["kinks"]) == "kicks"
     assert corrected("juump", words) == "jump"
+    assert corrected("trun", ["trunk", "turn"]) == "turn"  # of the same letters
     assert corrected("bakcflps", words) == "backflips"  # two letters off of eight
     assert corrected("jumpss", ["jump", "jumping"], words) == "jumps"
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Floats, Graph
-from motet.decode.loop import Flags, Ids, Loop, Noise, Scores, advance, zero_state
+from motet.decode.loop import Flags, Ids, Loop, Noise, Scores, State, advance, taken, zero_state
 from motet.generate.memory import Memory
 from motet.settings import Range, Settings
 
@@ -90,7 +90,11 @@ class Source:
 
 
 class Writer:
-    """Draws codes for B rows, each with its action and noise; holds all state of one request."""
+    """Draws codes for B rows, each with its action and noise; holds all state of one request.
+
+    The graph "step" reads the steps of a row when a net is to draw the next one, all that it has not read at once: most
+    steps are remembered ones, for which no net is needed.
+    """
 
     age: Ids
     """(B,) int64 steps since the action began."""
@@ -103,16 +107,17 @@ class Writer:
         self.noise = list(noise)
         self.drawing = drawing
         self.begin()
-        # The graphs run on 2 B rows: those that know the action, then those that do not.
-        rows = 2 * len(self.noise)
-        self.state = zero_state(source.step, rows)
-        self.last = np.zeros((rows, source.parts), dtype=np.int64)
+        # What the net knows of each row, twice: with the actions and without; and the steps that it has yet to read.
+        self.states = [zero_state(source.step, 2)] * len(self.noise)
+        self.steps: list[State] = []
+        self.unread = np.zeros(len(self.noise), dtype=np.int64)
+        self.last = np.zeros((len(self.noise), source.parts), dtype=np.int64)
         self.last[:, 0] = source.end + 1
         self.recent: list[Floats] = []  # numbers (B, L) of the last steps, the latest first
         self._remember()
 
     def _remember(self) -> None:
-        self._before = (self.last, self.state, self.recent, self.age, self.done)
+        self._before = (self.last, self.states, self.steps, self.unread, self.recent, self.age, self.done)
 
     def begin(self) -> None:
         """Begin an action in every row."""
@@ -122,7 +127,7 @@ class Writer:
     def see(self, codes: Ids) -> None:
         """Take steps (N, P) as the past of every row, whatever the action was."""
         for step in codes:
-            self._known(np.full(len(self.noise), self.source.null_action))
+            self._advance(np.full(len(self.noise), self.source.null_action))
             self.last = np.tile(step, (len(self.last), 1))
 
     def draw(self, actions: Ids, ends: bool = True, steps: int = 0, whole: bool = True) -> Ids:
@@ -134,15 +139,18 @@ class Writer:
         whole: whether all of an action is shown; else, of long recordings, an act (:meth:`Memory.next`). Each row takes
         one block of uniform numbers (P + 2,) from its noise.
         """
-        known = self._known(actions)
+        self._advance(actions)
         uniform = self.source.uniform(self.noise)
         self.age = self.age.copy()
         self.done = self.done.copy()
 
-        # Steps of some rows are remembered ones; -1 marks parts that are still to be drawn.
+        # Steps of some rows are remembered ones, and all that begin an action to show the most of it; -1 marks parts
+        # that are still to be drawn.
         memory = self.source.memory
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
-        for row in self._remembering(uniform[:, 0], steps):
+        share = self.drawing.memory
+        continues = (uniform[:, 0] < share) | (steps > 0 and share > 0)
+        for row in np.flatnonzero(continues).tolist():
             action = int(actions[row])
             if action in memory.rows:
                 codes[row] = self._remembered(row, action, float(uniform[row, 1]), ends, steps, whole)
@@ -150,20 +158,13 @@ class Writer:
         # The others are drawn, and end no sooner than remembered motions.
         shortest = np.array([memory.shortest.get(action, 0) for action in actions.tolist()])
         is_early = self.age < (1 - memory.settings.skip) * shortest
-        again = self._parts(known, uniform[:, 2:], codes, ends, is_early)
+        again = self._parts(uniform[:, 2:], codes, ends, is_early)
 
         # Actions that begin again have age 0 at the next step.
-        self.last = np.concatenate([codes, codes])
+        self.last = codes
         self.age = np.where(again, 0, self.age + 1)
         self.done = np.where(again, 0.0, self.done)
         return codes
-
-    def _remembering(self, uniform: Scores, steps: int) -> list[int]:
-        """The rows that continue with a remembered step, by uniform numbers (B,); all rows, where one begins an action
-        to show the most of it in a number of steps."""
-        share = self.drawing.memory
-        rows: list[int] = np.flatnonzero((uniform < share) | (steps > 0 and share > 0)).tolist()
-        return rows
 
     def _remembered(self, row: int, action: int, uniform: float, ends: bool, steps: int, whole: bool) -> Ids:
         """The codes (P,) of a remembered step at which a row continues; see :meth:`draw`."""
@@ -182,36 +183,62 @@ class Writer:
 
     def take_back(self) -> None:
         """Undo the last draw, such as that of an end, and continue from before it."""
-        self.last, self.state, self.recent, self.age, self.done = self._before
+        self.last, self.states, self.steps, self.unread, self.recent, self.age, self.done = self._before
 
-    def _known(self, actions: Ids) -> Floats:
-        """Advance by the last step: what the graph "part" has to know (2 B, H) of the next one."""
+    def _advance(self, actions: Ids) -> None:
+        """Put the last step behind each row, whose next one shows an action (B,)."""
         self._remember()
-        no_action = np.full(len(actions), self.source.null_action)
-        inputs = {
-            "codes": self.last,
-            "action": np.concatenate([self.source.written[actions], no_action]).astype(np.int64),
-            "age": np.concatenate([self.age, self.age]),
-        }
-        outputs, self.state = advance(self.source.step, self.state, inputs)
-        self._keep_window()
         if self.last[0, 0] != self.source.end + 1:
-            numbers = outputs["numbers"][: len(actions)]
-            self.recent = [numbers, *self.recent][: self.source.memory.settings.past_steps]
-        known: Floats = outputs["known"]
+            memory = self.source.memory
+            self.recent = [memory.numbers(self.last), *self.recent][: memory.settings.past_steps]
+        step = {"codes": self.last, "action": self.source.written[actions].astype(np.int64), "age": self.age}
+        self.steps = [*self.steps, step][-WINDOW:]
+        self.unread = np.minimum(self.unread + 1, WINDOW)
+
+    def _known(self, rows: Ids) -> Floats:
+        """What the graph "part" has to know (R, 2, H) of the next step of rows, with and without their actions.
+
+        Rows that have as many unread steps are read together.
+        """
+        counts = self.unread[rows]
+        known = np.zeros((len(rows), 2, self.source.part.spec.input("known").size(1)), dtype=np.float32)
+        for count in np.unique(counts):
+            known[counts == count] = self._read(rows[counts == count], int(count))
         return known
 
-    def _keep_window(self) -> None:
-        """Drop the states of steps before the window: attention falls with the distance in time."""
-        for name, array in self.state.items():
-            sizes = self.source.step.spec.start_shape(name)
-            if 0 not in sizes:
-                continue
-            axis = 1 + sizes.index(0)
-            if array.shape[axis] > WINDOW:
-                self.state[name] = np.ascontiguousarray(np.take(array, range(-WINDOW, 0), axis))
+    def _read(self, rows: Ids, count: int) -> Floats:
+        """Read the last steps of rows, ``count`` each: what is known (R, 2, H) of the next ones."""
+        # each row, and after it the same without its actions
+        inputs: State = {}
+        for name in self.steps[-1]:
+            of_rows = [step[name][rows] for step in self.steps[-count:]]
+            inputs[name] = np.repeat(np.stack(of_rows, axis=1), 2, axis=0)
+        inputs["action"][1::2] = self.source.null_action
+        outputs, state = advance(self.source.step, self._window(rows, WINDOW - count), inputs)
 
-    def _parts(self, known: Floats, uniform: Scores, codes: Ids, ends: bool, is_early: Flags) -> Flags:
+        # these rows know them now
+        self.states = self.states.copy()
+        for place, row in enumerate(rows):
+            self.states[row] = {name: array[2 * place : 2 * place + 2] for name, array in state.items()}
+        self.unread = self.unread.copy()
+        self.unread[rows] = 0
+        known: Floats = outputs["known"].reshape(len(rows), 2, -1)
+        return known
+
+    def _window(self, rows: Ids, most: int) -> State:
+        """The states of rows; of those that grow, that of the last steps, at most ``most``."""
+        window: State = {}
+        for name in self.source.step.spec.feedback:
+            state = np.concatenate([self.states[row][name] for row in rows])
+            sizes = self.source.step.spec.start_shape(name)
+            if 0 in sizes:
+                axis = 1 + sizes.index(0)
+                length = state.shape[axis]
+                state = np.take(state, range(max(0, length - most), length), axis)
+            window[name] = state
+        return window
+
+    def _parts(self, uniform: Scores, codes: Ids, ends: bool, is_early: Flags) -> Flags:
         """Draw the parts of steps (B, P) one after the other, except in rows that are remembered already.
 
         is_early: rows (B,) that may not end yet. Returns the rows (B,) that begin their action again."""
@@ -219,7 +246,7 @@ class Writer:
         rows = np.flatnonzero((codes[:, 0] < 0) | again)
         if not len(rows):
             return again
-        known = known[np.concatenate([rows, rows + len(codes)])]
+        known = np.concatenate(self._known(rows).swapaxes(0, 1))
         temperature = np.where(self.age == 0, self.drawing.first_temperature, self.drawing.temperature)[rows]
         drawn = np.zeros((len(rows), self.source.parts), dtype=np.int64)
         # The move first, as it may be an end; then the codes of the body.
@@ -256,13 +283,14 @@ class Writer:
 
     def keep(self, rows: NDArray[np.intp]) -> None:
         """Go on with some of the rows only."""
-        both = np.concatenate([rows, rows + len(self.noise)])
         self.noise = [self.noise[row] for row in rows]
         self.age = self.age[rows]
         self.done = self.done[rows]
         self.recent = [numbers[rows] for numbers in self.recent]
-        self.last = self.last[both]
-        self.state = {name: array[both] for name, array in self.state.items()}
+        self.last = self.last[rows]
+        self.states = [self.states[row] for row in rows.tolist()]
+        self.steps = [taken(step, rows) for step in self.steps]
+        self.unread = self.unread[rows]
 
 
 def nucleus(log_weights: Scores, uniform: Scores, temperature: Scores | float, top_p: float) -> Ids:
@@ -329,8 +357,8 @@ def drawn_steps(
 LOOPS: Mapping[str, Loop] = {
     "codes": Loop(
         draw_codes,
-        {"codes": "*batch P", "action": "*batch", "age": "*batch"},
-        {"known": "batch H", "numbers": "batch L"},
+        {"codes": "*batch steps P", "action": "*batch steps", "age": "*batch steps"},
+        {"known": "batch H"},
         CodesSettings,
     ),
 }

@@ -13,7 +13,8 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from motet.decode.loop import Ids, Scores, zero_state
+from motet.bundle.graph import Floats
+from motet.decode.loop import Ids, Scores
 from motet.generate.codec import Codec
 from motet.generate.codes import CodesSettings, Source, Writer, nucleus
 from motet.motion.rotations import Array
@@ -124,7 +125,7 @@ class Continuer(NamedTuple):
         """
         count = self.settings.rows
         noise = [np.random.Generator(np.random.PCG64([seed, row])) for row in range(count)]
-        actions, ages = self._drawn_actions(numbers_of(self.source, codes[:known]), pace, seed)
+        actions, ages = self._drawn_actions(self.source.memory.numbers(codes[:known]), pace, seed)
 
         # All rows have seen the same steps: one row sees them, and becomes all.
         writer = Writer(self.source, noise[:1], self.drawing)
@@ -146,7 +147,7 @@ class Continuer(NamedTuple):
             # One half of the rows keeps the action, the other may begin its own again.
             row_actions = np.where(np.arange(count) < count // 2, row_actions[best], actions)
 
-    def _drawn_actions(self, recent: Array, pace: Pace, seed: int) -> tuple[Ids, Ids]:
+    def _drawn_actions(self, recent: Floats, pace: Pace, seed: int) -> tuple[Ids, Ids]:
         """The action of each row (B,), and the age at which it is entered: a few drawn by their likelihood, in turn."""
         actions, ages, weights = self.likely(recent, self.paces_off(pace))
         uniform = np.random.Generator(np.random.PCG64(seed)).random(self.settings.actions)
@@ -154,7 +155,7 @@ class Continuer(NamedTuple):
         in_turn = drawn[np.arange(self.settings.rows) % len(drawn)]
         return actions[in_turn], ages[in_turn]
 
-    def likely(self, numbers: Array, beside: Array | float = 0.0) -> tuple[Ids, Ids, Scores]:
+    def likely(self, numbers: Floats, beside: Array | float = 0.0) -> tuple[Ids, Ids, Scores]:
         """Of all actions, the likeliest first: which they are, the age of each at the place that is nearest, and
         log-weights, from the numbers (N, L) of a motion's last steps. beside: (M,) what is added to the distances."""
         memory = self.source.memory
@@ -164,20 +165,17 @@ class Continuer(NamedTuple):
         places = np.array([nearest[action] for action in order])
         return np.array(order, dtype=np.int64), memory.ages[places], -distances[places] / self.settings.action_scale
 
-    def _distances(self, numbers: Array) -> Scores:
+    def _distances(self, numbers: Floats) -> Scores:
         """The mean squared distance of the last steps (N, L) from those before each remembered place (M,), the last
         ones counting most."""
         memory = self.source.memory
-        # The numbers of the step before each place, which keys begin with.
-        before = np.empty((len(memory.codes), numbers.shape[1]), dtype=np.float32)
-        for action, rows in memory.rows.items():
-            before[rows] = memory.keys[action][:, : numbers.shape[1]]
-        places = np.arange(len(before))
-        distances = np.zeros(len(before), dtype=np.float32)
+        remembered = memory.numbers(memory.codes)
+        places = np.arange(len(remembered))
+        distances = np.zeros(len(remembered), dtype=np.float32)
         total = 0.0
         for back, step in enumerate(numbers[: -self.settings.context_steps - 1 : -1]):
             weight = self.settings.context_fading**back
-            off = ((before - step) ** 2).sum(axis=1)[places - np.minimum(memory.ages, back)]
+            off = ((remembered - step) ** 2).sum(axis=1)[places - np.minimum(memory.ages, back + 1)]
             distances += np.float32(weight) * off
             total += weight
         mean: Scores = distances.astype(np.float64) / total
@@ -245,15 +243,3 @@ class Progress:
         turned = self.turned + moves[..., 2].sum(axis=0)
         beside: Scores = np.abs(turned - self.pace.turn * self.steps * seconds)
         return off + beside / self.continuer.settings.turn_scale
-
-
-def numbers_of(source: Source, codes: Ids) -> Array:
-    """The numbers (N, L) by which steps (N, P) are compared; they depend on a step alone."""
-    feeds = {
-        **zero_state(source.step, len(codes)),
-        "codes": codes,
-        "action": np.full(len(codes), source.null_action),
-        "age": np.zeros(len(codes), dtype=np.int64),
-    }
-    numbers: Array = source.step(feeds)["numbers"]
-    return numbers

@@ -131,6 +131,11 @@ class NamedAct:
         keys = mirrored_keys(self.act.keys) if side == "left" else self.act.keys
         return replace(self, act=replace(self.act, keys=keys, mirrored=False))
 
+    def at_pace(self, pace: float) -> "NamedAct":
+        """The act played a factor faster."""
+        slowest, fastest = self.act.speed
+        return replace(self, act=replace(self.act, speed=(pace * slowest, pace * fastest)))
+
     def lasting(self, seconds: float, seed: int) -> "NamedAct":
         """The act repeated more often, if it can be and is shorter than some seconds, or with its longest pose held
         longer, if it cannot; or played up to twice as fast, if it lasts longer. seconds: 0 for its usual length."""
@@ -164,11 +169,12 @@ class Order(NamedTuple):
     stems: frozenset[str]
     particles: frozenset[str]
 
-    def fit(self, words: Sequence[str]) -> tuple[int, int, bool, str, str]:
-        """Rises with how much it says of a sentence's words: in stems, in words, and all in their order."""
+    def fit(self, words: Sequence[str]) -> tuple[int, int, int, str, str]:
+        """Rises with how much it says of a sentence's words: in stems, in words in their order, in others."""
         of_order = self.sentence.split()
-        is_whole = list(words) == of_order
-        return len(self.stems), len(set(words).intersection(of_order)), is_whole, self.name, self.sentence
+        following = iter(map(stem, words))
+        in_order = all(stem(word) in following for word in of_order) * len(of_order)
+        return len(self.stems), in_order, len(set(words).intersection(of_order)), self.name, self.sentence
 
 
 def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:

@@ -4,7 +4,7 @@ Letters in shapes: M steps in all, R of an action, P codes of a step (B of the b
 before it, T steps of a recording.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, ClassVar, NamedTuple
@@ -98,31 +98,6 @@ class Recording(NamedTuple):
     """The last step of each piece, as a place among all M steps."""
 
 
-class Keys(Mapping[int, Floats]):
-    """The keys (R, K L) of each action, computed when the action is first used: few are used of many.
-
-    numbers: (M, L) float32 of all steps. ages: (M,). rows: the steps of each action. weights: (K,) of the steps before.
-    """
-
-    def __init__(self, numbers: Floats, ages: Ids, rows: Mapping[int, Ids], weights: Scores) -> None:
-        self._numbers = numbers
-        self._ages = ages
-        self._rows = rows
-        self._weights = weights
-        self._known: dict[int, Floats] = {}
-
-    def __getitem__(self, action: int) -> Floats:
-        if action not in self._known:
-            self._known[action] = _step_features(self._numbers, self._ages, self._rows[action], self._weights)
-        return self._known[action]
-
-    def __iter__(self) -> Iterator[int]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-
 @dataclass(frozen=True, eq=False)
 class Memory:
     """M remembered steps, motion after motion."""
@@ -148,12 +123,15 @@ class Memory:
     rows: dict[int, Ids]
     """The remembered steps (R,) of each action."""
 
-    keys: Mapping[int, Floats]
-    """The numbers (R, K L) float32 of the K steps before each step of an action, scaled by the roots of their weights.
-    """
+    moves: Floats
+    """(E, 3) numbers of each move."""
+
+    body: Floats
+    """(V, L) numbers of each code of the body."""
 
     settings: MemorySettings
     _courses: dict[int, tuple[Ids, Scores]] = field(default_factory=dict, init=False)
+    _keys: dict[int, Floats] = field(default_factory=dict, init=False)
 
     @staticmethod
     def of(
@@ -175,7 +153,6 @@ class Memory:
         # The steps of each action, and what preceded them.
         numbers = _numbers(codes, moves, body)
         rows = _rows_by_action(action_of_step)
-        keys = Keys(numbers, ages, rows, settings.past_weights)
 
         # How much each step matters: to its motion by its movement, to its action by what other actions do not have.
         starts, lasts = _motions(ages)
@@ -187,12 +164,31 @@ class Memory:
         # How much of each motion is over before its steps, by both.
         parts = _over(settings.rest_weight + change, starts, lasts)
         acts = _over(importance, starts, lasts)
-        return Memory(codes, ages, parts, importance, acts, lasts, rows, keys, settings)
+        return Memory(codes, ages, parts, importance, acts, lasts, rows, moves, body, settings)
 
     def lend(self, action: int, other: int) -> None:
         """Let an action that has no steps have those of another one."""
         if action not in self.rows and other in self.rows:
             self.rows[action] = self.rows[other]
+
+    def numbers(self, codes: Ids) -> Floats:
+        """The numbers (N, L) float32 by which steps (N, P) are compared; they depend on a step alone."""
+        return _numbers(codes, self.moves, self.body)
+
+    def keys(self, action: int) -> Floats:
+        """The numbers (R, K L) float32 of the K steps before each step of an action, by the roots of their weights.
+
+        Before its first step a figure counts as having stood in it. They are computed when the action is first used:
+        few are used of many.
+        """
+        if action not in self._keys:
+            rows = self.rows[action]
+            past = []
+            for back, weight in enumerate(self.settings.past_weights, start=1):
+                before = rows - np.minimum(self.ages[rows], back)
+                past.append(np.sqrt(weight) * self.numbers(self.codes[before]))
+            self._keys[action] = np.concatenate(past, axis=1).astype(np.float32)
+        return self._keys[action]
 
     @cached_property
     def shortest(self) -> dict[int, int]:
@@ -248,7 +244,7 @@ class Memory:
         ages = self.ages[rows]
         over = self.parts[rows]
         for places, lasts in self.recordings(action):
-            first, last = act_of(self.keys[action][places], self.particular[rows[places]], self.settings)
+            first, last = act_of(self.keys(action)[places], self.particular[rows[places]], self.settings)
             if last + 1 - first == len(places):
                 continue
             # All pieces of the recording are cut to its act, timed from the act's first step.
@@ -349,7 +345,7 @@ class Memory:
         # The last steps, the first one repeated where there are fewer than K.
         past = np.stack([recent[min(back, len(recent) - 1)] for back in range(settings.past_steps)])
         present = (np.sqrt(settings.past_weights)[:, None] * past).ravel()
-        distances = ((self.keys[action] - present) ** 2).sum(axis=1)
+        distances = ((self.keys(action) - present) ** 2).sum(axis=1)
         # Differences in age cost a little, without a limit where the motion is to end as remembered ones do.
         age_costs = settings.age_cost * (ages - age) ** 2
         distances += age_costs if ends else np.minimum(age_costs, settings.age_cost_limit)
@@ -439,16 +435,6 @@ def _numbers(codes: Ids, moves: Floats, body: Floats) -> Floats:
     is_move = (codes[:, :1] < end).astype(np.float32)
     numbers: Floats = np.concatenate([of_move, of_body], axis=1) * is_move
     return numbers
-
-
-def _step_features(numbers: Floats, ages: Ids, steps: Ids, weights: Scores) -> Floats:
-    """The keys (R, K L) float32 of steps (R,): numbers of those before each, scaled by the roots of their weights (K,).
-
-    Before its first step a figure counts as having stood in it."""
-    past = []
-    for back, weight in enumerate(weights, start=1):
-        past.append(np.sqrt(weight) * numbers[steps - np.minimum(ages[steps], back)])
-    return np.concatenate(past, axis=1).astype(np.float32)
 
 
 def _motions(ages: Ids) -> tuple[Ids, Ids]:

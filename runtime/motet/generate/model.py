@@ -139,8 +139,6 @@ class CodesModel(SentenceModel):
         self.bind_table("memory", "R S", "int16")
         self.bind_table("moves", "M 3", "float32")
         self.bind_table("body", "Q N", "float32")
-        if 3 + self.sizes["B"] * self.sizes["N"] != self.sizes["L"]:
-            raise BundleError("manifest, tables.body: does not fit the graph step")
 
     def _composed(self, sentence: str, numbers: bool, whole: bool, settings: LoopValues) -> bool:
         seconds = self._settled(settings)["seconds"]

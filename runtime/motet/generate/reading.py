@@ -20,6 +20,7 @@ from motet.figures.humanoid import HUMANOID
 from motet.generate.base import FamiliaritySettings, GenerateModel, Understood
 from motet.generate.commands import Commands
 from motet.generate.keyed_acts import (
+    ARTICLES,
     BOTH_SIDES,
     HAND_NAMED,
     HELD,
@@ -69,8 +70,9 @@ class SentenceModel(GenerateModel):
         commands = source.list_of_fields("commands") if "commands" in self.manifest.source else []
         self._commands = Commands.of(commands, self.vocabulary.rules, self.sizes["A"], self.vocabulary.meant)
         self._familiar = self.settings(FamiliaritySettings)
-        # a reading asks for the act of each part of a sentence several times
+        # a reading needs the act and the context of each part of a sentence several times
         self._keyed = lru_cache(maxsize=256)(self._keyed_act)
+        self._context = lru_cache(maxsize=256)(self._context_of)
         self._read_actions(source.list_of_fields("actions"))
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
@@ -81,10 +83,11 @@ class SentenceModel(GenerateModel):
     def embed(self, sentences: str | Sequence[str]) -> Floats:
         """See :meth:`GenerateModel.embed`: (A,), or (A + 1 + C,) where the bundle has C commands."""
         texts = texts_of(sentences)
-        contexts = super().embed(texts)
-        if self._commands.acts:
-            meant = [self._meant(text, context) for text, context in zip(texts, contexts, strict=True)]
-            contexts = np.stack(meant) if meant else contexts
+        for text in texts:
+            self.ids(text)  # warns of unknown words
+        if not texts:
+            return np.empty((0, self.sizes["A"]), dtype=np.float32)
+        contexts = np.stack([self._context(text) for text in texts])
         return contexts[0] if isinstance(sentences, str) else contexts
 
     def _meant(self, text: str, context: Floats) -> Floats:
@@ -106,7 +109,7 @@ class SentenceModel(GenerateModel):
         is_recorded = text in self._sentences[: self.sizes["A"]]
         order = text if is_recorded else SUBJECT.sub("", text, count=1)
         act = self._commands.act(order)
-        if act is not None and (order == text or not self._commands.is_instead(order)):
+        if act is not None and (order == text or self._is_obeyed(order, context)):
             return act
         nearest = self._commands.nearest(order)
         if nearest is None:
@@ -116,6 +119,12 @@ class SentenceModel(GenerateModel):
         limit += not nearest.isdisjoint(map(stem, lacking))
         command = self._commands.action(nearest)
         return command if len(self.lacking(text, command)) < limit else None
+
+    def _is_obeyed(self, order: str, context: Floats) -> bool:
+        """Whether a command whose subject is said is shown, and not the likeliest action: unless nobody recorded it,
+        and the action has its verb."""
+        recorded = self.vocabulary.rules.words(self._sentences[int(context.argmax())])
+        return not self._commands.is_instead(order) or stem(order.split(maxsplit=1)[0]) not in stems_of(recorded)
 
     def _read_actions(self, entries: Sequence[Fields]) -> None:
         """The known actions: a sentence and the words of each, and the weights of words, more of one that describes few
@@ -151,10 +160,21 @@ class SentenceModel(GenerateModel):
             return None
         text, amounts = counted(sentence)
         if amounts.keys() != {"seconds"}:
-            return self._keyed_by_hand(sentence)
+            return self._keyed_at_pace(sentence)
         text = HELD.sub("", text)
         act = None if text in self._sentences else self._keyed_by_hand(text)
         return replace(act, seconds=amounts["seconds"]) if act and not act.is_other_text else None
+
+    def _keyed_at_pace(self, sentence: str) -> NamedAct | None:
+        """The act of a sentence that does not say how long it lasts; in its pace, if that is no part of the act."""
+        act = self._keyed_by_hand(sentence)
+        is_composed = re.search(r",| and | then ", sentence)
+        if (act and not act.lacking) or is_composed or not PACE_PHRASES.search(sentence):
+            return act
+        plain = self._keyed_by_hand(PACE_PHRASES.sub("", sentence).strip(" ,"))
+        if plain is None or plain.lacking or plain.is_other_text:
+            return act
+        return plain.at_pace(quantities_of(sentence).amounts.get("pace", 1.0))
 
     def _keyed_by_hand(self, sentence: str) -> NamedAct | None:
         """The act of a sentence that does not say how long it lasts, done with the hand that it names, if it is one of
@@ -211,6 +231,8 @@ class SentenceModel(GenerateModel):
         if not act.leaves_legs:
             return None
         words = below.split()
+        if SUBJECT.sub("", below).split()[0] in ARTICLES:  # "wakes up with a start"
+            return None
         legs = act_named(without_subject(words))
         if legs and not (legs.leaves_legs or legs.is_other_text):
             return replace(act, legs=legs)
@@ -287,23 +309,28 @@ class SentenceModel(GenerateModel):
     def _shown_at_once(self, sentence: str, parts: Sequence[str]) -> bool:
         """Whether the likeliest action of a sentence shows all its parts, none of which has numbers of its own or
         is done again; or an act by key poses shows all, and no two parts name different ones."""
-        if self.likeliest(sentence).lacking or not self.understood(sentence).confident:
+        shown = self.likeliest(sentence)
+        if shown.lacking or not self.understood(sentence).confident:
             return False
         if whole := self._keyed(sentence):
             acts = [act.act for act in map(self._keyed, parts) if act]
             return not whole.is_other_text and all(act == acts[0] for act in acts)
-        verbs = [stem(SUBJECT.sub("", part).split()[0].lower()) for part in parts]
-        if len(set(verbs)) < len(verbs):
+        verbs = {stem(SUBJECT.sub("", part).split()[0].lower()) for part in parts}
+        if len(verbs) < len(parts):
             return False
         quantities = self.quantities(sentence)
-        for part in parts:
-            amounts = dict(quantities_of(part).amounts)
-            if amounts and amounts != dict(quantities.amounts):
-                return False
+        if any(quantities_of(part).amounts not in ({}, quantities.amounts) for part in parts):
+            return False
         # Several commands are one only where they are known as one.
-        if self._commands.act(quantities.text) is not None:
+        if self._is_known(sentence, keyed=False):
             return True
-        return any(self._commands.act(self.quantities(part).text) is None for part in parts)
+        says_all = verbs <= stems_of(self.vocabulary.rules.words(shown.action))
+        return not all(self._is_known(part, keyed=not says_all) for part in parts)
+
+    def _is_known(self, part: str, keyed: bool) -> bool:
+        """Whether a part is a command or, if ``keyed``, an act by key poses."""
+        is_keyed = keyed and self._keyed(part) is not None
+        return is_keyed or self._commands.act(self.quantities(part).text) is not None
 
     def quantities(self, sentence: str) -> Quantities:
         """The numbers in a sentence, and the text that it is read as: itself if the likeliest action has all its words,
@@ -370,7 +397,7 @@ class SentenceModel(GenerateModel):
             have = frozenset()
         return [word for word, forms in self._content(sentence).items() if have.isdisjoint(forms)]
 
-    def _context(self, sentence: str) -> Floats:
+    def _context_of(self, sentence: str) -> Floats:
         """The context (A,) of a sentence, without a warning of unknown words."""
         ids, _ = self.vocabulary.encode(sentence)
         context: Floats = self.contexts([ids])[0]

@@ -21,6 +21,7 @@ DIRECTION = re.compile(
     r"\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b",
     re.IGNORECASE,
 )
+TIMES = re.compile(r" (?:once|twice|\w+ times)\b", re.IGNORECASE)
 SIDE_ALONE = re.compile(
     r"(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
 )
@@ -36,10 +37,10 @@ ADDRESSEE = re.compile(
 
 # fmt: off
 FUNCTION_WORDS = frozenset((
-    "a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first",
-    "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on",
-    "or", "person", "she", "someone", "somebody", "that", "the", "their", "them", "then", "they", "this", "to", "up",
-    "while", "who", "with", "woman", "you", "your",
+    "a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "athlete", "be", "before", "boy", "by",
+    "finally", "first", "for", "from", "girl", "guy", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its",
+    "lady", "man", "my", "next", "of", "on", "or", "person", "she", "someone", "somebody", "that", "the", "their",
+    "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your",
 ))
 """Words that say little about an action."""
 # fmt: on
@@ -173,8 +174,11 @@ def _in_full(parts: Iterable[str]) -> list[str]:
 def _after(before: str, part: str) -> str:
     """A part in full, by the one before it."""
     directions = list(DIRECTION.finditer(before))
-    if directions and DIRECTION.fullmatch(part):
-        return before[: directions[-1].start()] + part + before[directions[-1].end() :]
+    if directions and DIRECTION.fullmatch(TIMES.sub("", part)):
+        # as often as it says itself, or as the part before
+        following = before[directions[-1].end() :]
+        own_times = TIMES.search(part)
+        return before[: directions[-1].start()] + part + (TIMES.sub("", following) if own_times else following)
     side = SIDE_ALONE.fullmatch(part)
     if side and re.search(r"\b(?:left|right)\b", before):
         return re.sub(r"\b(?:left|right)\b", side[1], before)

@@ -74,6 +74,9 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (rf"\ban? (?=(?:{MEASURES})\b)", "1 "),
     (r"\b(?:does|do) an? (45|90|135|180|270|360|540|720)\b(?! deg)", r"turn \1"),
     (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
+    (r"\b(?:an? )?(45|90|135|180|270|360|540|720) (turn|spin|pivot)\b", r"\2 \1 deg"),
+    (r"\b(?:retreats?|backs? (?:off|away|up)) (?=\d)", "walks backwards "),
+    (r"\badvances? (?=\d)", "walks forward "),
 )  # fmt: skip
 """Other ways to say numbers and their units, and their replacements."""
 

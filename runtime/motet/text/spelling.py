@@ -11,12 +11,14 @@ def corrected(word: str, *known: Iterable[str]) -> str:
     It is the nearest that starts with the same letter and has four letters or more: one letter off, or two if the word
     has eight letters or more. A shorter word with another letter is no slip but one of English ("coin" is no "chin"),
     as is one of less than six letters with a letter more, unless that is there twice. If several are as near, those of
-    the first of ``known`` count; they have to be forms of one word, and the first of them is returned.
+    the first of ``known`` count, and among them those of the same letters; they have to be forms of one word, and the
+    first of them is returned.
     """
     most = 2 if len(word) >= 8 else 1
     for off in range(1, most + 1):
         for words in known:
             nearest = [other for other in _alike(word, words, most) if distance(word, other) == off]
+            nearest = [other for other in nearest if sorted(other) == sorted(word)] or nearest
             if nearest:
                 return nearest[0] if len(set(map(stem, nearest))) == 1 else ""
     return ""

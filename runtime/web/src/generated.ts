@@ -1,4 +1,5 @@
 /* Written by runtime/web/generate.py: do not edit. Units stand in the modules of Python. */
+import { ranges } from "./settings.js";
 
 // motet.bundle.bundle
 export const BUNDLE = {
@@ -29,12 +30,12 @@ export const MEMBERS = {
 } as const;
 
 // motet.decode.beam.ConsensusSettings
-export const consensusSettings = {
+export const consensusSettings = ranges({
   max_words: { default: null, low: 1, high: 1000, whole: true },
   beams: { default: 5, low: 1, high: 100, whole: true },
   draws: { default: 100, low: 1, high: 1000, whole: true },
   temperature: { default: 1, low: 0.01, high: 100, whole: false },
-} as const;
+});
 
 // motet.figures.feet.contacts
 export const CONTACTS = {
@@ -120,10 +121,10 @@ export const TEXT = {
 } as const;
 
 // motet.generate.base.FamiliaritySettings
-export const familiaritySettings = {
+export const familiaritySettings = ranges({
   confident: { default: 0.5, low: 0, high: 1, whole: false },
   doubt: { default: 0.25, low: 0, high: 10, whole: false },
-} as const;
+});
 
 // motet.generate.codec
 export const CODEC = {
@@ -137,7 +138,7 @@ export const CODES = {
 } as const;
 
 // motet.generate.codes.CodesSettings
-export const codesSettings = {
+export const codesSettings = ranges({
   hypotheses: { default: 1, low: 1, high: 100, whole: true },
   temperature: { default: 1, low: 0.01, high: 100, whole: false },
   first_temperature: { default: 1, low: 0.01, high: 100, whole: false },
@@ -147,10 +148,10 @@ export const codesSettings = {
   certainty: { default: 1, low: 0.01, high: 100, whole: false },
   seconds: { default: 0, low: 0, high: 600, whole: false },
   max_seconds: { default: 30, low: 0, high: 600, whole: false },
-} as const;
+});
 
 // motet.generate.continue_codes.ContinuationSettings
-export const continuationSettings = {
+export const continuationSettings = ranges({
   context: { default: 4, low: 0.5, high: 10, whole: false },
   context_steps: { default: 12, low: 1, high: 100, whole: true },
   context_fading: { default: 0.85, low: 0, high: 1, whole: false },
@@ -172,7 +173,7 @@ export const continuationSettings = {
   ground_reach: { default: 0.7, low: 0.1, high: 10, whole: false },
   ground_limit: { default: 0.1, low: 0, high: 1, whole: false },
   anchor: { default: 1, low: 0.1, high: 10, whole: false },
-} as const;
+});
 
 // motet.generate.memory
 export const MEMORY = {
@@ -180,7 +181,7 @@ export const MEMORY = {
 } as const;
 
 // motet.generate.memory.MemorySettings
-export const memorySettings = {
+export const memorySettings = ranges({
   past_steps: { default: 3, low: 1, high: 16, whole: true },
   past_fading: { default: 0.5, low: 0, high: 1, whole: false },
   distance_scale: { default: 0.5, low: 1e-06, high: 1000000, whole: false },
@@ -197,7 +198,7 @@ export const memorySettings = {
   act_steps: { default: 45, low: 1, high: 10000, whole: true },
   alike_distance: { default: 8.03, low: 1e-06, high: 1000000, whole: false },
   edge_cost: { default: 30, low: 0, high: 10000, whole: false },
-} as const;
+});
 
 // motet.generate.model
 export const GENERATE = {
@@ -222,9 +223,9 @@ export const DESCRIBE = {
 } as const;
 
 // motet.models.describe.ConfidenceSettings
-export const confidenceSettings = {
+export const confidenceSettings = ranges({
   log_probability: { default: -5.5, low: -1000, high: 0, whole: false },
-} as const;
+});
 
 // motet.models.language
 export const LANGUAGE = {
@@ -240,7 +241,7 @@ export const NEAREST_NEIGHBOUR = {
 } as const;
 
 // motet.models.nearest_neighbour.AnswerSettings
-export const answerSettings = {
+export const answerSettings = ranges({
   near: { default: 40, low: 1, high: 1000, whole: true },
   temperature: { default: 0.07, low: 0.001, high: 10, whole: false },
   turned: { default: 45, low: 0, high: 360, whole: false },
@@ -254,7 +255,7 @@ export const answerSettings = {
   outside: { default: 0, low: -1, high: 1, whole: false },
   bias: { default: 0, low: -1000, high: 1000, whole: false },
   share: { default: 1, low: -1000, high: 1000, whole: false },
-} as const;
+});
 
 // motet.motion.rotations
 export const ROTATIONS = {
@@ -267,16 +268,16 @@ export const SKELETON = {
 } as const;
 
 // motet.predict.between.BetweenSettings
-export const betweenSettings = {
+export const betweenSettings = ranges({
   context: { default: null, low: 1, high: 1000, whole: true },
   least: { default: null, low: 1, high: 1000, whole: true },
   longest: { default: null, low: 1, high: 1000, whole: true },
-} as const;
+});
 
 // motet.predict.free_run.FreeRunSettings
-export const freeRunSettings = {
+export const freeRunSettings = ranges({
   horizon: { default: null, low: 1, high: 10000, whole: true },
-} as const;
+});
 
 // motet.predict.model
 export const PREDICT = {
@@ -300,16 +301,16 @@ export const ROOT_SIXD = {
 } as const;
 
 // motet.search.model.IndexSettings
-export const indexSettings = {
+export const indexSettings = ranges({
   window: { default: 10, low: 0.5, high: 30, whole: false },
   like_text: { default: 0.45, low: -1, high: 1, whole: false },
   like_motion: { default: 0.87, low: -1, high: 1, whole: false },
-} as const;
+});
 
 // motet.search.nearest.NearestSettings
-export const nearestSettings = {
+export const nearestSettings = ranges({
   count: { default: 5, low: 1, high: 1000, whole: true },
-} as const;
+});
 
 // motet.steering.action_layer
 export const ACTION_LAYER = {
@@ -325,7 +326,7 @@ export const ACTS = {
 } as const;
 
 // motet.steering.acts.ActSettings
-export const actSettings = {
+export const actSettings = ranges({
   blend: { default: 0.12, low: 0.01, high: 10, whole: false },
   far: { default: 0.7, low: 0.01, high: 3.15, whole: false },
   height_weight: { default: 10, low: 0, high: 100, whole: false },
@@ -336,10 +337,10 @@ export const actSettings = {
   bent: { default: 0.25, low: 0, high: 100, whole: false },
   raised: { default: 0.3, low: 0, high: 100, whole: false },
   turned: { default: 2.6179938779914944, low: 0, high: 3.15, whole: false },
-} as const;
+});
 
 // motet.steering.paths.ArrivalSettings
-export const arrivalSettings = {
+export const arrivalSettings = ranges({
   ahead: { default: 0.2, low: 0, high: 100, whole: false },
   ahead_moving: { default: 0.1, low: 0, high: 10, whole: false },
   turns_back: { default: 0.35, low: 0, high: 1, whole: false },
@@ -355,10 +356,10 @@ export const arrivalSettings = {
   faces: { default: 0.13962634015954636, low: 0, high: 3.15, whole: false },
   stands: { default: 0.1, low: 0, high: 100, whole: false },
   sudden: { default: 0.2, low: 0, high: 100, whole: false },
-} as const;
+});
 
 // motet.steering.avoidance.AvoidanceSettings
-export const avoidanceSettings = {
+export const avoidanceSettings = ranges({
   soon: { default: 2, low: 0.01, high: 100, whole: false },
   parts: { default: 0.4, low: 0.01, high: 100, whole: false },
   closes: { default: 1, low: 0, high: 100, whole: false },
@@ -371,7 +372,7 @@ export const avoidanceSettings = {
   rejoins: { default: 0.1, low: 0, high: 100, whole: false },
   standing: { default: 0.7, low: 0, high: 1, whole: false },
   gives_way: { default: 0.9, low: 0, high: 3.15, whole: false },
-} as const;
+});
 
 // motet.steering.events
 export const EVENTS = {
@@ -381,7 +382,7 @@ export const EVENTS = {
 } as const;
 
 // motet.steering.foot_lock.FootLockSettings
-export const footLockSettings = {
+export const footLockSettings = ranges({
   fade: { default: 0.1, low: 0.001, high: 10, whole: false },
   farthest: { default: 0.2, low: 0, high: 1, whole: false },
   stretches: { default: 1.01, low: 0.1, high: 10, whole: false },
@@ -393,7 +394,7 @@ export const footLockSettings = {
   leaves: { default: 0.1, low: 0, high: 1, whole: false },
   clears: { default: 0.06, low: 0, high: 1, whole: false },
   lifts: { default: 0.035, low: 0.001, high: 10, whole: false },
-} as const;
+});
 
 // motet.steering.idle
 export const IDLE = {
@@ -403,7 +404,7 @@ export const IDLE = {
 } as const;
 
 // motet.steering.idle.IdleSettings
-export const idleSettings = {
+export const idleSettings = ranges({
   settles: { default: 0.3, low: 0.01, high: 10, whole: false },
   slow: { default: 0.1, low: 0, high: 100, whole: false },
   stands: { default: 0.5, low: 0, high: 1, whole: false },
@@ -411,7 +412,7 @@ export const idleSettings = {
   depth: { default: 0.021, low: 0, high: 3.15, whole: false },
   wave_x: { default: 2, low: -100, high: 100, whole: false },
   wave_z: { default: 3, low: -100, high: 100, whole: false },
-} as const;
+});
 
 // motet.steering.look_layer
 export const LOOK_LAYER = {
@@ -421,7 +422,7 @@ export const LOOK_LAYER = {
 } as const;
 
 // motet.steering.look_layer.LookSettings
-export const lookSettings = {
+export const lookSettings = ranges({
   aside: { default: 1.4835298641951802, low: 0, high: 3.15, whole: false },
   up: { default: 0.8726646259971648, low: 0, high: 3.15, whole: false },
   behind: { default: 2.6179938779914944, low: 0, high: 3.15, whole: false },
@@ -429,7 +430,7 @@ export const lookSettings = {
   under: { default: 0.3, low: 0, high: 100, whole: false },
   leap: { default: 0.17453292519943295, low: 0, high: 3.15, whole: false },
   half_life: { default: 0.18, low: 0.01, high: 10, whole: false },
-} as const;
+});
 
 // motet.steering.matching
 export const MATCHING = {
@@ -454,7 +455,7 @@ export const REACH_LAYER = {
 } as const;
 
 // motet.steering.reach_layer.ReachSettings
-export const reachSettings = {
+export const reachSettings = ranges({
   widest: { default: 1.8325957145940461, low: 0, high: 3.15, whole: false },
   lets_go: { default: 0.4363323129985824, low: 0, high: 3.15, whole: false },
   nearest: { default: 0.25, low: 0, high: 1, whole: false },
@@ -463,7 +464,7 @@ export const reachSettings = {
   reached: { default: 0.02, low: 0, high: 100, whole: false },
   leap: { default: 0.1, low: 0, high: 100, whole: false },
   half_life: { default: 0.12, low: 0.01, high: 10, whole: false },
-} as const;
+});
 
 // motet.steering.repertoire
 export const REPERTOIRE = {
@@ -479,7 +480,7 @@ export const SAYING = {
 } as const;
 
 // motet.steering.settings.SteeringSettings
-export const steeringSettings = {
+export const steeringSettings = ranges({
   velocity: { default: 0.22, low: 0.01, high: 10, whole: false },
   facing: { default: 0.18, low: 0.01, high: 10, whole: false },
   horizon: { default: 1, low: 0.1, high: 10, whole: false },
@@ -512,7 +513,7 @@ export const steeringSettings = {
   aside: { default: 1.0471975511965976, low: 0, high: 3.15, whole: false },
   back: { default: 2.0943951023931953, low: 0, high: 3.15, whole: false },
   ahead: { default: 0.5235987755982988, low: 0, high: 3.15, whole: false },
-} as const;
+});
 
 // motet.steering.spoken
 export const SPOKEN = {
@@ -533,7 +534,7 @@ export const STEPPING = {
 } as const;
 
 // motet.steering.stepping.StepSettings
-export const stepSettings = {
+export const stepSettings = ranges({
   swing: { default: 0.4, low: 0.05, high: 5, whole: false },
   lowest: { default: 0.045, low: 0.001, high: 1, whole: false },
   highest: { default: 0.07, low: 0.001, high: 1, whole: false },
@@ -544,7 +545,7 @@ export const stepSettings = {
   lead: { default: 0.1, low: 0.001, high: 1, whole: false },
   mean: { default: 0.2, low: 0.001, high: 10, whole: false },
   rests: { default: 0.5, low: 0, high: 1, whole: false },
-} as const;
+});
 
 // motet.steering.targets
 export const TARGETS = {
@@ -560,7 +561,7 @@ export const TERRAIN = {
 } as const;
 
 // motet.steering.terrain.TerrainSettings
-export const terrainSettings = {
+export const terrainSettings = ranges({
   stands: { default: 0.5, low: 0, high: 1, whole: false },
   feet: { default: 0.015, low: 0.01, high: 10, whole: false },
   tilt: { default: 0.06, low: 0.01, high: 10, whole: false },
@@ -574,7 +575,7 @@ export const terrainSettings = {
   straight: { default: 0.97, low: 0, high: 1, whole: false },
   uphill: { default: 0.7, low: 0, high: 10, whole: false },
   slope_span: { default: 0.6, low: 0, high: 100, whole: false },
-} as const;
+});
 
 // motet.steering.turn_limit
 export const TURN_LIMIT = {
@@ -582,7 +583,7 @@ export const TURN_LIMIT = {
 } as const;
 
 // motet.steering.turn_limit.TurnSettings
-export const turnSettings = {
+export const turnSettings = ranges({
   trunk: { default: 540, low: 1, high: 5400, whole: false },
   head: { default: 450, low: 1, high: 5400, whole: false },
   shoulder: { default: 360, low: 1, high: 5400, whole: false },
@@ -593,7 +594,7 @@ export const turnSettings = {
   lower_leg: { default: 990, low: 1, high: 5400, whole: false },
   foot: { default: 1020, low: 1, high: 5400, whole: false },
   toes: { default: 1035, low: 1, high: 5400, whole: false },
-} as const;
+});
 
 // motet.steering.warping
 export const WARPING = {
@@ -602,7 +603,7 @@ export const WARPING = {
 
 // motet.text.clauses
 export const CLAUSES = {
-  FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "be", "before", "by", "finally", "first", "for", "from", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "man", "my", "next", "of", "on", "or", "person", "she", "somebody", "someone", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your"],
+  FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "athlete", "be", "before", "boy", "by", "finally", "first", "for", "from", "girl", "guy", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "lady", "man", "my", "next", "of", "on", "or", "person", "she", "somebody", "someone", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your"],
   POLITE_WORDS: ["a", "again", "an", "and", "do", "does", "finally", "first", "her", "his", "its", "just", "make", "makes", "my", "next", "now", "please", "take", "takes", "the", "their", "then", "to", "your"],
 } as const;
 

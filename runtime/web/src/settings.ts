@@ -9,6 +9,9 @@ export interface Range {
   readonly whole: boolean;
 }
 
+/** The ranges of a feature's settings; in declarations only their names are written. */
+export const ranges = <Name extends string>(values: Record<Name, Range>): Record<Name, Range> => values;
+
 /** A number for each setting of a feature. */
 export type Settings<Ranges> = Record<keyof Ranges, number>;
 

@@ -228,14 +228,13 @@ class MotionCodes(Net):
         way = codec.book[moves.clamp_max(self.end - 1)] / codec.book_scale
         return moves, torch.cat([way, codec.from_codes(codes[..., 1:])], dim=-1) * real
 
-    def step(self, codes: Tensor, action: Tensor, age: Tensor, past: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """What is known of the next step (B, C), and the numbers (B, L) for which the step before stands.
+    def step(self, codes: Tensor, action: Tensor, age: Tensor, past: Tensor) -> tuple[Tensor, Tensor]:
+        """What is known of the next step (B, C), and the past with the steps before it.
 
-        codes: (B, P) of the step before. action: (B,). age: (B,) steps since it began.
+        codes: (B, N, P) of the steps before it that are not in the past. action, age: (B, N), see the writer.
         """
-        moves, numbers = self._seen(codes[:, None])
-        known, new = self.writer(moves, numbers, action[:, None], age[:, None], past)
-        return known[:, 0], numbers[:, 0], new
+        known, past = self.writer(*self._seen(codes), action, age, past)
+        return known[:, -1], past
 
     def part(self, known: Tensor, codes: Tensor) -> Tensor:
         """Log-probabilities (B, P, V) of the codes of each part, given those (B, P) of the parts before it."""
@@ -273,23 +272,23 @@ class MotionCodes(Net):
         """The step, and the codes of its parts."""
         # what goes in, with the past of attention
         writer = self.config.writer
-        codes = id_rows("codes", len(self.sizes))
-        action = id_rows("action")
-        age = id_rows("age")
+        codes = id_rows("codes", "steps", len(self.sizes))
+        action = id_rows("action", "steps")
+        age = id_rows("age", "steps")
+        part_codes = id_rows("codes", len(self.sizes))
         size = 2 * writer.width // writer.heads
         shape = ("batch", writer.layers, writer.heads, "past", size)
         past = TensorSpec("past", shape)
 
         # what comes out
         known = float_rows("known", writer.width)
-        numbers = float_rows("numbers", self.writer.seen.in_features)
         next_past = TensorSpec("next_past", shape)
         scores = TensorSpec("log_probabilities", ("batch", len(self.sizes), max(self.sizes)))
         start = {"past": (writer.layers, writer.heads, 0, size)}
-        step = GraphSpec((codes, action, age, past), (known, numbers, next_past), {"past": "next_past"}, start)
+        step = GraphSpec((codes, action, age, past), (known, next_past), {"past": "next_past"}, start)
         return {
             "step": (Part(self, self.step), step),
-            "part": (Part(self, self.part), GraphSpec((known, codes), (scores,))),
+            "part": (Part(self, self.part), GraphSpec((known, part_codes), (scores,))),
         }
 
     def _codec_graphs(self) -> Graphs:

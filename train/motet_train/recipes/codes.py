@@ -137,7 +137,7 @@ def alike_distance(memory: Memory) -> float:
     for action in memory.rows:
         for recording in memory.recordings(action):
             if len(recording.places) - 1 > memory.settings.act_steps:
-                lengthy.append(memory.keys[action][recording.places])
+                lengthy.append(memory.keys(action)[recording.places])
     if not lengthy:
         return memory.settings.alike_distance
     # distances of all pairs of steps in a thousand of them at most

@@ -1,6 +1,6 @@
 /* Motions drawn code by code: docs/reference/bundle.md, the loop `codes`. */
 import { CODES } from "../generated.js";
-import { integers, type NumberArray } from "../bundle/arrays.js";
+import { integers, rows as rowsOf, stacked, type NumberArray } from "../bundle/arrays.js";
 import { type Graph, taken } from "../bundle/graph.js";
 import { type Memory } from "./memory.js";
 import type { Noise } from "../decode/random.js";
@@ -43,18 +43,34 @@ export function drawnAction(
   );
 }
 
-/** What a writer knows of its rows before a step; `last` and `states` twice, told the action and not told. */
+type States = Record<string, NumberArray<Float32Array>>;
+
+/** The last codes of all rows, the actions that their next steps show, and steps since these began. */
+interface Step {
+  codes: number[][];
+  actions: number[];
+  ages: number[];
+}
+
+/** What a writer knows of its rows before a step. */
 interface Known {
   age: number[];
   /** Of each row the share of its action's movement that is over. */
   done: number[];
   last: number[][];
-  states: Record<string, NumberArray<Float32Array>>;
+  /** What the net knows of each row, twice: told the actions, and not told. */
+  states: States[];
+  steps: Step[];
+  /** How many of the last steps of each row the net has yet to read. */
+  unread: number[];
   /** Of each row the numbers of its last steps, the latest first. */
   recent: Float32Array[][];
 }
 
-/** Draws codes for rows, each of its own action and noise: all state of one request. */
+/**
+ * Draws codes for rows, each of its own action and noise: all state of one request. The graph "step" reads a row's
+ * steps when a net is to draw the next one: most steps are remembered, and need none.
+ */
 export class Writer {
   private now: Known;
   private before: Known;
@@ -65,23 +81,24 @@ export class Writer {
     private readonly drawing: Drawing,
   ) {
     const first = [source.end + 1, ...Array<number>(source.parts - 1).fill(0)];
-    const rows = noise.length;
-    const last = Array<number[]>(2 * rows).fill(first);
     const zeros = noise.map(() => 0);
+    const start = source.step.zeroState(2);
     this.now = {
       age: zeros,
       done: zeros,
-      last,
-      states: source.step.zeroState(2 * rows),
+      last: noise.map(() => first),
+      states: noise.map(() => start),
+      steps: [],
+      unread: zeros,
       recent: noise.map(() => []),
     };
     this.before = this.now;
   }
 
   /** Take steps (N, P) as what every row did before, whatever action it was. */
-  async see(codes: number[][]): Promise<void> {
+  see(codes: number[][]): void {
     for (const step of codes) {
-      await this.known(this.noise.map(() => this.source.nullAction));
+      this.advance(this.noise.map(() => this.source.nullAction));
       this.now = { ...this.now, last: this.now.last.map(() => step) };
     }
   }
@@ -99,7 +116,7 @@ export class Writer {
    * the memory's `next`.
    */
   async draw(actions: number[], ends: boolean, steps: number, whole: boolean): Promise<number[][]> {
-    const known = await this.known(actions);
+    this.advance(actions);
     const uniform = this.noise.map((noise) => noise.uniform(this.source.parts + 2));
     const { memory } = this.source;
     const places = actions.map((action, row) =>
@@ -119,7 +136,6 @@ export class Writer {
       (action, row) => from[row]! < (1 - memory.settings.skip) * (memory.shortest.get(action) ?? 0),
     );
     const { codes, again } = await this.drawn(
-      known,
       uniform.map((block) => block.slice(2)),
       remembered,
       ends,
@@ -127,7 +143,7 @@ export class Writer {
     );
     const age = from.map((before, row) => (again[row] ? 0 : before + 1));
     const done = after.map((state, row) => (again[row] ? 0 : (state?.done ?? this.now.done[row]!)));
-    this.now = { ...this.now, last: [...codes, ...codes], age, done };
+    this.now = { ...this.now, last: codes, age, done };
     return codes;
   }
 
@@ -144,38 +160,89 @@ export class Writer {
 
   /** Go on with some of the rows only. */
   keep(rows: number[]): void {
-    const { age, done, last, states, recent } = this.now;
-    const both = [...rows, ...rows.map((row) => row + this.noise.length)];
-    this.noise = rows.map((row) => this.noise[row]!);
+    const of = <T>(values: T[]) => rows.map((row) => values[row]!);
+    const { age, done, last, states, steps, unread, recent } = this.now;
+    this.noise = of(this.noise);
     this.now = {
-      age: rows.map((row) => age[row]!),
-      done: rows.map((row) => done[row]!),
-      last: both.map((row) => last[row]!),
-      states: taken(states, both),
-      recent: rows.map((row) => recent[row]!),
+      age: of(age),
+      done: of(done),
+      last: of(last),
+      states: of(states),
+      steps: steps.map(({ codes, actions, ages }) => ({
+        codes: of(codes),
+        actions: of(actions),
+        ages: of(ages),
+      })),
+      unread: of(unread),
+      recent: of(recent),
     };
   }
 
-  /** What the step makes of the last codes, and of all before: (2 B, H). */
-  private async known(actions: number[]): Promise<NumberArray<Float32Array>> {
-    const { age, done, last, states, recent } = (this.before = this.now);
-    const inputs = {
-      codes: integers(last.flat(), last.length, this.source.parts),
-      action: integers([
-        ...actions.map((action) => this.source.written[action]!),
-        ...actions.map(() => this.source.nullAction),
-      ]),
-      age: integers([...age, ...age]),
+  /** Put the last step behind each row, whose next one shows an action. */
+  private advance(actions: number[]): void {
+    const { age, last, steps, unread, recent } = (this.before = this.now);
+    const { end, memory } = this.source;
+    const started = last[0]![0] !== end + 1;
+    this.now = {
+      ...this.now,
+      steps: [...steps, { codes: last, actions, ages: age }].slice(-CODES.WINDOW),
+      unread: unread.map((count) => Math.min(count + 1, CODES.WINDOW)),
+      recent: recent.map((before, row) =>
+        started ? [memory.numbersOf(last[row]!), ...before].slice(0, memory.settings.past_steps) : before,
+      ),
     };
-    const { outputs, states: next } = await this.source.step.step(inputs, states);
-    const { data, shape } = outputs.numbers!;
-    const row = (at: number) => data.slice(at * shape[1]!, (at + 1) * shape[1]!);
-    const started = last[0]![0] !== this.source.end + 1;
-    const latest = started
-      ? recent.map((before, at) => [row(at), ...before].slice(0, this.source.memory.settings.past_steps))
-      : recent;
-    this.now = { age, done, last, states: lately(next), recent: latest };
-    return outputs.known!;
+  }
+
+  /**
+   * What the parts have to know (2 R, H) of the next step of rows: all told their actions, then all not. Rows that have
+   * as many unread steps are read together.
+   */
+  private async known(rows: number[]): Promise<NumberArray<Float32Array>> {
+    const known = Array<Float32Array>(2 * rows.length);
+    const counts = rows.map((row) => this.now.unread[row]!);
+    for (const count of new Set(counts)) {
+      const group = rows.flatMap((_, at) => (counts[at] === count ? [at] : []));
+      const read = await this.read(
+        group.map((at) => rows[at]!),
+        count,
+      );
+      group.forEach((at, place) => {
+        known[at] = read[2 * place]!;
+        known[rows.length + at] = read[2 * place + 1]!;
+      });
+    }
+    return stacked(known);
+  }
+
+  /** Read the last steps of rows, `count` each; of each row twice, told the actions and not told. */
+  private async read(rows: number[], count: number): Promise<Float32Array[]> {
+    const { step, written, nullAction, parts } = this.source;
+    const steps = this.now.steps.slice(-count);
+    const both = rows.flatMap((row) => [row, row]);
+    const of = (value: (step: Step, row: number, at: number) => number | number[], ...shape: number[]) => {
+      const values = both.flatMap((row, at) => steps.flatMap((step) => value(step, row, at)));
+      return integers(values, both.length, count, ...shape);
+    };
+    const inputs = {
+      codes: of(({ codes }, row) => codes[row]!, parts),
+      action: of(({ actions }, row, at) => (at % 2 ? nullAction : written[actions[row]!]!)),
+      age: of(({ ages }, row) => ages[row]!),
+    };
+    const window: States = {};
+    for (const name of Object.keys(step.spec.feedback)) {
+      const kept = rows.map((row) => lately(this.now.states[row]![name]!, CODES.WINDOW - count));
+      const data = kept.map((state) => state.data);
+      window[name] = stacked(data, both.length, ...kept[0]!.shape.slice(1));
+    }
+    const next = await step.step(inputs, window);
+    const states = [...this.now.states];
+    const unread = [...this.now.unread];
+    rows.forEach((row, place) => {
+      states[row] = taken(next.states, [2 * place, 2 * place + 1]);
+      unread[row] = 0;
+    });
+    this.now = { ...this.now, states, unread };
+    return rowsOf(next.outputs.known!);
   }
 
   /** A row of the memory that is gone on with, or none where the net draws the step. */
@@ -200,7 +267,6 @@ export class Writer {
    * begun: rows that do not end yet.
    */
   private async drawn(
-    known: NumberArray<Float32Array>,
     uniform: number[][],
     remembered: (number[] | undefined)[],
     ends: boolean,
@@ -212,7 +278,8 @@ export class Writer {
     const codes = remembered.map((step, row) =>
       step && !again[row] ? step : Array<number>(source.parts).fill(0),
     );
-    for (let part = 0; drawn.length && part < source.parts; part++) {
+    const known = drawn.length ? await this.known(drawn) : undefined;
+    for (let part = 0; known && part < source.parts; part++) {
       const chances = await this.chances(known, codes, drawn, part);
       drawn.forEach((row, at) => {
         const temperature = this.now.age[row] === 0 ? drawing.first_temperature : drawing.temperature;
@@ -239,14 +306,12 @@ export class Writer {
     part: number,
   ): Promise<number[][]> {
     const { part: graph, parts } = this.source;
-    const both = [...rows, ...rows.map((row) => row + codes.length)];
     const actions = integers(
       [...rows, ...rows].flatMap((row) => codes[row]!),
-      both.length,
+      2 * rows.length,
       parts,
     );
-    const { data, shape } = (await graph.run({ known: taken({ known }, both).known!, codes: actions }))
-      .log_probabilities!;
+    const { data, shape } = (await graph.run({ known, codes: actions })).log_probabilities!;
     const of = (at: number) =>
       data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
     return rows.map((_, at) => {
@@ -313,26 +378,17 @@ function nucleus(logWeights: number[], uniform: number, temperature: number, top
   return places.findIndex((place) => place > uniform * sum);
 }
 
-/** States that grow, cut to the last steps. */
-function lately(
-  states: Record<string, NumberArray<Float32Array>>,
-): Record<string, NumberArray<Float32Array>> {
-  const doubled: Record<string, NumberArray<Float32Array>> = {};
-  for (const [name, array] of Object.entries(states)) {
-    const axis = array.shape.length - 2;
-    const steps = array.shape[axis]!;
-    const width = array.shape[axis + 1]!;
-    if (steps <= CODES.WINDOW) {
-      doubled[name] = array;
-      continue;
-    }
-    const blocks = array.data.length / (steps * width);
-    const data = new Float32Array(blocks * CODES.WINDOW * width);
-    for (let block = 0; block < blocks; block++) {
-      const stop = (block + 1) * steps * width;
-      data.set(array.data.subarray(stop - CODES.WINDOW * width, stop), block * CODES.WINDOW * width);
-    }
-    doubled[name] = { data, shape: array.shape.with(axis, CODES.WINDOW) };
+/** A state that grows, cut to its last steps. */
+function lately(array: NumberArray<Float32Array>, most: number): NumberArray<Float32Array> {
+  const axis = array.shape.length - 2;
+  const steps = array.shape[axis]!;
+  const width = array.shape[axis + 1]!;
+  if (steps <= most) return array;
+  const blocks = array.data.length / (steps * width);
+  const data = new Float32Array(blocks * most * width);
+  for (let block = 0; block < blocks; block++) {
+    const stop = (block + 1) * steps * width;
+    data.set(array.data.subarray(stop - most * width, stop), block * most * width);
   }
-  return doubled;
+  return { data, shape: array.shape.with(axis, most) };
 }

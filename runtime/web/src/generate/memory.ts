@@ -32,8 +32,8 @@ export class Memory {
    */
   constructor(
     private readonly table: NumberArray,
-    moves: NumberArray,
-    body: NumberArray,
+    private readonly moves: NumberArray,
+    private readonly body: NumberArray,
     actions: number,
     readonly settings: Settings<typeof memorySettings>,
     lent: Map<number, number> = new Map(),
@@ -44,7 +44,7 @@ export class Memory {
     this.width = moves.shape[1]! + (columns - 3) * body.shape[1]!;
     this.numbers = new Float32Array(steps * this.width);
     this.ages = Int32Array.from({ length: steps }, (_, row) => Number(table.data[(row + 1) * columns - 1]));
-    for (let row = 0; row < steps; row++) this.remember(row, moves, body, actions);
+    for (let row = 0; row < steps; row++) this.remember(row, actions);
     this.lasts = lastsOf(this.ages);
     const kinds = this.rows.size;
     for (const [action, other] of lent) {
@@ -117,26 +117,31 @@ export class Memory {
     return Number(this.table.data[row * this.table.shape[1]! + column]);
   }
 
-  private remember(row: number, moves: NumberArray, body: NumberArray, actions: number): void {
-    const columns = this.table.shape[1]!;
-    const at = (column: number) => Number(this.table.data[row * columns + column]);
-    const end = moves.shape[0]!;
-    const values = body.shape[0]!;
-    const move = at(0);
-    const action = at(columns - 2);
+  private remember(row: number, actions: number): void {
+    const [move, ...body] = this.codes(row);
+    const action = this.column(row, this.table.shape[1]! - 2);
     const age = this.ages[row]!;
-    let fits = move >= 0 && move <= end && action >= 0 && action < actions && age >= 0 && age <= row;
-    for (let column = 1; column < columns - 2; column++) fits &&= at(column) >= 0 && at(column) < values;
+    const values = this.body.shape[0]!;
+    const known = move! >= 0 && move! <= this.moves.shape[0]!;
+    let fits = known && action >= 0 && action < actions && age >= 0 && age <= row;
+    for (const code of body) fits &&= code >= 0 && code < values;
     if (!fits) throw new BundleError("table memory is out of range");
     const rows = this.rows.get(action);
     if (rows) rows.push(row);
     else this.rows.set(action, [row]);
-    if (move === end) return; // its numbers are zeros
-    let place = row * this.width;
-    for (let column = 0; column < columns - 2; column++) {
-      const { data, shape } = column ? body : moves;
-      for (let i = 0; i < shape[1]!; i++) this.numbers[place++] = Number(data[at(column) * shape[1]! + i]);
-    }
+    this.numbers.set(this.numbersOf([move!, ...body]), row * this.width);
+  }
+
+  /** The numbers by which steps are compared: those of a step's codes, zeros for an end. */
+  numbersOf(codes: number[]): Float32Array {
+    const numbers = new Float32Array(this.width);
+    if (codes[0]! >= this.moves.shape[0]!) return numbers;
+    let place = 0;
+    codes.forEach((code, column) => {
+      const { data, shape } = column ? this.body : this.moves;
+      for (let i = 0; i < shape[1]!; i++) numbers[place++] = Number(data[code * shape[1]! + i]);
+    });
+    return numbers;
   }
 
   /** Whether anything of an action is remembered. */

@@ -400,7 +400,7 @@ export class GenerateModel extends LanguageModel {
   ): AsyncGenerator<Piece, void> {
     const writer = new Writer(this.source, [noise], drawing);
     const before = after && (await this.continued(after));
-    if (before) await writer.see(before.codes);
+    if (before) writer.see(before.codes);
     const decoder = new StreamingDecoder(this.codec, before);
     let done = 0;
     let shown = 0;

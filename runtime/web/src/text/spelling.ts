@@ -7,7 +7,7 @@ export function corrected(word: string, ...known: string[][]): string {
   const most = size >= 8 ? 2 : 1;
   for (let off = 1; off <= most; off++) {
     for (const words of known) {
-      const near = words.filter(
+      const nearest = words.filter(
         (candidate) =>
           candidate[0] === word[0] &&
           candidate.length >= 4 &&
@@ -15,15 +15,18 @@ export function corrected(word: string, ...known: string[][]): string {
           isSlip(word, candidate) &&
           distance(word, candidate) === off,
       );
+      const swapped = nearest.filter((candidate) => letters(candidate) === letters(word));
+      const near = swapped.length ? swapped : nearest;
       if (near.length) return new Set(near.map(stem)).size === 1 ? near[0]! : "";
     }
   }
   return "";
 }
 
+const letters = (text: string) => [...text].sort().join("");
+
 /** Whether two words differ as in a slip: a short word with another letter, or a letter more, is one of English. */
 function isSlip(word: string, other: string): boolean {
-  const letters = (text: string) => [...text].sort().join("");
   const kinds = (text: string) => [...new Set(text)].sort().join("");
   const size = [...word].length;
   if (size === other.length && size < 8) return letters(word) === letters(other);
