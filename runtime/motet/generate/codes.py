@@ -234,7 +234,8 @@ class Writer:
             if 0 in sizes:
                 axis = 1 + sizes.index(0)
                 length = state.shape[axis]
-                state = np.take(state, range(max(0, length - most), length), axis)
+                if length > most:
+                    state = np.take(state, range(length - most, length), axis)
             window[name] = state
         return window
 
