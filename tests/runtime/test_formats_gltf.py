@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gltf_files import read_document as parts
 
 from motet.errors import FormatError, MotionError
 from motet.figures.humanoid.bones import BONES, HUMANOID, MIXAMO, T_POSE, ground_under, sole_points
@@ -34,12 +35,6 @@ def in_order(motion: Motion, names: list[str] | None = None) -> Array:
 
 
 BONE_INDICES = [HUMANOID.index(bone) for bone in BONES]
-
-
-def parts(path: Path) -> tuple[dict[str, Any], bytes]:
-    content = path.read_bytes()
-    length = struct.unpack_from("<I", content, 12)[0]
-    return json.loads(content[20 : 20 + length]), content[28 + length :]
 
 
 def write_gltf(path: Path, document: dict[str, Any], binary: bytes = b"") -> Path:
@@ -129,7 +124,7 @@ def test_an_avatar_with_rest_rotations_of_its_own_moves_as_the_humanoid(tmp_path
 
 
 def test_vrm_0_is_read_too(tmp_path: Path) -> None:
-    document, binary = parts(twisted_glb(tmp_path))
+    document, binary = parts(moving_glb(tmp_path))
     bones = [{"bone": bone, "node": HUMANOID.index(bone)} for bone in BONES]
     bones += [{"bone": "jaw", "node": -1}]  # as UniVRM writes what is not set
     document["extensions"] = {"VRM": {"humanoid": {"humanBones": bones}}}
@@ -140,14 +135,14 @@ def test_vrm_0_is_read_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(positions(humanoid.motion)[:, 0, 0], positions(moving())[:, 0, 0], atol=1e-5)
 
 
-def twisted_glb(folder: Path) -> Path:
+def moving_glb(folder: Path) -> Path:
     glb.write(folder / "a.glb", moving())
     return folder / "a.glb"
 
 
 @pytest.mark.parametrize("kind", ["STEP", "CUBICSPLINE"])
 def test_interpolations_are_those_of_the_standard(tmp_path: Path, kind: str) -> None:
-    document, binary = parts(twisted_glb(tmp_path))
+    document, binary = parts(moving_glb(tmp_path))
     animation = document["animations"][0]
     track = next(c for c in animation["channels"] if c["target"] == {"node": 0, "path": "translation"})
     times = np.array([0.0, 0.05, 0.1], "<f4")
@@ -176,7 +171,7 @@ def test_interpolations_are_those_of_the_standard(tmp_path: Path, kind: str) -> 
 
 
 def test_broken_files_are_refused_in_words(tmp_path: Path) -> None:
-    good = twisted_glb(tmp_path)
+    good = moving_glb(tmp_path)
     content = good.read_bytes()
     cases = {
         "truncated.glb": (content[:3000], "truncated GLB"),
@@ -228,8 +223,7 @@ def test_a_file_object_is_read_and_its_buffer_must_be_in_it(tmp_path: Path) -> N
 @pytest.mark.parametrize("extension", [".gltf", ".glb", ".vrm", ".vrma"])
 @pytest.mark.parametrize("way", ["absolute", "../", "%2e%2e%2f", "..%2F", "link", "sub/../../", "folder", "pipe"])
 def test_a_buffer_is_no_file_outside_of_the_folder(tmp_path: Path, way: str, extension: str) -> None:
-    glb.write(tmp_path / "a.glb", moving())
-    document, binary = parts(tmp_path / "a.glb")
+    document, binary = parts(moving_glb(tmp_path))
     secret, inside = tmp_path / "secret.bin", tmp_path / "inside"
     secret.write_bytes(binary)
     (inside / "sub").mkdir(parents=True)
@@ -244,8 +238,7 @@ def test_a_buffer_is_no_file_outside_of_the_folder(tmp_path: Path, way: str, ext
 
 
 def test_of_a_buffer_no_more_is_read_than_it_declares(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    glb.write(tmp_path / "a.glb", moving())
-    document, binary = parts(tmp_path / "a.glb")
+    document, binary = parts(moving_glb(tmp_path))
     file = write_gltf(tmp_path / "b.gltf", document, binary)
     (tmp_path / "b.bin").write_bytes(binary + b"secret")
     assert gltf_data.parse(file).buffers == (binary,)
@@ -281,7 +274,7 @@ def test_a_file_of_many_alike_nodes_is_read_in_time_that_grows_with_it(tmp_path:
 
 
 def test_arrays_that_overlap_are_refused(tmp_path: Path) -> None:
-    document, binary = parts(twisted_glb(tmp_path))
+    document, binary = parts(moving_glb(tmp_path))
     animation, accessors = document["animations"][0], document["accessors"]
     sampler, channel = animation["samplers"][0], animation["channels"][0]
     own = range(len(accessors), len(accessors) + 5_000)  # an accessor for each sampler, all of the same place
@@ -293,14 +286,14 @@ def test_arrays_that_overlap_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    document, binary = parts(twisted_glb(tmp_path))
+    document, binary = parts(moving_glb(tmp_path))
     document["nodes"][0]["name"] = 64
     with pytest.raises(FormatError, match="the name of node 0 is not text"):
         gltf.read(write_gltf(tmp_path / "number.gltf", document, binary))
 
 
 def test_an_animation_without_end_is_refused(tmp_path: Path) -> None:
-    document, binary = parts(twisted_glb(tmp_path))
+    document, binary = parts(moving_glb(tmp_path))
     times = document["accessors"][document["animations"][0]["samplers"][0]["input"]]
     start = document["bufferViews"][times["bufferView"]]["byteOffset"] + 4 * (times["count"] - 1)
     binary = binary[:start] + struct.pack("<f", 1e9) + binary[start + 4 :]
