@@ -130,6 +130,27 @@ def test_places_that_are_no_files_are_named(tmp_path: Path) -> None:
             read_motion(tmp_path / name)
 
 
+NEEDED = {
+    "no skeleton": (replace(walker(), skeleton=None), (".npz", ".csv")),
+    "no frames": (walker()[:0], (".npz", ".csv", ".bvh", ".amc")),
+}
+"""What is said -> of which motion, and the formats that hold it nevertheless."""
+
+
+@pytest.mark.parametrize("extension", WRITTEN)
+@pytest.mark.parametrize("said", NEEDED)
+def test_what_a_format_needs_is_said_and_nothing_written(tmp_path: Path, extension: str, said: str) -> None:
+    path = tmp_path / f"a{extension}"
+    motion, holding = NEEDED[said]
+    if extension in holding:
+        write_motion(path, motion)
+        assert len(read_motion(path)) == len(motion)
+        return
+    with pytest.raises(MotionError, match=said):
+        write_motion(path, motion)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("extension", WRITTEN)
 def test_what_cannot_be_written_leaves_nothing(tmp_path: Path, extension: str) -> None:
     motion = walker()
@@ -137,8 +158,8 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path: Path, extension: str) -
     tall = replace(motion, skeleton=replace(motion.skeleton, joints=(*motion.skeleton.joints[:-1], high)))
     huge = motion.values / np.abs(motion.values).max() * 1.7e308
     radians = replace(motion, values=huge, units=tuple(unit.replace("deg", "rad") for unit in motion.units))
+    path = tmp_path / f"a{extension}"
     for broken in (replace(motion, values=motion.values + 1e308), radians, tall):
-        path = tmp_path / f"a{extension}"
         try:
             write_motion(path, broken)
         except MotionError:
@@ -150,3 +171,6 @@ def test_what_cannot_be_written_leaves_nothing(tmp_path: Path, extension: str) -
             file.unlink()
     with pytest.raises(OutputError, match="does not exist"):
         write_motion(tmp_path / "no" / f"a{extension}", motion)
+    path.mkdir()
+    with pytest.raises(OutputError, match="it is a folder"):
+        write_motion(path, motion)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from figures import walker
 
-from motet.errors import FormatError, OutputError
+from motet.errors import FormatError
 from motet.formats import csv, npz, read_motion, write_motion
 from motet.motion.motion import Motion
 
@@ -169,13 +169,3 @@ def test_csv_names_what_is_wrong(tmp_path, text, line, words):
     with pytest.raises(FormatError, match=words) as error:
         read_motion(path)
     assert (error.value.path, error.value.line) == (path, line)
-
-
-@pytest.mark.parametrize("extension", [".npz", ".csv"])
-def test_nothing_half_written(tmp_path, extension):
-    with pytest.raises(OutputError):
-        write_motion(tmp_path / "nowhere" / f"a{extension}", walker())
-    (tmp_path / f"a{extension}").mkdir()
-    with pytest.raises(OutputError, match="it is a folder"):
-        write_motion(tmp_path / f"a{extension}", walker())
-    assert len(list(tmp_path.iterdir())) == 1
