@@ -105,13 +105,6 @@ def test_what_the_model_sees_is_prepared_once(model: DescribeModel) -> None:
     np.testing.assert_array_equal(model.frames(model.prepared(motion)), model.frames(motion))
 
 
-def test_frames_that_are_not_finite_never_become_a_motion() -> None:
-    values = np.array(moving(20).values)
-    values[3, 1] = np.nan
-    with pytest.raises(MotionError, match=r"frame 3, channel 'knee.rz' is nan"):
-        replace(moving(20), values=values)
-
-
 def drawing(temperature: float) -> DescribeModel:
     """The model with 30 draws as its default; it is sharp, so that only hot draws differ."""
     model = describe_model()
@@ -157,16 +150,13 @@ def test_draws_are_of_their_seed() -> None:
         model.describe(motions, seed=-1)
 
 
-@pytest.mark.parametrize("draws", [-1, 0, 1001])
-def test_draws_out_of_range(model: DescribeModel, draws: int) -> None:
-    with pytest.raises(DecodingError, match=f"draws must be between 1 and 1000, not {draws}"):
-        model.describe(moving(20), draws=draws)
-
-
-@pytest.mark.parametrize("beams", [0, -1, 101])
-def test_beams_out_of_range(model: DescribeModel, beams: int) -> None:
-    with pytest.raises(DecodingError, match=f"beams must be between 1 and 100, not {beams}"):
-        model.describe(moving(20), beams)
+@pytest.mark.parametrize(
+    ("setting", "value", "most"),
+    [*(("draws", value, 1000) for value in (-1, 0, 1001)), *(("beams", value, 100) for value in (-1, 0, 101))],
+)
+def test_settings_out_of_range(model: DescribeModel, setting: str, value: int, most: int) -> None:
+    with pytest.raises(DecodingError, match=f"{setting} must be between 1 and {most}, not {value}"):
+        model.describe(moving(20), **{setting: value})
 
 
 def test_scored_sentences(model: DescribeModel) -> None:
@@ -207,14 +197,6 @@ def test_the_model_holds_no_state(model: DescribeModel) -> None:
 def test_a_manifest_that_does_not_fit(model: DescribeModel, change: dict[str, Any], reason: str) -> None:
     with pytest.raises(BundleError, match=reason):
         DescribeModel(replace(model.manifest, **change), model.graphs)
-
-
-def test_one_step_call_serves_the_batch(model: DescribeModel) -> None:
-    step = model.graphs["step"]
-    assert isinstance(step, FakeGraph)
-    step.calls = 0
-    model.describe([moving(20, seed=i) for i in range(9)])
-    assert step.calls <= 7
 
 
 def test_padding() -> None:
