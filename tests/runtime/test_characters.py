@@ -5,14 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_formats_gltf import in_order, moving, twisted
 from test_retarget import SKELETONS, dancing
 
 import motet
 from motet.errors import FormatError, MotionError
-from motet.figures.humanoid.bones import BONES
 from motet.formats import Character, read_character
-from motet.motion import HUMANOID, MIXAMO, positions
+from motet.motion import MIXAMO
 
 
 def test_a_motion_is_written_onto_a_character_given_in_any_way(tmp_path: Path) -> None:
@@ -44,17 +42,6 @@ def test_a_motion_on_the_characters_skeleton_stays_as_it_is(tmp_path: Path) -> N
     source = motet.read(SKELETONS / "rokoko.bvh")
     motet.write(tmp_path / "a.npz", source, like=source)
     np.testing.assert_array_equal(motet.read(tmp_path / "a.npz").values, source.values)
-
-
-def test_a_vrm_avatar_is_a_character_with_its_own_bones(tmp_path: Path) -> None:
-    avatar, motion = twisted(tmp_path / "avatar.vrm"), moving()
-    motet.write(tmp_path / "a.npz", motion, like=avatar)
-    written = motet.read(tmp_path / "a.npz")
-    assert written.skeleton is not None
-    assert written.skeleton.names[0] == "J_0"
-    bones = [HUMANOID.index(bone) for bone in BONES]
-    places, expected = in_order(written, [f"J_{i}" for i in bones]), positions(motion)[:, bones]
-    np.testing.assert_allclose(places - places[:1, :1], expected - expected[:1, :1], atol=2e-6)
 
 
 def test_what_is_no_character_is_refused_and_nothing_written(tmp_path: Path) -> None:
