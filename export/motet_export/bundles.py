@@ -21,6 +21,7 @@ from motet_export.decoded import differences, golden_vectors, whole_runs
 from motet_export.exporter import ExportError, apart, export_graph, halved, quantised, renewed, round_weights
 from motet_export.parity import (
     Examples,
+    Once,
     check_carried,
     check_far,
     check_meaning,
@@ -31,6 +32,9 @@ from motet_export.parity import (
 from motet_train.runs import Run
 
 log = logging.getLogger("motet.export")
+
+Report = dict[str, Any]
+"""The parity report of a manifest."""
 
 
 def export_run(run: Run, out: str | Path, int8: bool = False, half: bool = False) -> Json:
@@ -99,9 +103,7 @@ def halve_bundle(bundle: Bundle, out: str | Path) -> Json:
     check_place(out)
     exact = kind_of(bundle.manifest).load(bundle)
     # the same graphs with rounded weights
-    files = {}
-    for role in bundle.manifest.graphs:
-        files[f"{role}.onnx"] = halved(bundle.model(role), rounded=True)
+    files = {f"{role}.onnx": halved(bundle.model(role), rounded=True) for role in exact.graphs}
     onnx = _loaded(exact, files)
     changes = differences(onnx, exact)
     report = {**bundle.manifest.parity, "weights": "float16", "half": changes}
@@ -148,7 +150,7 @@ def _write(
     write_bundle(out, manifest, {**files, **arrays, golden["file"]: vectors})
 
 
-def _graph_files(model: BundleModel, graphs: Mapping[str, bytes]) -> tuple[dict[str, bytes], dict[str, Any]]:
+def _graph_files(model: BundleModel, graphs: Mapping[str, bytes]) -> tuple[dict[str, bytes], Json]:
     """The files of graphs, with the weights that several hold in one of their own, and their entries in a manifest."""
     files, weights = apart(graphs)
     entries = {}
@@ -174,23 +176,26 @@ def parity_of(run: Run, bundle: Bundle, options: SessionOptions | None = None) -
     return parity(model, run.bundle_model())
 
 
-def _single_calls(onnx: BundleModel, torch: BundleModel, draws: Mapping[str, Examples]) -> dict[str, Any]:
+def _single_calls(onnx: BundleModel, torch: BundleModel, draws: Mapping[str, Examples]) -> Report:
     """The rungs of each graph alone: inputs like the data's, and inputs far from all data."""
     far = examples(torch.manifest, torch.graphs, far=True)
-    report: dict[str, Any] = {}
+    report: Report = {}
     for role, graph in torch.graphs.items():
         report[f"{role}.one_step"] = check_one_step(role, onnx.graphs[role], graph, draws[role])
         report[f"{role}.far"] = check_far(role, onnx.graphs[role], graph, far[role])
     return report
 
 
-def parity(onnx: BundleModel, torch: BundleModel) -> dict[str, Any]:
+def parity(onnx: BundleModel, torch: BundleModel) -> Report:
     """Climb the parity ladder and return the report for the manifest; ExportError at the first rung that fails."""
     check_meaning(onnx, torch)
+    horizon = None
+    if onnx.VERB == "predict":
+        # its encoder is called again after its horizon, and for the inputs of its step
+        horizon = int(onnx.defaults["horizon"])
+        torch = build(torch.manifest, {**torch.graphs, "encoder": Once(torch.graphs["encoder"])}, torch.tables)
     draws = examples(torch.manifest, torch.graphs)
     report = _single_calls(onnx, torch, draws)
-    # a predictor's encoder is called again after its horizon
-    horizon = int(onnx.defaults["horizon"]) if onnx.VERB == "predict" else None
     if "step" in torch.graphs:
         report["step.carried"] = check_carried(onnx.graphs["step"], torch.graphs["step"], draws["step"], horizon)
     report["runs"] = check_runs(whole_runs(onnx, torch))

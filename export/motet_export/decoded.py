@@ -34,7 +34,7 @@ Decoded = dict[str, NDArray[Any]]
 Runs = dict[str, Callable[[], Decoded]]
 """Name of a run -> decodes it with a model."""
 
-Golden = tuple[Arrays, dict[str, Any]]
+Golden = tuple[Arrays, Json]
 """The inputs of a whole run and its settings."""
 
 
@@ -72,7 +72,7 @@ def differences(small: BundleModel, exact: BundleModel) -> dict[str, float]:
     return report
 
 
-def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[bytes, dict[str, Any]]:
+def golden_vectors(model: BundleModel, draws: Mapping[str, Examples]) -> tuple[bytes, Json]:
     """The file of golden vectors of a bundle, and its entry in the manifest."""
     rng = np.random.default_rng(5)
     feeds = {}
@@ -193,7 +193,7 @@ def _(model: DescribeModel, like: DescribeModel) -> Runs:
 @golden_run.register
 def _(model: DescribeModel, rng: np.random.Generator) -> Golden:
     """A motion of 20 frames, with the noise of the draws that a model makes."""
-    inputs: dict[str, NDArray[Any]] = {"frames": walks(model.contract, rng, 1, 20)[0]}
+    inputs: Decoded = {"frames": walks(model.contract, rng, 1, 20)[0]}
     if "draws" in model.defaults:
         inputs["noise"] = noise_of(model.limits(model.defaults), int(model.defaults["draws"]))
     return inputs, {}

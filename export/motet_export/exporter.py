@@ -4,7 +4,6 @@ import logging
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -44,52 +43,39 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     rng = np.random.default_rng(0)
     # a batch of 2: torch would take an axis of size 1 for a constant
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
-    # gradients off: torch does not export a scan over weights that ask for them
-    with warnings.catch_warnings(), _log_silenced(), torch.no_grad():
-        warnings.simplefilter("ignore")
-        program = torch.onnx.export(
-            module.eval(),
-            (),
-            kwargs=example,
-            input_names=[tensor.name for tensor in spec.inputs],
-            output_names=[tensor.name for tensor in spec.outputs],
-            dynamic_shapes=_dynamic_axes(spec),
-            dynamo=True,
-            external_data=False,
-            opset_version=18,
-            verbose=False,
-        )
+    # of the many warnings of torch's exporter none
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        # gradients off: torch does not export a scan over weights that ask for them
+        with warnings.catch_warnings(action="ignore"), torch.no_grad():
+            program = torch.onnx.export(
+                module.eval(),
+                (),
+                kwargs=example,
+                input_names=[tensor.name for tensor in spec.inputs],
+                output_names=[tensor.name for tensor in spec.outputs],
+                dynamic_shapes=_dynamic_axes(spec),
+                dynamo=True,
+                external_data=False,
+                opset_version=18,
+                verbose=False,
+            )
+    finally:
+        logging.disable(before)
     if program is None:
         raise ExportError("torch gave no ONNX program")
     return self_contained(program.model_proto, metadata)
 
 
-def _dynamic_axes(spec: GraphSpec) -> dict[str, dict[int, Any]]:
+def _dynamic_axes(spec: GraphSpec) -> dict[str, Any]:
     """The dynamic axes of each input; axes of one name have the same size."""
     dims: dict[str, Any] = {}
-    shapes: dict[str, dict[int, Any]] = {}
+    shapes: dict[str, Any] = {}
     for tensor in spec.inputs:
-        shapes[tensor.name] = {}
-        for axis, name in enumerate(tensor.shape):
-            if isinstance(name, str):
-                if name not in dims:
-                    dims[name] = torch.export.Dim(name)
-                shapes[tensor.name][axis] = dims[name]
+        names = {axis: name for axis, name in enumerate(tensor.shape) if isinstance(name, str)}
+        shapes[tensor.name] = {axis: dims.setdefault(name, torch.export.Dim(name)) for axis, name in names.items()}
     return shapes
-
-
-@contextmanager
-def _log_silenced() -> Iterator[None]:
-    """Silence the exporter's log but for errors."""
-    loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
 
 
 def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
@@ -117,9 +103,7 @@ def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes
 def _strip(graph: onnx.GraphProto) -> None:
     """Remove doc strings and metadata, which hold source paths, from a graph and the bodies of its Scan and If."""
     for part in _with_bodies(graph):
-        part.doc_string = ""
-        del part.metadata_props[:]
-        for items in (part.node, part.initializer, part.input, part.output, part.value_info):
+        for items in ([part], part.node, part.initializer, part.input, part.output, part.value_info):
             for item in items:
                 item.doc_string = ""
                 del item.metadata_props[:]
@@ -180,8 +164,7 @@ def _ranks(model: onnx.ModelProto) -> dict[str, int]:
 
 def renewed(model: bytes) -> bytes:
     """A graph as it would be stored today, with the same weights."""
-    proto = onnx.load_from_string(model)
-    return self_contained(proto, {prop.key: prop.value for prop in proto.metadata_props})
+    return _stored(model, lambda _: None)
 
 
 def apart(models: Mapping[str, bytes]) -> tuple[dict[str, bytes], bytes]:
@@ -289,12 +272,12 @@ def _replace_tensor(
 ) -> list[onnx.NodeProto]:
     """Store a tensor in a smaller type; the nodes that compute the original one from it."""
     name = tensor.name
-    # the smaller tensor, and nodes that make the old one of it
-    tensor.CopyFrom(numpy_helper.from_array(small, f"{name}.small"))
-    if scale is None:
-        return [helper.make_node("Cast", [f"{name}.small"], [name], to=TensorProto.FLOAT)]
-    graph.initializer.append(numpy_helper.from_array(scale, f"{name}.scale"))
-    return [
-        helper.make_node("Cast", [f"{name}.small"], [f"{name}.cast"], to=TensorProto.FLOAT),
-        helper.make_node("Mul", [f"{name}.cast", f"{name}.scale"], [name]),
-    ]
+    small_name = f"{name}.small"
+    tensor.CopyFrom(numpy_helper.from_array(small, small_name))
+    cast_name = name if scale is None else f"{name}.cast"
+    nodes = [helper.make_node("Cast", [small_name], [cast_name], to=TensorProto.FLOAT)]
+    if scale is not None:
+        scale_name = f"{name}.scale"
+        graph.initializer.append(numpy_helper.from_array(scale, scale_name))
+        nodes.append(helper.make_node("Mul", [cast_name, scale_name], [name]))
+    return nodes
