@@ -101,11 +101,11 @@ CEILINGS = {
     "motet.text": 6_000,
     "motet_export": 12_300,
     "motet_train": 9_300,
-    "motet_train.cli": 8_500,
+    "motet_train.cli": 7_900,
     "motet_train.data": 18_700,
-    "motet_train.evaluate": 53_300,
+    "motet_train.evaluate": 52_400,
     "motet_train.models": 24_700,
-    "motet_train.papers": 41_200,
+    "motet_train.papers": 39_600,
     "motet_train.recipes": 15_900,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets

@@ -22,7 +22,7 @@ from motet_train.papers.li2018.recurrent import (
     LSTMAE,
     RRNN,
     EncoderRecurrentDecoder,
-    ERDConfig,
+    LSTM3LRConfig,
     LSTMAEConfig,
     RRNNConfig,
 )
@@ -36,7 +36,7 @@ KEPT = (0, 1, 3, 4, 6)
 LSTMS_OF_SRNN = len(srnn.EDGES) + len(srnn.NODES)
 SYSTEMS: dict[str, Callable[[], System]] = {
     "rrnn": lambda: RRNN(RRNNConfig(5, 9)),
-    "erd": lambda: EncoderRecurrentDecoder(ERDConfig(5, (7, 6), 2, 8, (7, 4))),
+    "erd": lambda: EncoderRecurrentDecoder(LSTM3LRConfig(5, (7, 6), 2, 8, (7, 4), rectified=True)),
     "lstm_3lr, filtered": lambda: LSTMAE(LSTMAEConfig(5, (7,), 2, 6, autoencoder=(9, 4, 9))),
     "srnn": lambda: srnn.SRNN(srnn.Config(9, ((8, 0, 4), (1, 2), (5, 6), (3,), (7,)), linear=6, units=5, narrow=4)),
 }

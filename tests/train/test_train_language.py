@@ -208,7 +208,7 @@ def test_either_loss_can_be_trained(store: Path, tmp_path: Path) -> None:
 
 PAPER: list[tuple[Recipe, Callable[[int, int], object], float]] = [
     (language.PAPER, MotionToLanguageConfig, 8.0),
-    (generate.PAPER, LanguageToMotionConfig, 25.0),
+    (generate.RECIPES["paper"], LanguageToMotionConfig, 25.0),
 ]
 
 

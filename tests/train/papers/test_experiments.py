@@ -26,6 +26,7 @@ from motet_train.evaluate.tables import reached
 from motet_train.papers.tdbn.clips import Clips, read_clips
 from motet_train.papers.tdbn.experiments import constant_hysteresis, gait_transitions, limit_cycle
 from motet_train.papers.tdbn.figures import drawings
+from motet_train.papers.tdbn.recipe import RECIPES
 from motet_train.papers.tdbn.report import GOALS, by_label, control_report, missed_goals, study_of
 from motet_train.papers.tdbn.study import ControlStudy
 from motet_train.papers.tdbn.tdbn import TDBNConfig
@@ -68,7 +69,7 @@ def test_a_candidate_is_judged_by_every_goal_but_its_training(monkeypatch: pytes
 @pytest.mark.parametrize(("clamped", "least", "most"), [(False, 1.5, np.inf), (True, 0.0, 1.0)])
 def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool, least: float, most: float) -> None:
     """The thesis' text unclamps them in the reconstruction; the switch is then a jump in one frame."""
-    config = TDBNConfig().unclamped()
+    config = RECIPES["unclamped"].config
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
     run = control_run(clips, config)
     study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
@@ -80,7 +81,7 @@ def test_gaits_that_borrow_persist_and_switch_where_pure_ones_rest_between(clips
     """Seed 21, whose RBM has a state of rest between its gaits: it takes the walk away, and delays switches."""
     widths = []
     quick = []
-    for config in (TDBNConfig().pure(), TDBNConfig()):
+    for config in (RECIPES["pure"].config, TDBNConfig()):
         alone = replace(config, restarts=1, tries=1, rounds=1, rbm=replace(config.rbm, epochs=300))
         run = control_run(clips, alone, seed=21)
         study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
@@ -192,7 +193,7 @@ def autoregression(study: ControlStudy) -> ControlStudy:
     step = FunctionGraph(linear.step, GraphSpec(inputs, outputs, {"history": "next_history"}))
     encoder = FunctionGraph(linear.encode, GraphSpec((replace(frame, name="frames"),), (codes,)))
     model = TdbnModel(study.model.manifest, {"encoder": encoder, "step": step})
-    return ControlStudy(model, study.reference, study.walk, study.run, study.bend, None)
+    return ControlStudy(model, study.reference, study.walk, study.run, study.bend, ())
 
 
 class FunctionGraph:

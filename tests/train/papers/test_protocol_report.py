@@ -143,7 +143,7 @@ def test_rows_are_means_and_spreads() -> None:
 
 def shown(layout: Layout, actions: tuple[str, ...]) -> str:
     corpus = ExpmapCorpus(layout, {}, {action: {} for action in actions}, ())
-    return protocol_table(constant(actions, **{ZERO: 1.0}), corpus)
+    return protocol_table(constant(actions, **{ZERO: 1.0}), corpus, {})
 
 
 def test_published_rows_stand_under_ours() -> None:
@@ -216,7 +216,7 @@ def test_the_mean_is_that_of_the_actions_with_all_their_files() -> None:
     gone = ("train/washwindow/washwindow_2.txt", "train/washwindow/washwindow_1.txt", "test/soccer/soccer_1.txt")
     test = {action: {} for action in (*FIVE, "washwindow") if action != "soccer"}
     found = constant(list(test), **{ZERO: 1.0})
-    head = protocol_table(found, ExpmapCorpus(CMU_LAYOUT, {}, test, gone)).splitlines()
+    head = protocol_table(found, ExpmapCorpus(CMU_LAYOUT, {}, test, gone), {}).splitlines()
     assert "mean of basketball, jumping, running, walking" in head
 
 
@@ -303,7 +303,7 @@ def test_strips_are_seed_frames_and_what_follows(tmp_path: Path) -> None:
     found = strips({"run": loaded(saved(tmp_path / "run", data, 0))}, corpus, "walking", SKELETON)
     window = windows([corpus.test["walking"]["test/walking/walking_1.txt"]])[0]
     assert [points.shape for points in found.values()] == [(SEED_POSES + 13, 38, 3)] * 2
-    np.testing.assert_allclose(found["truth"][SEED_POSES - 1], places(window[50 - FRAMES_APART], SKELETON))
-    np.testing.assert_allclose(found["truth"][-1], places(window[-1], SKELETON))
+    np.testing.assert_allclose(found["truth"][SEED_POSES - 1], places(window[[50 - FRAMES_APART]], SKELETON)[0])
+    np.testing.assert_allclose(found["truth"][-1], places(window[-1:], SKELETON)[0])
     np.testing.assert_array_equal(found["run"][:SEED_POSES], found["truth"][:SEED_POSES])
     assert np.abs(found["run"][SEED_POSES:] - found["truth"][SEED_POSES:]).max(axis=(1, 2)).min() > 0

@@ -14,7 +14,6 @@ from motet_train.papers.li2018.recurrent import (
     LSTMAE,
     RRNN,
     EncoderRecurrentDecoder,
-    ERDConfig,
     LSTM3LRConfig,
     LSTMAEConfig,
     Reused,
@@ -156,7 +155,7 @@ def test_noise_grows_and_is_for_training_only() -> None:
     [
         (lambda: RRNN(RRNNConfig(70)), 3 * 1024 * (70 + 1024 + 1) + 1025 * 70),
         (
-            lambda: EncoderRecurrentDecoder(ERDConfig(70)),
+            lambda: EncoderRecurrentDecoder(LSTM3LRConfig(70, (500, 500), 2, decoder=(500, 100), rectified=True)),
             71 * 500 + 501 * 500 + 4000 * (500 + 1000 + 1) + 4000 * 2001 + 1001 * 500 + 501 * 100 + 101 * 70,
         ),
         (

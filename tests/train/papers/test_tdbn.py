@@ -11,6 +11,7 @@ from motet.papers.tdbn_control import TdbnModel
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import body_parts, read_clips
 from motet_train.papers.tdbn.rbm import Learning
+from motet_train.papers.tdbn.recipe import RECIPES
 from motet_train.papers.tdbn.tdbn import TDBN, Lessons, TDBNConfig
 from motet_train.runs import Run, RunError
 
@@ -25,7 +26,7 @@ def test_the_net_has_the_thesis_sizes() -> None:
     clips = read_clips(None, root_rotation=False)
     parts = body_parts(clips.skeleton, clips.channels)
     assert sorted(np.bincount(parts.of_channel)) == [7, 7, 12, 12, 18]
-    net = TDBN(replace(TDBNConfig.thesis(), control_units=20), parts.of_channel.tolist(), labels=1)
+    net = TDBN(replace(RECIPES["thesis"].config, control_units=20), parts.of_channel.tolist(), labels=1)
     assert net.crbm.past_weight.numel() == 67500  # thesis 4.1
     assert net.rbm.mask.shape == (56, 150)
     used = int(net.rbm.mask.sum()) + sum(p.numel() for p in net.parameters()) - net.rbm.weight.numel()
@@ -35,11 +36,11 @@ def test_the_net_has_the_thesis_sizes() -> None:
 def test_the_thesis_second_layer_is_one_block_for_two_gaits_and_equal_parts_for_three() -> None:
     """Thesis 5.3 and 5.4."""
     parts = [0, 0, 1]
-    two, three = (TDBN(TDBNConfig.thesis(), parts, labels=count) for count in (2, 3))
+    two, three = (TDBN(RECIPES["thesis"].config, parts, labels=count) for count in (2, 3))
     assert two.crbm.control_units == 20
     assert two.expansion.tolist() == [[0.0] * 20, [1.0] * 20]
     assert three.expansion.tolist() == np.repeat(np.eye(3), 7, axis=1).tolist()
-    assert TDBNConfig.thesis().rbm.steps == 1
+    assert RECIPES["thesis"].config.rbm.steps == 1
 
 
 def test_a_round_is_an_rbm_with_nets_on_it_and_the_next_begins_anew() -> None:
@@ -65,7 +66,7 @@ def test_training_repeats_by_its_seed() -> None:
 
 
 @pytest.mark.parametrize(
-    "config", [SHORT, replace(SHORT, free_units=8), replace(TDBNConfig.thesis(), rbm=SHORT.rbm, crbm=SHORT.crbm)]
+    "config", [SHORT, replace(SHORT, free_units=8), replace(RECIPES["thesis"].config, rbm=SHORT.rbm, crbm=SHORT.crbm)]
 )
 def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
     run = train(config)

@@ -19,7 +19,6 @@ from motet.models.load import load_as
 from motet.motion.motion import Motion
 from motet.papers.tdbn_control import TdbnModel
 from motet.predict.fill import FillModel
-from motet.predict.model import PredictModel
 from motet.search.model import SearchModel
 from motet.steering.model import SteerModel
 from motet_train.cli.train import read_expmap_files
@@ -35,7 +34,7 @@ from motet_train.evaluate.language.search import SEARCH_GOALS, search_report
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.predict import liveliness, mocap
 from motet_train.evaluate.steer.report import Recorded, steer_report, steer_text
-from motet_train.evaluate.tables import Goals, Report, json_ready, report_table
+from motet_train.evaluate.tables import Goals, Report, Reports, json_ready, report_table
 from motet_train.evaluate.text_adherence.bare import bare_report
 from motet_train.evaluate.text_adherence.composed import composed_report
 from motet_train.evaluate.text_adherence.numbers import numbers_report
@@ -72,18 +71,21 @@ class Inputs:
         return next(path for path in self.data.values() if path is not None)
 
 
+Drawn = Callable[[], Mapping[str, Drawings]]
+
+
 @dataclass(frozen=True)
 class Results:
     """Figures of each model, ready for JSON; the same as text; and pictures, by their folder."""
 
-    figures: dict[str, Any]
+    figures: Json
     text: str
-    drawings: Callable[[], Mapping[str, Drawings]] | None = None
+    drawings: Drawn | None = None
 
     @staticmethod
-    def of(reports: Mapping[str, Report], goals: Goals) -> "Results":
+    def of(reports: Reports, goals: Goals, drawings: Drawn | None = None) -> "Results":
         """The results of reports, next to their goals."""
-        return Results(json_ready(reports), report_table(reports, goals))
+        return Results(json_ready(reports), report_table(reports, goals), drawings)
 
 
 @dataclass(frozen=True)
@@ -96,10 +98,10 @@ class Suite:
     draws: bool = True
 
 
-def as_steered(model: BundleModel) -> SteerModel | None:
+def as_steered(model: Any) -> SteerModel | None:
     """The steered figure that a model is, or that stands in for it; None if it is neither."""
-    if model.manifest.loop == "session" and Driven.fits(cast(TdbnModel, model)):
-        return cast(SteerModel, Driven(cast(TdbnModel, model)))
+    if model.manifest.loop == "session" and Driven.fits(model):
+        return cast(SteerModel, Driven(model))
     return cast(SteerModel, model) if model.manifest.loop == "matching" else None
 
 
@@ -117,12 +119,10 @@ def _control(models: Mapping[str, TdbnModel], inputs: Inputs) -> Results:
     studies = {}
     for name, model in models.items():
         studies[name] = study_of(model, read_clips(inputs.data[name], unit=inputs.unit))
-    results = Results.of({name: control_report(study) for name, study in studies.items()}, CONTROL_GOALS)
-
-    def drawings() -> dict[str, Drawings]:
-        return {name: control_drawings(study) for name, study in studies.items()}
-
-    return Results(results.figures, results.text, drawings)
+    reports = {name: control_report(study) for name, study in studies.items()}
+    return Results.of(
+        reports, CONTROL_GOALS, lambda: {name: control_drawings(study) for name, study in studies.items()}
+    )
 
 
 def _filled(models: Mapping[str, FillModel], inputs: Inputs) -> Results:
@@ -135,17 +135,16 @@ def _language(models: Mapping[str, LanguageModel], inputs: Inputs) -> Results:
     store = Store.open(inputs.first)
     corpora = {name: split_as(model.manifest, store) for name, model in models.items()}
     reports = {name: _language_report(name, models, corpora) for name in models}
-    results = Results.of(reports, {**LANGUAGE_GOALS, **SEARCH_GOALS})
-    by_subject = {name for name, model in models.items() if model.manifest.training["split"]["by"] == "subject"}
+    results = Results.of(reports, {**LANGUAGE_GOALS, **SEARCH_GOALS}, lambda: _language_drawings(models, corpora))
+    by_subject = [name for name, model in models.items() if model.manifest.training["split"]["by"] == "subject"]
     # a model divided by trial also shows the figures of its verb for people never seen in training
-    people_unseen: dict[str, Report] = {}
-    for name, model in models.items():
-        if name in by_subject:
-            people_unseen.setdefault(model.VERB, reports[name])
-    for name, model in models.items():
-        if name not in by_subject and model.VERB in people_unseen:
-            results.figures[name]["people_unseen"] = json_ready(people_unseen[model.VERB])
-    return Results(results.figures, results.text, lambda: _language_drawings(models, corpora))
+    people_unseen: dict[str, Json] = {}
+    for name in by_subject:
+        people_unseen.setdefault(models[name].VERB, results.figures[name])
+    for name in models.keys() - by_subject:
+        if models[name].VERB in people_unseen:
+            results.figures[name]["people_unseen"] = people_unseen[models[name].VERB]
+    return results
 
 
 def _language_report(name: str, models: Json, corpora: Mapping[str, SplitStore]) -> Report:
@@ -177,7 +176,7 @@ def _language_drawings(models: Mapping[str, LanguageModel], corpora: Mapping[str
     return drawings
 
 
-def _predict(models: Mapping[str, PredictModel], inputs: Inputs) -> Results:
+def _predict(models: mocap.Models, inputs: Inputs) -> Results:
     """By the protocol if its text files are given, else the joints' distances in held-out trials."""
     if not is_expmap(inputs.first):
         return _in_mocap(models, Store.open(inputs.first), inputs)
@@ -185,7 +184,7 @@ def _predict(models: Mapping[str, PredictModel], inputs: Inputs) -> Results:
     return Results(json_ready(results.to_json()), results.text(), lambda: {"": protocol_drawings(results)})
 
 
-def _in_mocap(models: Mapping[str, PredictModel], store: Store, inputs: Inputs) -> Results:
+def _in_mocap(models: mocap.Models, store: Store, inputs: Inputs) -> Results:
     trials = mocap.held_out(models, store)
     motions = {entry.name: motion for entry, motion in trials.items()}
     fps = next(iter(models.values())).fps
@@ -203,7 +202,7 @@ def _in_mocap(models: Mapping[str, PredictModel], store: Store, inputs: Inputs) 
 
 
 def _mocap_drawings(
-    models: Mapping[str, PredictModel], motions: Mapping[str, Motion], measured: mocap.Measured, fps: float
+    models: mocap.Models, motions: Mapping[str, Motion], measured: mocap.Measured, fps: float
 ) -> Drawings:
     """Errors over time by measure, and strips of poses of about three trials."""
     # how errors grow, by measure
@@ -281,19 +280,23 @@ def suite_of(
     compositions.
     """
     if clips is not None:
-        if wrong := [name for name, model in models.items() if model.VERB != "describe"]:
-            raise click.UsageError(f"--actions takes describe models, not {', '.join(wrong)}")
+        _check(models, lambda model: model.VERB == "describe", "--actions takes describe models")
         return Suite("describe models", partial(_actions, clips=clips), draws=False)
     if composed:
-        if wrong := [name for name, model in models.items() if not isinstance(model, CodesModel)]:
-            raise click.UsageError(f"--composed takes models that generate codes, not {', '.join(wrong)}")
+        _check(models, lambda model: isinstance(model, CodesModel), "--composed takes models that generate codes")
         return Suite("generate models", _composed, data="", draws=False)
     if says:
-        if wrong := [name for name, model in models.items() if model.VERB != "generate"]:
-            raise click.UsageError(f"--says takes generate models, not {', '.join(wrong)}")
+        _check(models, lambda model: model.VERB == "generate", "--says takes generate models")
         return Suite("generate models", _says, data="")
     # all others by their verb; models of one call share a suite
     first, *others = {SUITES["steered" if as_steered(model) else model.VERB] for model in models.values()}
     if others:
         raise click.UsageError("evaluate control, fill, predict and language models separately: their data differ")
     return first
+
+
+def _check(models: Mapping[str, BundleModel], fits: Callable[[BundleModel], bool], takes: str) -> None:
+    """UsageError with the names of models that an option does not take."""
+    wrong = [name for name, model in models.items() if not fits(model)]
+    if wrong:
+        raise click.UsageError(f"{takes}, not {', '.join(wrong)}")

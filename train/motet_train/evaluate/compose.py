@@ -52,15 +52,10 @@ def compose_report(writer: CodesModel) -> dict[str, Report]:
 def _unconstrained(writer: CodesModel, moments: list[Moment]) -> Motion:
     """The prompts of a composition as a story, moved to its start."""
     # each prompt lasts until the next one, or until the end
-    sentences = []
-    starts = []
-    for moment in moments:
-        if moment.text is not None:
-            sentences.append(moment.text)
-            starts.append(moment.at)
-    stops = [*starts[1:], moments[-1].at]
-    seconds = [stop - start for start, stop in zip(starts, stops, strict=True)]
-    story = writer.story(sentences, seconds=seconds, seed=0)
+    prompts = [(moment.text, moment.at) for moment in moments if moment.text is not None]
+    sentences, starts = zip(*prompts, strict=True)
+    seconds = np.diff([*starts, moments[-1].at]).tolist()
+    story = writer.story(list(sentences), seconds=seconds, seed=0)
     return moved(story.motion, moments[0])
 
 

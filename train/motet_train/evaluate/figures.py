@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from motet.bundle.fields import Json
 from motet.draw.svg import shapes
 from motet.errors import OutputError
 from motet.files import write_whole
@@ -25,7 +24,9 @@ SPACING = 0.6
 Drawings = Mapping[str, Callable[[], Figure]]
 """Name of a figure -> the function that draws it."""
 
-Bones = Sequence[tuple[int, int]]
+
+Looks = dict[str, dict[str, Any]]
+"""Name of a system -> how its line is drawn."""
 
 
 def save(drawings: Drawings, folder: Path) -> list[Path]:
@@ -61,19 +62,15 @@ def in_profile(points: Array, skeleton: Skeleton) -> Array:
     return profile
 
 
-def bones_of(skeleton: Skeleton) -> Bones:
-    """Each bone as the indices of the joints at its ends."""
-    return [(joint.parent, i) for i, joint in enumerate(skeleton.joints) if joint.parent >= 0]
-
-
-def stick_figures(axes: Axes, points: Array, bones: Bones, colours: Sequence[Any]) -> None:
+def stick_figures(axes: Axes, points: Array, skeleton: Skeleton, colours: Sequence[Any]) -> None:
     """Draw poses (K, J, 2) in body heights from left to right, :data:`SPACING` apart.
 
     colours: one for each pose, or one for each of its bones.
     """
     shifts = SPACING * np.arange(len(points))
     placed = points + shifts[:, None, None] * [1, 0]
-    for pose, colour in zip(placed[:, np.array(bones)], colours, strict=True):
+    bones = np.stack([skeleton.parents, np.arange(len(skeleton.parents))], axis=1)[1:]
+    for pose, colour in zip(placed[:, bones], colours, strict=True):
         axes.add_collection(LineCollection(list(pose), colors=colour, linewidths=0.9))
     axes.autoscale_view()
     axes.set_aspect("equal")
@@ -123,8 +120,8 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
         unused.remove()
 
     for axis, (title, systems) in zip(axes, errors.items(), strict=False):
-        _plot(axis, systems, fps, looks)
-        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, 1.1 * _highest(systems)))
+        highest = _plot(axis, systems, fps, looks)
+        axis.set(title=title, xlabel="ms", ylabel=unit, ylim=(0, 1.1 * highest))
 
     if legend_outside:
         figure.legend(*axes[0].get_legend_handles_labels(), loc="outside right upper")
@@ -133,26 +130,22 @@ def error_over_time(errors: Mapping[str, Mapping[str, Array]], fps: float, unit:
     return figure
 
 
-def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Mapping[str, Json]) -> None:
-    """Plot errors (N,) against the true time."""
+def _plot(axis: Axes, systems: Mapping[str, Array], fps: float, looks: Looks) -> float:
+    """Plot errors (N,) against the true time; the largest of all but constant velocity, if there is anything else."""
     for name, error in systems.items():
         milliseconds = (np.arange(len(error)) + 1) / fps * 1000
         axis.plot(milliseconds, error, label=name, **looks[name])
-
-
-def _highest(systems: Mapping[str, Array]) -> float:
-    """The largest error of all but constant velocity, or of all if there is nothing else."""
     others = [error for name, error in systems.items() if not name.startswith(CONSTANT)]
     return max(float(error.max()) for error in others or systems.values())
 
 
-def looks_of(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+def looks_of(names: Sequence[str]) -> Looks:
     """Colour and style of each system's line: floors are grey; line styles change once the ten colours are used up."""
     styles = ("-", "--", ":", "-.", (0, (1, 3)))
     # floors stand back behind what is compared
     floors = [name for name in names if name in FLOORS]
     others = [name for name in names if name not in FLOORS]
-    looks: dict[str, dict[str, Any]] = {}
+    looks: Looks = {}
     for number, name in enumerate(floors):
         looks[name] = {"color": "0.6", "linewidth": 1.8, "linestyle": styles[number]}
     for number, name in enumerate(others):

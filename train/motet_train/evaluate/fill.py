@@ -16,7 +16,7 @@ from motet.representation.placed import ROOT_PLACE, bridge, placed_by_way, strai
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store, split
 from motet_train.evaluate.positions import Flags, jerk, length
-from motet_train.evaluate.tables import Report, gathered, read_goals
+from motet_train.evaluate.tables import Figures, Report, gathered, read_goals
 from motet_train.models.kinematics import SixdPlaces, tree_of
 
 FOOT_JOINTS = [HUMANOID.index(sided(side, part)) for side, part in product(LEFT_RIGHT, ("Foot", "Toes"))]
@@ -78,12 +78,12 @@ def _windows(model: FillModel, store: Store, frames: int) -> Iterator[Window]:
             yield Window(placed[start - context : start], placed[start:stop], placed[stop : stop + context])
 
 
-def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> dict[str, float]:
+def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Window], fps: float) -> Figures:
     # what was recorded: which feet stand, and across which gaps the figure travels
     recorded = _places(joints, windows, [window.truth for window in windows])
     stands = _standing_feet(recorded, fps)
     going = _going(windows, fps)
-    figures = {"gaps": float(len(windows)), "gaps_going": float(going.sum()), "jerk_recorded": jerk(recorded, fps)}
+    figures = {"gaps": float(len(windows)), "gaps_going": going.sum(), "jerk_recorded": jerk(recorded, fps)}
 
     # every system, relative to the recording
     for name, fill in systems.items():
@@ -101,21 +101,19 @@ def _figures(joints: SixdPlaces, systems: Mapping[str, Fill], windows: list[Wind
     return figures
 
 
-def _distances(distances: Array, going: Flags) -> dict[str, float]:
+def _distances(distances: Array, going: Flags) -> Figures:
     """Mean distances (W, T, J) of joints in all gaps, and in those across which the figure travels, centimetres."""
     inside = distances[:, MARGIN:-MARGIN]
     return {
-        "cm": 100 * float(inside.mean()),
-        "cm_going": 100 * float(inside[going].mean()) if going.any() else np.nan,
+        "cm": 100 * inside.mean(),
+        "cm_going": 100 * inside[going].mean() if going.any() else np.nan,
     }
 
 
 def _going(windows: list[Window], fps: float) -> Flags:
     """Whether the figure travels across each gap (W,)."""
     crossings = np.array([(window.after[0] - window.past[-1])[[0, 2]] for window in windows])
-    frames_across = len(windows[0].truth) + 1
-    speeds = length(crossings) * fps / frames_across
-    return speeds > 0.5
+    return length(crossings) * fps / (len(windows[0].truth) + 1) > 0.5
 
 
 def _standing_feet(places: Array, fps: float) -> Flags:
@@ -130,7 +128,7 @@ def _standing_feet(places: Array, fps: float) -> Flags:
 def _slide(places: Array, stands: Flags, fps: float) -> float:
     """The mean speed over the ground of feet while those recorded stand, centimetres a second; NaN if none does."""
     speeds = ground_speeds(places[:, :, FOOT_JOINTS], fps)
-    return 100 * float(speeds[stands].mean()) if stands.any() else np.nan
+    return 100 * speeds[stands].mean() if stands.any() else np.nan
 
 
 def _places(joints: SixdPlaces, windows: list[Window], filled: list[Array]) -> Array:

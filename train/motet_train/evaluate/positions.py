@@ -102,14 +102,14 @@ def mean_and_tail(values: Array) -> tuple[float, float]:
     """The mean and the 95th percentile of values (N,); NaN without a value."""
     if len(values) == 0:
         return np.nan, np.nan
-    return float(values.mean()), float(np.percentile(values, 95))
+    return values.mean(), np.percentile(values, 95)
 
 
 def speed(points: Array, root: Array, fps: float) -> float:
     """How fast points (T, K, 3) move over the ground while they stand, m/s: the median over all frames of all stances.
     NaN without a stance."""
     steps = [length(np.diff(places[:, [0, 2]], axis=0)) for places in stances(points, root, fps)]
-    return float(np.median(np.concatenate(steps))) * fps if steps else np.nan
+    return np.median(np.concatenate(steps)) * fps if steps else np.nan
 
 
 def skate(feet: Array, heights: Array, low: float, fps: float, slowest: bool = False) -> float:
@@ -123,20 +123,20 @@ def skate(feet: Array, heights: Array, low: float, fps: float, slowest: bool = F
     if slowest:
         speeds = speeds.min(axis=1)
     stood = speeds[np.isfinite(speeds)]
-    return float(stood.mean()) if len(stood) else np.nan
+    return stood.mean() if len(stood) else np.nan
 
 
 def acceleration(joints: Array, root: Array, fps: float) -> float:
     """How much joints (T, J, 3) tremble, m/s^2: the median magnitude of their acceleration relative to the root (T, 3),
     over all joints and frames."""
     second = np.diff(joints - root[:, None], n=2, axis=0) * fps**2
-    return float(np.median(length(second))) if len(second) else np.nan
+    return np.median(length(second)) if len(second) else np.nan
 
 
 def jerk(joints: Array, fps: float) -> float:
     """The mean magnitude of the third difference of joints (..., T, J, 3), m/s^3; NaN below four frames."""
     third = np.diff(joints, n=3, axis=-3) * fps**3
-    return float(length(third).mean()) if third.size else np.nan
+    return length(third).mean() if third.size else np.nan
 
 
 def leap(motion: Motion) -> float:

@@ -1,7 +1,7 @@
 """The writer of all reports: groups of figures with stable keys, as JSON and as text, and tables of cells."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain, zip_longest
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,9 @@ Figures = dict[str, float]
 
 Report = dict[str, Figures]
 """Group -> key -> figure. A measure is a function of a model and data that returns a report, or yields its parts."""
+
+Reports = Mapping[str, Report]
+"""Name of a model -> its report."""
 
 Goals = Mapping[str, tuple[float | None, float | None]]
 """Name of a figure, "GROUP.KEY" -> the lowest and highest value that meet the goal, None for no bound."""
@@ -42,7 +45,7 @@ def json_ready(figures: Any) -> Any:
         return {key: json_ready(value) for key, value in figures.items()}
     if isinstance(figures, list | tuple):
         return [json_ready(value) for value in figures]
-    if isinstance(figures, float):
+    if isinstance(figures, float | np.number):
         return float(f"{figures:.6g}") if np.isfinite(figures) else None
     return figures
 
@@ -71,7 +74,7 @@ def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
     return "\n".join(lines)
 
 
-def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[str, Report] | None = None) -> str:
+def report_table(reports: Reports, goals: Goals, beside: Reports | None = None) -> str:
     """One line per figure that any report has, one column per report, and the goal of those that have one.
 
     beside: further columns, to which goals do not apply.
@@ -80,22 +83,23 @@ def report_table(reports: Mapping[str, Report], goals: Goals, beside: Mapping[st
     others = beside or {}
     columns = [*reports.values(), *others.values()]
     rows = [["", *short_names(list(reports)), *others, ""]]
-    for group, key in _figure_keys(list(reports.values())):
-        values = [report.get(group, {}).get(key) for report in columns]
-        cells = ["" if value is None else f"{value:.4g}" for value in values]
-        judged = [value for value in values[: len(reports)] if value is not None]
-        name = f"{group}.{key}"
-        rows.append([name, *cells, _goal(goals, name, judged)])
+    for group, figures in _merged(reports.values()).items():
+        for key in figures:
+            values = [report.get(group, {}).get(key) for report in columns]
+            cells = ["" if value is None else f"{value:.4g}" for value in values]
+            judged = [value for value in values[: len(reports)] if value is not None]
+            name = f"{group}.{key}"
+            rows.append([name, *cells, _goal(goals, name, judged)])
     return aligned(rows, left=(0, len(columns) + 1))
 
 
-def _figure_keys(reports: Sequence[Report]) -> list[tuple[str, str]]:
-    """Group and key of each figure that any report has, group by group, in the order of the reports."""
-    groups: dict[str, dict[tuple[str, str], None]] = {}
+def _merged(reports: Iterable[Report]) -> Report:
+    """Each figure that any report has, group by group, in the order of the reports."""
+    merged: Report = {}
     for report in reports:
         for group, figures in report.items():
-            groups.setdefault(group, {}).update(dict.fromkeys((group, key) for key in figures))
-    return list(chain.from_iterable(groups.values()))
+            merged[group] = merged.get(group, {}) | figures
+    return merged
 
 
 def short_names(names: Sequence[str]) -> list[str]:

@@ -12,7 +12,7 @@ from motet_train.data.store import Split, Store, matches
 from motet_train.evaluate.language.attributes import common_side, side, turning
 from motet_train.evaluate.language.confidence import CHAIN, fits_timeline, share, timelines_of
 from motet_train.evaluate.language.describe import nearest_motions
-from motet_train.evaluate.language.split_store import SplitStore
+from motet_train.evaluate.language.split_store import SplitStore, matching
 from motet_train.evaluate.tables import Figures, Report
 
 BINS = 10
@@ -21,12 +21,9 @@ BINS = 10
 
 def clips_apart(store: Store, patterns: str) -> SplitStore:
     """The clips whose names match one of several comma-separated patterns as the test part; all others train."""
-    train: list[int] = []
-    test: list[int] = []
-    for record, entry in enumerate(store.records):
-        part = test if matches(entry.name, patterns) else train
-        part.append(record)
-    return SplitStore(store, Split(tuple(train), (), tuple(test)))
+    names = [entry.name for entry in store.records]
+    train = matching(names, lambda name: not matches(name, patterns))
+    return SplitStore(store, Split(train, (), matching(names, lambda name: matches(name, patterns))))
 
 
 def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
@@ -44,9 +41,12 @@ def actions_report(model: DescribeModel, corpus: SplitStore) -> Report:
     motions = corpus.motions(test)
     shown = [_shown(corpus, record) for record in test]
     descriptions = [row[0] for row in model.describe(motions)]
+    looked_up = []
+    for actions, texts in zip(shown, corpus.references(nearest_motions(corpus, motions)), strict=True):
+        looked_up.append(np.mean(list(map(actions.right, texts))))
     return {
         "actions": _action_figures(model, shown, descriptions),
-        "lookup": {"right": _looked_up(corpus.references(nearest_motions(corpus, motions)), shown)},
+        "lookup": {"right": np.average(looked_up)},
         "turns": _turns(corpus, test, descriptions),
         "timeline": timelines(model, corpus, test),
     }
@@ -80,14 +80,6 @@ def _reachable(model: DescribeModel, shown: list[Shown]) -> float:
     return share(np.array([any(map(actions.right_kinds, known_kinds)) for actions in shown]))
 
 
-def _looked_up(references: Sequence[Sequence[str]], shown: list[Shown]) -> float:
-    """The mean share of sentences about other motions, a list for each, that are right."""
-    shares = []
-    for actions, texts in zip(shown, references, strict=True):
-        shares.append(np.mean(list(map(actions.right, texts))))
-    return float(np.mean(shares))
-
-
 def _shown(corpus: SplitStore, record: int) -> Shown:
     entry = corpus.store.records[record]
     return shown_by((*entry.sentences, *entry.unseen), entry.action)
@@ -107,8 +99,8 @@ def _turns(corpus: SplitStore, records: Sequence[int], descriptions: Sequence[De
     return {"of": float(len(mentioned)), "told": share(np.array(mentioned, dtype=bool))}
 
 
-def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int], count: int = 40) -> Figures:
-    """Figures of timelines of three motions of 2 to 12 s, drawn at random and joined: the share of time with a right
+def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> Figures:
+    """Figures of 40 timelines of three motions of 2 to 12 s, drawn at random and joined: the share of time with a right
     description ("time_right"), of joins with a cut within half a second ("joins_found"), and of cuts with a join
     ("cuts_right"). Empty if there are fewer than three such motions."""
     usable = [record for record in records if fits_timeline(corpus.motion(record))]
@@ -116,11 +108,11 @@ def timelines(model: DescribeModel, corpus: SplitStore, records: Sequence[int], 
         return {}
     # the same chains for every model
     random = np.random.default_rng(0)
-    chains = [random.choice(usable, CHAIN, replace=False).tolist() for _ in range(count)]
+    chains = [random.choice(usable, CHAIN, replace=False).tolist() for _ in range(40)]
     described = timelines_of(model, corpus, chains, within=0.5)
     shown = {record: _shown(corpus, record) for record in usable}
     right = [shown[record].right(part.text) for record, part in described.moments]
-    return {"time_right": share(np.array(right)), **described.cut_shares(count)}
+    return {"time_right": share(np.array(right)), **described.cut_shares(40)}
 
 
 def calibration_error(probability: Array, right: Mask) -> float:

@@ -89,11 +89,6 @@ def action_right(text: str, sentences: Sequence[str]) -> bool:
     return bool(actions) and actions <= mentioned(ACTIONS, *sentences)
 
 
-def _verbs_right(text: str, agreed: frozenset[str], sentences: Sequence[str]) -> bool:
-    verbs = mentioned(VERBS, text)
-    return bool(verbs & agreed) and verbs <= mentioned(VERBS, *sentences)
-
-
 def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) -> Figures:
     """The shares of hypotheses that are right, NaN without any, and their numbers with the suffix "_of".
 
@@ -104,7 +99,8 @@ def words_right(hypotheses: Sequence[str], references: Sequence[Sequence[str]]) 
     for text, sentences in zip(hypotheses, references, strict=True):
         # each attribute counts only where people agree on it
         if agreed_verbs := common_verbs(sentences):
-            right["verbs"].append(_verbs_right(text, agreed_verbs, sentences))
+            verbs = mentioned(VERBS, text)
+            right["verbs"].append(bool(verbs & agreed_verbs) and verbs <= mentioned(VERBS, *sentences))
         if agreed_side := common_side(sentences):
             right["sides"].append(side(text) == {agreed_side})
         if (agreed_turning := common_turning(sentences)) is not None:

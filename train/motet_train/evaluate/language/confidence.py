@@ -212,7 +212,7 @@ def matched(joins: Sequence[float], cuts: Sequence[float], within: float = 1.0) 
 
 def share(truths: Mask) -> float:
     """The share of true flags, NaN without any flags."""
-    return float(truths.mean()) if len(truths) else np.nan
+    return truths.mean() if len(truths) else np.nan
 
 
 def _auc(scores: Array, right: Mask) -> float:

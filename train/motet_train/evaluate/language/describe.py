@@ -5,6 +5,7 @@ figures of a describe model as one report."""
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import chain, zip_longest
+from operator import attrgetter
 from typing import TypeVar
 
 import numpy as np
@@ -29,6 +30,9 @@ NGRAM_ORDERS = (1, 2, 3, 4)
 """Longest n-grams of the BLEU scores on unseen references."""
 
 Hypothesis = TypeVar("Hypothesis")
+
+Hypotheses = Sequence[Sequence[str]]
+"""The ranked sentences for each motion."""
 
 References = Sequence[Sequence[str]]
 """The normalised sentences about each motion."""
@@ -56,7 +60,7 @@ def ranked(row: Sequence[Hypothesis], rank: int) -> Hypothesis:
     return row[min(rank, len(row) - 1)]
 
 
-def ranks(hypotheses: Sequence[Sequence[str]], references: References, marks: bool = False) -> Figures:
+def ranks(hypotheses: Hypotheses, references: References, marks: bool = False) -> Figures:
     """BLEU of the first, second, ... fifth hypothesis of every motion, as "1" to "5" (a row of table 2).
 
     A motion with fewer hypotheses counts with its last one.
@@ -86,7 +90,7 @@ def agreement(references: References) -> float:
         others = [[*sentences[:place], *sentences[place + 1 :]] for sentences in rows]
         scores.append(bleu(hypotheses, others))
         weights.append(len(rows))
-    return float(np.average(scores, weights=weights))
+    return np.average(scores, weights=weights)
 
 
 def nearest_motions(corpus: SplitStore, motions: Sequence[Motion]) -> list[int]:
@@ -110,9 +114,8 @@ def copied_bleu(copied: References, references: References, longest: int = 4) ->
 
 def frequent_sentence(corpus: SplitStore) -> str:
     """The most frequent sentence about training motions, the first in alphabetical order of several."""
-    counts: Counter[str] = Counter()
-    for sentences in corpus.references(corpus.parts.train):
-        counts.update(sentences)
+    sentences = chain.from_iterable(corpus.references(corpus.parts.train))
+    counts = Counter(sentences)
     return min(counts, key=lambda sentence: (-counts[sentence], sentence))
 
 
@@ -121,17 +124,14 @@ def retrieved(corpus: SplitStore, sentences: Sequence[str]) -> list[int]:
 
     Similarity is the cosine between TF-IDF vectors of their words, the standard baseline.
     """
-    records = []
-    train_sentences = []
-    for record in corpus.parts.train:
-        for sentence in corpus.sentences(record):
-            records.append(record)
-            train_sentences.append(sentence)
+    references = corpus.references(corpus.parts.train)
+    records = np.repeat(corpus.parts.train, list(map(len, references)))
     # cosines between all sentences and those of training
     vectors = TfidfVectorizer(token_pattern=r"\S+")
-    table = vectors.fit_transform(train_sentences)
+    table = vectors.fit_transform(chain.from_iterable(references))
     similarities = (vectors.transform(sentences) @ table.T).toarray()
-    return [records[row] for row in similarities.argmax(axis=1)]
+    nearest: list[int] = records[similarities.argmax(axis=1)].tolist()
+    return nearest
 
 
 def describe_report(model: DescribeModel, corpus: SplitStore) -> Report:
@@ -167,12 +167,11 @@ def _described(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
     yield _floors(best, copied, references, frequent_sentence(corpus))
     yield {"words": words_right(best, references), "likelihood": {"test": _log_probability(model, corpus, test)}}
 
-    # what was chosen on validation motions
+    # what was chosen on validation motions, if any has a sentence
     yield from _validated(model, corpus)
 
 
 def _validated(model: DescribeModel, corpus: SplitStore) -> Iterator[Report]:
-    """Confidence and timelines on validation motions, if any has a sentence."""
     validation = [record for record in corpus.parts.validation if corpus.sentences(record)]
     if validation:
         yield {"confidence": confidence(model, corpus, validation)}
@@ -187,15 +186,13 @@ def _floors(best: Sequence[str], copied: References, references: References, fre
     return {"floor": {**floors, "human": agreement(references)}, "gain": gains}
 
 
-def _hypotheses(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> list[list[str]]:
+def _hypotheses(model: DescribeModel, corpus: SplitStore, records: Sequence[int]) -> Hypotheses:
     """The ranked descriptions of each record."""
-    rows = []
-    for row in model.describe(corpus.motions(records), RANKS):
-        rows.append([description.text for description in row])
-    return rows
+    rows = model.describe(corpus.motions(records), RANKS)
+    return [list(map(attrgetter("text"), row)) for row in rows]
 
 
-def _table_2(part: str, hypotheses: list[list[str]], references: References) -> Report:
+def _table_2(part: str, hypotheses: Hypotheses, references: References) -> Report:
     """The rows of table 2 for a part of the data."""
     return {
         f"bleu_{part}": ranks(hypotheses, references),
@@ -204,7 +201,7 @@ def _table_2(part: str, hypotheses: list[list[str]], references: References) -> 
 
 
 def _unseen(
-    hypotheses: list[list[str]], copied: References, references: References, unseen: References, seen: int
+    hypotheses: Hypotheses, copied: References, references: References, unseen: References, seen: int
 ) -> Report:
     """BLEU on the sentences of motions that no training saw, beside the floor.
 
@@ -231,7 +228,7 @@ def _unseen(
     }
 
 
-def _by_order(hypotheses: list[list[str]], copied: References, references: References) -> Figures:
+def _by_order(hypotheses: Hypotheses, copied: References, references: References) -> Figures:
     """BLEU of the first hypotheses, and of copying, for n-grams of each length."""
     best = [row[0] for row in hypotheses]
     scores = {f"bleu_{n}": bleu(best, references, longest=n) for n in NGRAM_ORDERS}

@@ -139,14 +139,14 @@ def _chain(describe: DescribeModel, corpus: SplitStore, answers: Mapping[str, An
     # relative to the describe model on its own training motions
     report: Report = {f"chain_{part}": row for part, row in rows.items()}
     for part, row in rows.items():
-        report[f"relative_{part}"] = {rank: _relative(score, train_bleu) for rank, score in row.items()}
-    relative_bounds = {f"{key}_relative": _relative(score, train_bleu) for key, score in bounds.items()}
+        report[f"relative_{part}"] = _relative(row, train_bleu)
+    relative_bounds = {f"{key}_relative": score for key, score in _relative(bounds, train_bleu).items()}
     report["bound"] = {"describe_train": train_bleu, **bounds, **relative_bounds}
     return report
 
 
-def _relative(score: float, train_bleu: float) -> float:
-    return score / train_bleu if train_bleu else np.nan
+def _relative(scores: Figures, train_bleu: float) -> Figures:
+    return {key: score / train_bleu if train_bleu else np.nan for key, score in scores.items()}
 
 
 def _likelihood(model: GenerateModel, corpus: SplitStore, records: Sequence[int]) -> float:
@@ -185,10 +185,6 @@ class KindPrompt(NamedTuple):
     least: str
     below: str | None = None
 
-    def measurable(self, limits: Thresholds) -> bool:
-        """Whether its thresholds exist."""
-        return self.least in limits and (self.below is None or self.below in limits)
-
     def passes(self, travel: Travel, limits: Thresholds) -> bool:
         """Whether a motion is of the kind."""
         most = np.inf if self.below is None else limits[self.below]
@@ -210,9 +206,9 @@ def travel(motion: Motion) -> Travel:
     # the first frame has no velocity of its own
     steps = block[1:]
     height = block[:, 3]
-    speed = float(np.median(steps[:, 0])) if len(steps) else 0.0
-    turn = float(steps[:, 2].sum() / motion.fps)
-    rise = float(height.max() - np.median(height))
+    speed = np.median(steps[:, 0]) if len(steps) else 0.0
+    turn = steps[:, 2].sum() / motion.fps
+    rise = height.max() - np.median(height)
     return Travel(speed, turn, rise)
 
 
@@ -247,33 +243,28 @@ def thresholds(travels: Mapping[str, Sequence[Travel]]) -> Figures:
     walks and of runs. turn: degrees, half-way between the median turns of straight and of turning motions. rise: m,
     half-way between the median rises of walks and of jumps.
     """
-    # the figures of each kind, on both sides of a threshold
     walks = travels["walks"]
-    walk_speeds = [walk.speed for walk in walks]
-    run_speeds = [run.speed for run in travels["runs"]]
-    straight_turns = [abs(straight.turn) for straight in travels["straight"]]
-    turns = [abs(turn.turn) for turn in (*travels["left"], *travels["right"])]
-    walk_rises = [walk.rise for walk in walks]
-    jump_rises = [jump.rise for jump in travels["jumps"]]
+    turns = [*travels["left"], *travels["right"]]
     limits = {
-        "slow": float(np.percentile(walk_speeds, 10) / 2) if walks else np.nan,
-        "run": _half_way(walk_speeds, run_speeds),
-        "turn": _half_way(straight_turns, turns),
-        "rise": _half_way(walk_rises, jump_rises),
+        "slow": np.percentile([walk.speed for walk in walks], 10) / 2 if walks else np.nan,
+        "run": _half_way(lambda travel: travel.speed, walks, travels["runs"]),
+        "turn": _half_way(lambda travel: abs(travel.turn), travels["straight"], turns),
+        "rise": _half_way(lambda travel: travel.rise, walks, travels["jumps"]),
     }
     return {key: limit for key, limit in limits.items() if np.isfinite(limit)}
 
 
-def _half_way(lower: list[float], upper: list[float]) -> float:
-    """The value half-way between two medians; NaN if there is nothing on one side."""
+def _half_way(quantity: Callable[[Travel], float], lower: Sequence[Travel], upper: Sequence[Travel]) -> float:
+    """The value half-way between the medians of a quantity in two kinds; NaN if there is nothing on one side."""
     if not lower or not upper:
         return np.nan
-    return float(np.mean([np.median(lower), np.median(upper)]))
+    return float(np.mean([np.median(list(map(quantity, kind))) for kind in (lower, upper)]))
 
 
 def measurable(limits: Thresholds) -> dict[str, KindPrompt]:
     """The entries of ASKED whose thresholds exist."""
-    return {key: prompt for key, prompt in ASKED.items() if prompt.measurable(limits)}
+    known = {*limits, None}
+    return {key: prompt for key, prompt in ASKED.items() if {prompt.least, prompt.below} <= known}
 
 
 def recognised(travels: Mapping[str, Sequence[Travel]], limits: Thresholds) -> Figures:

@@ -64,7 +64,7 @@ def last_energy(z: Array, fps: float) -> float:
 def quiet_energy(motions: Sequence[Motion], contract: MotionContract) -> float:
     """The 5th percentile of the energy of the last second: motions below it count as frozen."""
     ends = [last_energy(contract.normalised(contract.frames(motion)), contract.fps) for motion in motions]
-    return float(np.percentile(ends, 5))
+    return np.percentile(ends, 5)
 
 
 def speed(motion: Motion) -> float:

@@ -1,7 +1,8 @@
 """How well a search model finds motions by sentences that were not in training, and by motions."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -73,9 +74,15 @@ def _nearest(model: SearchModel, looks: Looks, groups: Numbers, test_motions: Se
     by_model = [_places(index.search(motion, 1))[0] for motion in test_motions]
     distances = cdist(looks.features(test_motions), looks.features(corpus.motions(train)))
 
+    # among those whose description is in training
     train_groups = groups[list(train)]
-    nearest_groups = {"alike": train_groups[by_model], "features_alike": train_groups[distances.argmin(axis=1)]}
-    return _shares(nearest_groups, groups[list(corpus.parts.test)], train_groups)
+    test_groups = groups[list(corpus.parts.test)]
+    known = np.isin(test_groups, train_groups)
+    return {
+        "alike": share((train_groups[by_model] == test_groups)[known]),
+        "features_alike": share((train_groups[distances.argmin(axis=1)] == test_groups)[known]),
+        "of": known.sum(),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +92,7 @@ class _TestQueries:
     takes, groups: of the test motions; pieces of one take count as the same motion, those of one group as alike.
     """
 
-    sentences: list[str]
+    sentences: Sequence[str]
     rows: list[int]
     takes: NDArray[np.str_]
     groups: Numbers
@@ -94,15 +101,16 @@ class _TestQueries:
     def of(corpus: SplitStore, groups: Numbers) -> "_TestQueries":
         """Those of a corpus; DataError without any. groups: of all its records."""
         test = corpus.parts.test
-        rows, sentences = _queries(corpus, test)
-        if not rows:
+        queries = list(_queries(corpus, test))
+        if not queries:
             raise DataError(
                 "no sentence to search by: the test motions have none that is not in training and has a word of it; "
                 "give the sentences to measure by the pool test in the table"
             )
         entries = [corpus.store.records[record] for record in test]
         takes = np.array([entry.take or entry.name for entry in entries])
-        return _TestQueries(sentences, rows, takes, groups[list(test)])
+        rows, sentences = zip(*queries, strict=True)
+        return _TestQueries(sentences, list(rows), takes, groups[list(test)])
 
     def figures(self, train_groups: Numbers) -> Figures:
         """The number of sentences, the share with a known subject, and the best "first_5"."""
@@ -110,8 +118,8 @@ class _TestQueries:
         motions_alike = (query_groups[:, None] == self.groups).sum(axis=1)
         return {
             "sentences": float(len(self.rows)),
-            "known": float(np.isin(query_groups, train_groups).mean()),
-            "best_5": float(np.minimum(1, 5 / motions_alike).mean()),
+            "known": np.isin(query_groups, train_groups).mean(),
+            "best_5": np.minimum(1, 5 / motions_alike).mean(),
         }
 
     def ranks(self, prefix: str, order: Indices) -> Report:
@@ -133,11 +141,9 @@ def _orders(model: SearchModel, corpus: SplitStore, sentences: Sequence[str]) ->
 def _likelihoods(describe: DescribeModel, motions: Sequence[Motion], sentences: Sequence[str]) -> Array:
     """The log-likelihoods (Q, N) of sentences given motions."""
     prepared = [describe.prepared(motion) for motion in motions]
-    rows = []
     with unknown_words_allowed():
-        for sentence in sentences:
-            rows.append([describe.score(motion, sentence) for motion in prepared])
-    return np.array(rows)
+        scores = [describe.score(motion, sentence) for sentence, motion in product(sentences, prepared)]
+    return np.reshape(scores, (len(sentences), -1))
 
 
 def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> Figures:
@@ -153,7 +159,7 @@ def _likeness(model: SearchModel, corpus: SplitStore, groups: Numbers) -> Figure
         if corpus.parts.validation:
             hits, right = _first_hits(model, corpus, corpus.parts.validation, groups, kind)
             scores = np.array([hit.score for hit in hits])
-            figures[f"{kind}_least"] = float(np.percentile(scores[right], 5)) if right.any() else np.nan
+            figures[f"{kind}_least"] = np.percentile(scores[right], 5) if right.any() else np.nan
 
         # how well the bundle tells in the test
         hits, right = _first_hits(model, corpus, corpus.parts.test, groups, kind)
@@ -172,7 +178,8 @@ def _first_hits(
     searched_groups = groups[list(searched)]
     first_hits = []
     right = []
-    for row, query in _queries_of(corpus, part, kind):
+    queries = _queries(corpus, part) if kind == "text" else enumerate(corpus.motions(part))
+    for row, query in queries:
         with unknown_words_allowed():
             hits = index.search(query, min(MOST_HITS, len(index.members)))
         # which hits have an equal description
@@ -186,44 +193,26 @@ def _first_hits(
     return first_hits, np.array(right, dtype=np.bool_)
 
 
-def _queries_of(corpus: SplitStore, part: Sequence[int], kind: str) -> list[tuple[int, str | Motion]]:
-    """The sentences or motions of a part, with their rows in it."""
-    if kind == "text":
-        return list(zip(*_queries(corpus, part), strict=True))
-    return list(enumerate(corpus.motions(part)))
-
-
 def _places(hits: Sequence[Hit]) -> list[int]:
     """The place in the index of each hit, see :func:`_index`."""
     return [int(hit.path.name) for hit in hits]
 
 
-def _queries(corpus: SplitStore, part: Sequence[int]) -> tuple[list[int], list[str]]:
-    """The sentences to search by, with at least one word known from training, and the row in a part of each."""
+def _queries(corpus: SplitStore, part: Sequence[int]) -> Iterator[tuple[int, str]]:
+    """The sentences to search by, with at least one word known from training, each with its row in a part."""
     known = corpus.words(corpus.parts.train)
     kept = [corpus.kept(record) for record in part]
-    rows = []
-    queries = []
     for row, sentences in enumerate(kept if any(kept) else corpus.unseen(part)):
         for sentence in sentences:
             if not known.isdisjoint(sentence.split()):
-                rows.append(row)
-                queries.append(sentence)
-    return rows, queries
+                yield row, sentence
 
 
 def _ranks(right: Mask) -> Figures:
     """By which hits (Q, N), best first, are right: the shares among the first, and the median rank."""
     ranks = right.argmax(axis=1) + 1
-    shares = {f"first_{count}": float((ranks <= count).mean()) for count in (1, 5, 10)}
-    return {**shares, "median_rank": float(np.median(ranks))}
-
-
-def _shares(nearest: Mapping[str, Numbers], test: Numbers, train: Numbers) -> Figures:
-    """The share of nearest motions described like the test motion, among those whose description is in training."""
-    known = np.isin(test, train)
-    shares = {key: float((groups == test)[known].mean()) if known.any() else np.nan for key, groups in nearest.items()}
-    return {**shares, "of": float(known.sum())}
+    shares = {f"first_{count}": (ranks <= count).mean() for count in (1, 5, 10)}
+    return {**shares, "median_rank": np.median(ranks)}
 
 
 def _index(model: SearchModel, corpus: SplitStore, records: Sequence[int]) -> Index:

@@ -76,10 +76,7 @@ class SplitStore:
 
     def words(self, records: Iterable[int]) -> set[str]:
         """The words of the sentences of some records."""
-        words: set[str] = set()
-        for sentence in chain.from_iterable(self.references(records)):
-            words.update(sentence.split())
-        return words
+        return set(" ".join(chain.from_iterable(self.references(records))).split())
 
     def people(self, records: Iterable[int]) -> set[str]:
         """The people that move in some records."""
@@ -107,34 +104,29 @@ class SplitStore:
 
 def split_as(manifest: Manifest, store: Store) -> SplitStore:
     """The store divided as the manifest of a run or bundle says; DataError if it was not trained on this store."""
-    train_count, validation_names, test_names = _split_of(manifest)
+    try:
+        split = manifest.training["split"]
+        train_count = int(split["train"])
+        validation_names = set(split["validation"])
+        test_names = set(split["test"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
+    names = [entry.name for entry in store.records]
     held_out = validation_names | test_names
-    train = _matching(store, lambda name: name not in held_out)
-    validation = _matching(store, lambda name: name in validation_names)
-    test = _matching(store, lambda name: name in test_names)
+    train = matching(names, lambda name: name not in held_out)
     # the store has these motions, and no others
-    complete = len(store.records) == train_count + len(validation_names) + len(test_names)
-    all_present = held_out <= {entry.name for entry in store.records}
-    if not all_present or not complete or len(train) != train_count:
+    if not held_out <= set(names) or len(train) != train_count:
         raise DataError(
             f"{manifest.name} was not trained on this data: its {train_count} training, {len(validation_names)} "
             f"validation and {len(test_names)} test motions are not the {len(store.records)} that are here"
         )
-    return SplitStore(store, Split(train, validation, test))
+    validation = matching(names, validation_names.__contains__)
+    return SplitStore(store, Split(train, validation, matching(names, test_names.__contains__)))
 
 
-def _split_of(manifest: Manifest) -> tuple[int, set[str], set[str]]:
-    """The number of training motions, and the names of validation and test motions; DataError without them."""
-    try:
-        split = manifest.training["split"]
-        return int(split["train"]), set(split["validation"]), set(split["test"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise DataError(f"{manifest.name} does not say which motions it was trained on") from error
-
-
-def _matching(store: Store, wanted: Callable[[str], bool]) -> tuple[int, ...]:
+def matching(names: Sequence[str], wanted: Callable[[str], bool]) -> tuple[int, ...]:
     """The records whose names are wanted."""
-    return tuple(record for record, entry in enumerate(store.records) if wanted(entry.name))
+    return tuple(record for record, name in enumerate(names) if wanted(name))
 
 
 def plain(sentence: str) -> str:

@@ -20,6 +20,7 @@ from motet.representation.contract import named
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
 from motet_train.evaluate.positions import length
+from motet_train.evaluate.tables import Figures
 
 ZERO = "zero velocity"
 CONSTANT = "constant velocity"
@@ -77,12 +78,12 @@ def best(errors: Sequence[Array]) -> Array:
     return decays
 
 
-def by_frame(errors: Array) -> dict[str, float]:
+def by_frame(errors: Array) -> Figures:
     """Errors (N,) at the reported frames, "frame_1" and so on."""
-    return {f"frame_{frame}": float(errors[frame]) for frame in REPORTED}
+    return {f"frame_{frame}": errors[frame] for frame in REPORTED}
 
 
-def cells(figures: Mapping[str, float], digits: int) -> list[str]:
+def cells(figures: Figures, digits: int) -> list[str]:
     """Figures by frame as text, empty for NaN."""
     return [f"{value:.{digits}f}" if np.isfinite(value) else "" for value in figures.values()]
 
@@ -169,7 +170,7 @@ def floors(windows: Windows, decays: Decays) -> dict[str, Array]:
     return {name: predictions[name] for name in FLOORS}
 
 
-def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> dict[str, tuple[Array, Array]]:
+def chosen(store: Store, held_out: Sequence[str], fps: float, frames: int) -> Decays:
     """The decays that are best on windows of a store's training motions, those that are not ``held_out``.
 
     First the decays of the joints relative to the root are chosen by the distances relative to it, then those of its

@@ -11,8 +11,8 @@ slide: how far the balls of the feet slide in a stance (:mod:`motet_train.evalua
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain, combinations
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -25,7 +25,7 @@ from motet.motion.motion import Motion
 from motet.motion.rotations import Array
 from motet.predict.model import PredictModel
 from motet_train.evaluate.positions import BALLS, length, slide, stances
-from motet_train.evaluate.tables import Report, aligned, short_names
+from motet_train.evaluate.tables import Figures, Report, Reports, aligned, short_names
 
 SPANS = ((0, 1), (1, 5), (5, 30))
 """Seconds after the recording's end."""
@@ -36,12 +36,14 @@ KEPT_CHANGE = 0.15
 CONTINUED = {"still": "standing still", "alone": "{name}, alone", "beyond": "{name}, then the writer"}
 """System -> its name in tables: standing still, the predictor alone, and with a continuation beyond its horizon."""
 
-Figures = dict[str, Report]
+Alive = dict[str, Report]
 """Group of recordings -> system -> its figures, see :func:`figures`; "recorded" and "samples" are among the systems."""
 
 
-@dataclass(frozen=True)
-class Trajectory:
+Rows = list[Sequence[str]]
+
+
+class Trajectory(NamedTuple):
     """Positions (T, J, 3) of the humanoid's joints in metres, at ``fps`` frames a second."""
 
     points: Array
@@ -109,7 +111,7 @@ def going(trials: Mapping[str, Motion], writer: CodesModel) -> dict[str, dict[st
     return groups
 
 
-def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motion]) -> Figures:
+def measured(model: PredictModel, writer: CodesModel, trials: Mapping[str, Motion]) -> Alive:
     """The figures of the recordings that go at their end; empty without any, or if one is not of a human."""
     try:
         groups = going(trials, writer)
@@ -154,7 +156,7 @@ def _continued(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[
     return {system: Trajectory(np.concatenate([last_frame, points[system]]), model.fps) for system in CONTINUED}
 
 
-def figures(pairs: Sequence[tuple[Trajectory, Trajectory]]) -> dict[str, float]:
+def figures(pairs: Sequence[tuple[Trajectory, Trajectory]]) -> Figures:
     """Figures of pairs of an input and its continuation, whose first frame is the input's last: for each span the
     medians of relative speeds and energies, the share of motions that keep their speed, and the slide."""
     report = {}
@@ -164,9 +166,9 @@ def figures(pairs: Sequence[tuple[Trajectory, Trajectory]]) -> dict[str, float]:
         speeds = np.array([part.paces.mean() / end.paces.mean() for end, part in both])
         energies = [part.energy / end.energy for end, part in both]
         span = f"{start}_{stop}_s"
-        report[f"speed_{span}"] = float(np.median(speeds))
+        report[f"speed_{span}"] = np.median(speeds)
         report[f"kept_{span}"] = float(np.mean(np.abs(speeds - 1) <= KEPT_CHANGE))
-        report[f"energy_{span}"] = float(np.median(energies))
+        report[f"energy_{span}"] = np.median(energies)
         report[f"slide_cm_{span}"] = _slide(part for _, part in both)
     return report
 
@@ -179,7 +181,7 @@ def _slide(parts: Iterable[Trajectory]) -> float:
     return 100 * slide(every_stance)
 
 
-def _sample_distances(model: PredictModel, writer: CodesModel, motion: Motion) -> dict[str, float]:
+def _sample_distances(model: PredictModel, writer: CodesModel, motion: Motion) -> Figures:
     """Mean distances between joints of three futures, centimetres, at the end of the first two spans: in the world
     ("place") and relative to the root ("pose")."""
     frames = round(SPANS[1][1] * model.fps)
@@ -202,24 +204,22 @@ def _mean_distance_cm(points: Sequence[Array]) -> float:
     return 100 * float(np.mean([length(first - second).mean() for first, second in combinations(points, 2)]))
 
 
-def alive_table(figures: Mapping[str, Figures]) -> str:
+def alive_table(figures: Mapping[str, Alive]) -> str:
     """The figures of several models, by name, as text; "" without any."""
-    kinds = dict.fromkeys(chain.from_iterable(figures.values()))
-    rows: list[Sequence[str]] = []
-    for kind in kinds:
+    rows: Rows = []
+    for kind in dict.fromkeys(chain.from_iterable(figures.values())):
         reports = {name: groups[kind] for name, groups in figures.items() if kind in groups}
-        names = short_names(list(reports))
         if rows:
             rows.append([""])
-        rows += _rows(kind, dict(zip(names, reports.values(), strict=True)))
+        rows += _rows(kind, dict(zip(short_names(list(reports)), reports.values(), strict=True)))
     return aligned(rows)
 
 
-def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
+def _rows(kind: str, reports: Reports) -> Rows:
     # the head, and the recordings
     recorded = next(iter(reports.values()))["recorded"]
     spans = ", ".join(f"{start}-{stop}" for start, stop in SPANS)
-    rows: list[Sequence[str]] = [
+    rows: Rows = [
         [f"{recorded['recordings']:.0f} {kind} continued; after {spans} s"],
         ["", "speed / given", "within 15%", "energy / given", "slide, cm"],
         ["  the recordings", "", "", "", f"{recorded['slide_cm']:.1f}"],
@@ -227,35 +227,27 @@ def _rows(kind: str, reports: Mapping[str, Report]) -> list[Sequence[str]]:
 
     # standing still is the same for all models, so only the first has its row
     systems = list(CONTINUED)
+    formats = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
+    names = [f"{start}_{stop}" for start, stop in SPANS]
     for name, report in reports.items():
         for system in systems:
-            rows.append([f"  {CONTINUED[system].format(name=name)}", *_span_cells(report[system])])
+            cells = [_cell(report[system], key, form, names) for key, form in formats.items()]
+            rows.append([f"  {CONTINUED[system].format(name=name)}", *cells])
         systems = systems[-2:]
     return rows + _future_rows(reports)
 
 
-def _future_rows(reports: Mapping[str, Report]) -> list[Sequence[str]]:
+def _future_rows(reports: Reports) -> Rows:
     """How different several futures are."""
-    stops = ", ".join(str(stop) for _, stop in SPANS[:2])
-    rows: list[Sequence[str]] = [["  joints of different futures apart, cm: in the world, seen from the root"]]
+    stops = [str(stop) for _, stop in SPANS[:2]]
+    rows: Rows = [["  joints of different futures apart, cm: in the world, seen from the root"]]
     for name, report in reports.items():
-        rows.append([f"  {name} after {stops} s", *_sample_cells(report["samples"])])
+        place = _cell(report["samples"], "place_cm", ".0f", stops)
+        pose = _cell(report["samples"], "pose_cm", ".0f", stops)
+        rows.append([f"  {name} after {', '.join(stops)} s", place, "", pose, ""])
     return rows
 
 
-def _sample_cells(samples: Mapping[str, float]) -> list[str]:
-    """The distances between futures in the world and relative to the root, with empty cells between."""
-    texts = []
-    for key in ("place", "pose"):
-        texts.append("  ".join(f"{samples[f'{key}_cm_{stop}_s']:.0f}" for _, stop in SPANS[:2]))
-    return [texts[0], "", texts[1], ""]
-
-
-def _span_cells(figures: Mapping[str, float]) -> list[str]:
-    """A cell for each measure, with its figures over all spans."""
-    formats = {"speed": ".2f", "kept": "4.0%", "energy": ".2f", "slide_cm": "4.1f"}
-    cells = []
-    for key, form in formats.items():
-        values = [figures[f"{key}_{start}_{stop}_s"] for start, stop in SPANS]
-        cells.append("  ".join(f"{value:{form}}" for value in values))
-    return cells
+def _cell(figures: Figures, key: str, form: str, spans: Sequence[str]) -> str:
+    """A figure over several spans."""
+    return "  ".join(f"{figures[f'{key}_{span}_s']:{form}}" for span in spans)

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from motet.bundle.fields import Json
 from motet.motion.motion import Motion
-from motet.motion.rotations import Array
+from motet.motion.rotations import Array, Indices
 from motet.predict.model import PredictModel
 from motet.representation.contract import named
 from motet_train.data.errors import DataError
@@ -57,7 +57,7 @@ PLACE, POSE, BONES = TITLES
 RIVALS = (*FLOORS, PLAIN_MLP, PLAIN_BONES)
 """What models are compared with, in the order of tables."""
 
-COUNTS = ("people", "recordings", "windows")
+Models = Mapping[str, PredictModel]
 
 MOTION_KINDS: Mapping[str, str] = {
     "boxing": "boxing|boxers?|punch|punches|punching|jabs?",
@@ -85,22 +85,20 @@ def kind_of(entry: Entry) -> str:
         return EVERYTHING_ELSE
     words = [re.findall(r"[a-z]+", text.lower()) for text in texts]
     for kind, pattern in MOTION_KINDS.items():
-        matching = [text_words for text_words in words if _any_matches(pattern, text_words)]
+        matching = [text_words for text_words in words if any(map(re.compile(pattern).fullmatch, text_words))]
         if 2 * len(matching) >= len(texts):
             return kind
     return EVERYTHING_ELSE
 
 
-def _any_matches(pattern: str, words: Sequence[str]) -> bool:
-    return any(re.fullmatch(pattern, word) for word in words)
-
-
 def by_kind(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
     """The records of each kind that has any, in the order of :data:`MOTION_KINDS`, everything else last."""
-    kinds: dict[str, list[Entry]] = {kind: [] for kind in (*MOTION_KINDS, EVERYTHING_ELSE)}
-    for entry in entries:
-        kinds[kind_of(entry)].append(entry)
-    return {kind: members for kind, members in kinds.items() if members}
+    kinds = {}
+    for kind in (*MOTION_KINDS, EVERYTHING_ELSE):
+        members = [entry for entry in entries if kind_of(entry) == kind]
+        if members:
+            kinds[kind] = members
+    return kinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +115,11 @@ class Measured:
     seeds: tuple[Motion, ...]
     speeds: Array
 
-    def windows(self, entries: Collection[Entry]) -> NDArray[np.intp]:
+    def windows(self, entries: Collection[Entry]) -> Indices:
         """The indices of the windows of some recordings."""
         return np.flatnonzero(np.isin(self.names, [entry.name for entry in entries]))
 
-    def by_going(self, entries: Sequence[Entry]) -> dict[str, NDArray[np.intp]]:
+    def by_going(self, entries: Sequence[Entry]) -> dict[str, Indices]:
         """The indices of the windows that begin on the way somewhere, of the others by :data:`ANIMALS`, and of the
         rest; only those that there are."""
         going = self.speeds > GOING
@@ -129,27 +127,27 @@ class Measured:
         parts = {"going": going, "animals": animal & ~going, "others": ~animal & ~going}
         return {name: np.flatnonzero(part) for name, part in parts.items() if part.any()}
 
-    def part(self, name: str, entries: Sequence[Entry], windows: NDArray[np.intp]) -> dict[str, Any]:
+    def part(self, name: str, entries: Sequence[Entry], windows: Indices) -> Json:
         """The figures of a system, and of floors by their names, in some windows of recordings."""
         # how much is measured, then the system and the floors
         names = {self.names[window] for window in windows.tolist()}
         people = {entry.subject for entry in entries if entry.name in names}
-        counts = dict(zip(COUNTS, (len(people), len(names), len(windows)), strict=True))
+        counts = {"people": len(people), "recordings": len(names), "windows": len(windows)}
         figures: dict[str, Any] = {**counts, **self._means(name, windows)}
         for floor in RIVALS:
             if floor in self.distances:
                 figures[key(floor)] = self._means(floor, windows)
         # and how often standing still is nearer in the end
         last = self.distances[name][PLACE][windows, REPORTED[-1]]
-        figures["behind_standing"] = float((last > self.distances[ZERO][PLACE][windows, REPORTED[-1]]).mean())
+        figures["behind_standing"] = (last > self.distances[ZERO][PLACE][windows, REPORTED[-1]]).mean()
         return figures
 
-    def _means(self, system: str, windows: NDArray[np.intp]) -> dict[str, Any]:
+    def _means(self, system: str, windows: Indices) -> Json:
         """Measure -> a system's mean distances at the reported frames in some windows."""
         return {measure: by_frame(errors[windows].mean(axis=0)) for measure, errors in self.distances[system].items()}
 
 
-def mocap_report(models: Mapping[str, PredictModel], results: Measured, trials: Sequence[Entry]) -> dict[str, Any]:
+def mocap_report(models: Models, results: Measured, trials: Sequence[Entry]) -> Json:
     """The figures of each model: mean distances of joints in the world, "place_cm", and relative to the root,
     "pose_cm", in all windows, those of the floors, and both by "kinds" of motions; and for models that predict their
     errors the "calibration"."""
@@ -168,7 +166,7 @@ def mocap_report(models: Mapping[str, PredictModel], results: Measured, trials: 
     return reports
 
 
-def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.intp]]) -> dict[str, Any]:
+def calibration(expected: Array, true: Array, kinds: Mapping[str, Indices]) -> Json:
     """Expected and measured errors (W, N) in centimetres, compared at the reported frames.
 
     "ratio": measured over expected, ideally 1, in "all" windows and in each of ``kinds``, kind -> indices of its
@@ -183,15 +181,13 @@ def calibration(expected: Array, true: Array, kinds: Mapping[str, NDArray[np.int
 def _rank_correlations(expected: Array, true: Array) -> Array:
     """Spearman's correlation (N,) at each frame of two errors (W, N), NaN where one of the two is constant."""
     correlations = []
-    for expected_at_frame, true_at_frame in zip(expected.T, true.T, strict=True):
-        if np.ptp(expected_at_frame) > 0 and np.ptp(true_at_frame) > 0:
-            correlations.append(spearmanr(expected_at_frame, true_at_frame).statistic)
-        else:
-            correlations.append(np.nan)
+    for errors in zip(expected.T, true.T, strict=True):
+        varies = np.ptp(errors, axis=1).all()
+        correlations.append(spearmanr(*errors).statistic if varies else np.nan)
     return np.array(correlations)
 
 
-def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
+def calibration_rows(figures: Json) -> list[list[str]]:
     """Rows of a table, after a head with the frames."""
     # ratios by kind, and ranks
     rows = [["measured mean error over the expected one, joints in the world"]]
@@ -202,7 +198,7 @@ def calibration_rows(figures: Mapping[str, Any]) -> list[list[str]]:
     return rows
 
 
-def mocap_text(reports: Mapping[str, Any], fps: float) -> str:
+def mocap_text(reports: Json, fps: float) -> str:
     """The distances in all motions and in each kind, and the calibration of models that predict their errors."""
     # the head: frames and their times
     milliseconds = [f"{(frame + 1) / fps * 1000:.0f}" for frame in REPORTED]
@@ -220,10 +216,10 @@ def mocap_text(reports: Mapping[str, Any], fps: float) -> str:
     return aligned(rows)
 
 
-def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
+def _kind_rows(kind: str, parts: Json) -> list[list[str]]:
     """The rows of a kind of motions; floors and counts are the same for all models."""
     first = next(iter(parts.values()))
-    counts = ", ".join(f"{first[count]} {count}" for count in COUNTS)
+    counts = ", ".join(f"{first[count]} {count}" for count in ("people", "recordings", "windows"))
     # measure after measure: floors, then models
     rows = [[f"{kind}: {counts}"]]
     for measure in TITLES if kind == "all" else (PLACE,):
@@ -238,7 +234,7 @@ def _kind_rows(kind: str, parts: Mapping[str, Any]) -> list[list[str]]:
     return rows
 
 
-def held_out(models: Mapping[str, PredictModel], store: Store) -> dict[Entry, Motion]:
+def held_out(models: Models, store: Store) -> dict[Entry, Motion]:
     """The records of a store that all models held out, and their motions; DataError if the store has none of them."""
     test = set.intersection(*map(_tested, models.values()))
     playable = named(store.representation).motion
@@ -248,7 +244,7 @@ def held_out(models: Mapping[str, PredictModel], store: Store) -> dict[Entry, Mo
     return motions
 
 
-def chosen_decays(models: Mapping[str, PredictModel], store: Store) -> Decays:
+def chosen_decays(models: Models, store: Store) -> Decays:
     """The decays of damped velocity, chosen on the motions that no model holds out for its test."""
     first = next(iter(models.values()))
     test = set.union(*map(_tested, models.values()))
@@ -259,7 +255,7 @@ def _tested(model: PredictModel) -> set[str]:
     return set(model.manifest.training.get("data", {}).get("test", ()))
 
 
-def plain_mlp(models: Mapping[str, PredictModel], store: Store) -> PlainMLP:
+def plain_mlp(models: Models, store: Store) -> PlainMLP:
     """The plain MLP, trained on the motions of a store that no model holds out, for the seed and horizon of the
     first."""
     first = next(iter(models.values()))
@@ -274,7 +270,7 @@ def _held(model: PredictModel) -> set[str]:
 
 
 def measured(
-    models: Mapping[str, PredictModel],
+    models: Models,
     motions: Mapping[str, Motion],
     decays: Decays,
     rival: PlainMLP | None = None,
@@ -306,14 +302,14 @@ def _by_plain_mlp(rival: PlainMLP, seeds: Sequence[Motion]) -> dict[str, Array]:
     return {PLAIN_MLP: 100 * points, PLAIN_BONES: 100 * with_bones(points)}
 
 
-def distances_of(predicted: Array, truth: Array, parents: NDArray[np.intp]) -> dict[str, Array]:
+def distances_of(predicted: Array, truth: Array, parents: Indices) -> dict[str, Array]:
     """How far predicted joints (W, N, J, 3) are from recorded ones, by measure."""
     in_world, relative = apart(predicted, truth)
     bones = _lengths(predicted, parents) - _lengths(truth, parents)
     return {PLACE: in_world, POSE: relative, BONES: abs(bones).mean(axis=-1)}
 
 
-def _lengths(joints: Array, parents: NDArray[np.intp]) -> Array:
+def _lengths(joints: Array, parents: Indices) -> Array:
     """The lengths (..., J - 1) of the bones between joints (..., J, 3)."""
     return length(joints[..., 1:, :] - joints[..., parents[1:], :])
 
@@ -340,7 +336,7 @@ def _cut(motions: Mapping[str, Motion], model: PredictModel) -> tuple[list[str],
     return names, windows
 
 
-def shown(models: Mapping[str, PredictModel], motion: Motion) -> dict[str, Motion]:
+def shown(models: Models, motion: Motion) -> dict[str, Motion]:
     """One horizon from the middle of a motion: the truth, and each model's prediction, with models as in
     :func:`measured`."""
     first = next(iter(models.values()))

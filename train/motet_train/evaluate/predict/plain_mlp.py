@@ -86,10 +86,9 @@ def seen_from_last(windows: Tensor, seed: int) -> tuple[Tensor, Tensor, Tensor]:
 
 def _turn_along(across: Tensor) -> Tensor:
     """The turns (W, 3, 3) about the vertical that take x to where vectors (W, 3) point over the ground."""
-    cos, _, sin = functional.normalize(across * torch.tensor([1.0, 0.0, 1.0]), dim=-1).unbind(-1)
-    zero = torch.zeros_like(cos)
-    rows = [cos, zero, -sin, zero, torch.ones_like(cos), zero, sin, zero, cos]
-    return torch.stack(rows, dim=-1).reshape(*cos.shape, 3, 3)
+    ahead = functional.normalize(across * torch.tensor([1.0, 0.0, 1.0]), dim=-1)
+    up = torch.tensor([0.0, 1.0, 0.0]).expand_as(ahead)
+    return torch.stack([ahead, up, torch.linalg.cross(ahead, up)], dim=-1)
 
 
 def mirrored(places: Tensor) -> Tensor:

@@ -17,7 +17,7 @@ SYSTEMS: Mapping[str, tuple[type[Any], type[Any], str]] = {
     "rrnn": (recurrent.RRNN, recurrent.RRNNConfig, "the residual recurrent net (Martinez et al. 2017)"),
     "erd": (
         recurrent.EncoderRecurrentDecoder,
-        recurrent.ERDConfig,
+        recurrent.LSTM3LRConfig,
         "the encoder-recurrent-decoder (Fragkiadaki et al. 2015)",
     ),
     "lstm-3lr": (

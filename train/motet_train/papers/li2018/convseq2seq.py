@@ -56,26 +56,14 @@ class Convolution(nn.Module):
         self.kernel = kernel
         self.padding = padding
 
-    def size(self, frames: int, channels: int) -> tuple[int, int]:
-        """The size of the output for an image of frames x channels."""
-        if self.padding == "same":
-            return -(-frames // 2), -(-channels // 2)
-        return (frames - self.kernel[0]) // 2 + 1, (channels - self.kernel[1]) // 2 + 1
-
     def forward(self, x: Tensor) -> Tensor:
         """(B, inputs, T, D) to (B, outputs, T', D')."""
         if self.padding == "same":
-            frames, channels = x.shape[2:]
-            frames_out, channels_out = self.size(frames, channels)
-            extra_frames = max(0, 2 * (frames_out - 1) + self.kernel[0] - frames)
-            extra_channels = max(0, 2 * (channels_out - 1) + self.kernel[1] - channels)
-            # torch pads the last axis first; of an odd number, one more goes after
-            x = pad(x, [*_halves(extra_channels), *_halves(extra_frames)])
+            # so many zeros that every second frame and channel has an output; of an odd number, one more goes after
+            rows, columns = (max(0, size - 2 + n % 2) for size, n in zip(self.kernel, x.shape[2:], strict=True))
+            # torch pads the last axis first
+            x = pad(x, [columns // 2, -(-columns // 2), rows // 2, -(-rows // 2)])
         return leaky_relu(conv2d(x, self.weight, stride=2), LEAKY_SLOPE)
-
-
-def _halves(total: int) -> tuple[int, int]:
-    return total // 2, total - total // 2
 
 
 class EncodingModule(nn.Module):
@@ -86,20 +74,19 @@ class EncodingModule(nn.Module):
 
     def __init__(self, frames: int, config: Config, filters: tuple[int, ...]) -> None:
         super().__init__()
-        size = (frames, config.dimensions)
-        inputs = 1
+        image = torch.zeros(1, 1, frames, config.dimensions)
         layers: list[nn.Module] = []
-        # each convolution shrinks the image
-        for outputs, rate in zip(filters, config.dropout, strict=True):
-            layer = Convolution(inputs, outputs, config.kernel, config.padding)
-            layers += [layer, nn.Dropout(rate)]
-            size = layer.size(*size)
-            inputs = outputs
-        if min(size) < 1:
-            image = f"{frames} frames of {config.dimensions} channels"
-            raise DataError(f"{image} are too few for these convolutions without padding: use padding 'same'")
+        try:
+            # each convolution shrinks the image
+            for outputs, rate in zip(filters, config.dropout, strict=True):
+                layer = Convolution(image.shape[1], outputs, config.kernel, config.padding)
+                layers += [layer, nn.Dropout(rate)]
+                image = layer(image)
+        except RuntimeError as error:
+            few = f"{frames} frames of {config.dimensions} channels are too few for these convolutions"
+            raise DataError(f"{few} without padding: use padding 'same'") from error
         self.layers = nn.Sequential(*layers, nn.Flatten())
-        self.linear = nn.Linear(inputs * size[0] * size[1], config.units)
+        self.linear = nn.Linear(image[0].numel(), config.units)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Frames (B, T, D) to (B, U)."""
@@ -157,9 +144,7 @@ class ConvSeq2Seq(System):
         """A free run that may feed back predicted frames mixed with true ones (eq. 10)."""
         seed = windows[:, :seed_frames]
         truth = windows[:, seed_frames:]
-        return free_run(
-            self, seed, truth.shape[1], truth if self.config.predicted_share < 1 else None, self.config.predicted_share
-        )
+        return free_run(self, seed, truth.shape[1], truth, self.config.predicted_share)
 
     def error(self, predicted: Tensor, truth: Tensor) -> Tensor:
         """The mean squared error (eq. 7), per channel; or the mean distance over the root of the number of channels."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from motet_train.data.archive import Archive
 from motet_train.data.cmu_trials import CMU_LICENCE
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material
+from motet_train.data.table import read_toml
+from motet_train.models.net import configured
 
 STRIDE = 2
 """The protocol uses every second frame of a file."""
@@ -59,7 +61,7 @@ class Layout:
     train: Mapping[str, Sequence[str]]
     test: Mapping[str, Sequence[str]]
     fps: float
-    pairs: tuple[tuple[int, int, int], ...] = ()
+    pairs: tuple[tuple[int, int, int], ...]
     extra: tuple[str, ...] = ()
     first: int = 0
     room: int = PROTOCOL_WINDOW
@@ -71,53 +73,9 @@ class Layout:
         return [*chain.from_iterable(self.train.values()), *chain.from_iterable(self.test.values())]
 
 
-# fmt: off
-CMU_ACTIONS = (
-    "basketball", "basketball_signal", "directing_traffic", "jumping", "running", "soccer", "walking", "washwindow",
-)
-H36M_ACTIONS = (
-    "directions", "discussion", "eating", "greeting", "phoning", "posing", "purchases", "sitting", "sittingdown",
-    "smoking", "takingphoto", "waiting", "walking", "walkingdog", "walkingtogether",
-)
-# fmt: on
-
-
-def _numbered(stem: str, count: int) -> list[str]:
-    return [f"{stem}_{number}.txt" for number in range(1, count + 1)]
-
-
-def _of_subject(subject: int) -> list[str]:
-    """The files of all actions of a subject of Human3.6M."""
-    return list(chain.from_iterable(_numbered(f"S{subject}/{action}", 2) for action in H36M_ACTIONS))
-
-
-CMU_LAYOUT = Layout(
-    "cmu-expmap",
-    117,
-    {action: _numbered(f"train/{action}/{action}", 5) for action in CMU_ACTIONS},
-    {action: _numbered(f"test/{action}/{action}", 1) for action in CMU_ACTIONS},
-    120.0,
-    pairs=((6, 24, 18), (63, 90, 27)),
-    extra=("basketball_signal", "directing_traffic"),
-)
-"""Li et al. 2018: five training trials and one test trial of eight actions."""
-
-H36M_LAYOUT = Layout(
-    "h36m-expmap",
-    99,
-    {f"S{subject}": _of_subject(subject) for subject in (1, 6, 7, 8, 9, 11)},
-    {action: _numbered(f"S5/{action}", 2) for action in H36M_ACTIONS},
-    50.0,
-    pairs=((21, 6, 15), (51, 75, 24)),
-    first=16,
-    room=150,
-    padding="same",
-)
-"""Human3.6M in its usual division: two trials of fifteen actions, with subject 5 for testing.
-
-Its 32 joints are the hips, the right leg, the left leg, the spine with the head, the left arm and the right arm (Jain
-et al. 2016). The hips lie along x, and all other bones along y or z, so left and right are mirrored like CMU's.
-"""
+LAYOUTS = read_toml(__file__, "layouts.toml")
+CMU_LAYOUT: Layout = configured(Layout, LAYOUTS["cmu"])
+H36M_LAYOUT: Layout = configured(Layout, LAYOUTS["h36m"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +92,7 @@ class ExpmapCorpus:
         return {group: files for group, files in self.train.items() if group in self.test} or self.train
 
 
-@dataclass(frozen=True, eq=False)
-class Scaling:
+class Scaling(NamedTuple):
     """Statistics over all training frames, not sub-sampled (protocol). mean, std: (C,). kept: columns that vary."""
 
     mean: Array
@@ -329,8 +286,6 @@ def _sequence(frames: Array) -> Floats:
 
 def _mirrored_columns(layout: Layout) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """Columns and signs that mirror frames: left is along x, so its translation and turns about y and z change sign."""
-    if not layout.pairs:
-        return (), ()
     # exchange the columns of both sides
     columns = np.arange(layout.columns)
     for left, right, width in layout.pairs:

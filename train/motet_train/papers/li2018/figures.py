@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.motion.kinematics import skeleton_of
+from motet.motion.kinematics import chained, skeleton_of
 from motet.motion.rotations import Array, axis_to_rotmat, rotvec_to_rotmat
 from motet.motion.skeleton import Skeleton
 from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import cmu_trial
-from motet_train.evaluate.figures import SPACING, Drawings, bones_of, error_over_time, in_profile, panels, stick_figures
+from motet_train.evaluate.figures import SPACING, Drawings, error_over_time, in_profile, panels, stick_figures
 from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, SEED_FRAMES, STRIDE, ExpmapCorpus
 from motet_train.papers.li2018.protocol import predictor, windows
 from motet_train.papers.li2018.report import MANY, Results
@@ -53,7 +53,7 @@ def drawings(results: Results) -> Drawings:
 
 
 def places(frames: Array, skeleton: Skeleton) -> Array:
-    """Places (..., J, 3) of joints of frames (..., 3 + 3 J), in the skeleton's unit.
+    """Places (T, J, 3) of joints of frames (T, 3 + 3 J), in the skeleton's unit.
 
     The root is at the origin and faces along z; its lean is kept. MotionError if the skeleton has another number of
     joints.
@@ -63,20 +63,12 @@ def places(frames: Array, skeleton: Skeleton) -> Array:
         raise MotionError(f"frames of {frames.shape[-1]} columns do not fit a skeleton of {count} joints")
     vectors = frames[..., 3:].reshape(*frames.shape[:-1], count, 3)
     rotations = np.swapaxes(rotvec_to_rotmat(vectors), -1, -2)
-    rotations[..., 0, :, :] = _without_heading(rotations[..., 0, :, :])
-    # forward kinematics, parents first
-    points = np.zeros_like(vectors)
-    for i, joint in enumerate(skeleton.joints[1:], start=1):
-        parent = rotations[..., joint.parent, :, :]
-        points[..., i, :] = points[..., joint.parent, :] + parent @ np.array(joint.offset)
-        rotations[..., i, :, :] = parent @ rotations[..., i, :, :]
-    return points
-
-
-def _without_heading(root: Array) -> Array:
+    root = rotations[..., 0, :, :]
     heading = np.arctan2(root[..., 0, 2], root[..., 2, 2])
-    level: Array = axis_to_rotmat("y", -heading) @ root
-    return level
+    rotations[..., 0, :, :] = axis_to_rotmat("y", -heading) @ root
+    bones = np.tile(skeleton.offsets, (len(frames), 1, 1))
+    bones[:, 0] = 0
+    return chained(skeleton, rotations, bones)[1]
 
 
 def strips(
@@ -103,15 +95,14 @@ def strips_drawing(strips: Mapping[str, Array], skeleton: Skeleton) -> Figure:
     The first strip is the truth, which is also drawn in grey behind the others.
     """
     truth = next(iter(strips.values()))
-    bones = bones_of(skeleton)
     width = 13
     height = 0.4 + 1.1 * width / (SPACING * (len(truth) + 1))
     figure, axes = panels(len(strips), 1, (width, height * len(strips)))
     # each strip over the truth
     for axis, (title, points) in zip(axes, strips.items(), strict=True):
         if points is not truth:
-            stick_figures(axis, in_profile(truth, skeleton), bones, ["0.75"] * len(truth))
+            stick_figures(axis, in_profile(truth, skeleton), skeleton, ["0.75"] * len(truth))
         colours = ["tab:blue"] * SEED_POSES + ["black"] * (len(points) - SEED_POSES)
-        stick_figures(axis, in_profile(points, skeleton), bones, colours)
+        stick_figures(axis, in_profile(points, skeleton), skeleton, colours)
         axis.set_title(title, loc="left")
     return figure

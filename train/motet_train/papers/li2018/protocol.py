@@ -65,14 +65,15 @@ def rotmat_to_protocol_euler(matrix: Array) -> Array:
 
 def euler_frames(frames: Array) -> Array:
     """Frames (..., C) of exponential maps to frames (..., C) of Euler angles; the root's six columns become 0."""
-    angles = rotmat_to_protocol_euler(_rotations(frames)).reshape(*frames.shape[:-1], -1)
+    angles = rotmat_to_protocol_euler(rotvec_to_rotmat(_vectors(frames))).reshape(*frames.shape[:-1], -1)
     result = np.zeros(frames.shape)
     result[..., ROOT_COLUMNS:] = angles[..., 3:]
     return result
 
 
-def _rotations(frames: Array) -> Array:
-    return rotvec_to_rotmat(frames[..., 3:].reshape(*frames.shape[:-1], -1, 3))
+def _vectors(frames: Array, first: int = 3) -> Array:
+    """The exponential maps (..., J, 3) of frames (..., C) from a column on, by default with the root's."""
+    return frames[..., first:].reshape(*frames.shape[:-1], -1, 3)
 
 
 def window_starts(
@@ -120,18 +121,13 @@ def rotation_errors(predicted: Array, truth: Array) -> Array:
     Not part of the protocol, but without the leaps of Euler errors where a joint passes gimbal lock. Arguments as in
     :func:`window_errors`.
     """
-    true_vectors = _joint_vectors(truth)
+    true_vectors = _vectors(truth, ROOT_COLUMNS)
     moving = (true_vectors.std(axis=1, keepdims=True) > CONSTANT_STD).any(axis=-1)
     # the Frobenius norm of the difference of two matrices is sqrt(8) sin(angle / 2)
-    difference = rotvec_to_rotmat(_joint_vectors(predicted)) - rotvec_to_rotmat(true_vectors[:, SEED_FRAMES:])
+    difference = rotvec_to_rotmat(_vectors(predicted, ROOT_COLUMNS)) - rotvec_to_rotmat(true_vectors[:, SEED_FRAMES:])
     half_sin = np.linalg.norm(difference, axis=(-2, -1)) / np.sqrt(8)
     angles = 2 * np.degrees(np.arcsin(np.minimum(half_sin, 1.0)))
     return np.asarray((angles * moving).sum(axis=-1) / np.maximum(moving.sum(axis=-1), 1))
-
-
-def _joint_vectors(frames: Array) -> Array:
-    """The exponential maps (..., J, 3) of frames (..., C), without the root's."""
-    return frames[..., ROOT_COLUMNS:].reshape(*frames.shape[:-1], -1, 3)
 
 
 def predictions(
@@ -180,7 +176,7 @@ def velocity(decays: Array | float) -> Continuation:
 
     def go_on(seed: Array) -> Array:
         last = seed[:, -2:]
-        vectors = rotmat_to_rotvec(turned_on(_rotations(last), steps))
+        vectors = rotmat_to_rotvec(turned_on(rotvec_to_rotmat(_vectors(last)), steps))
         return np.concatenate([gone_on(last[..., :3], steps), vectors.reshape(*vectors.shape[:2], -1)], axis=-1)
 
     return go_on

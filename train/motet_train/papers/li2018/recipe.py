@@ -12,8 +12,10 @@ from torch.nn.functional import softplus
 from motet.bundle.fields import Json
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, Windows
+from motet_train.data.table import read_toml
 from motet_train.descent import Descent, GradientLearner, Term, Terms, Training
-from motet_train.papers.li2018 import convseq2seq, from_config, recurrent, srnn
+from motet_train.models.net import configured
+from motet_train.papers.li2018 import SYSTEMS, convseq2seq, from_config, srnn
 from motet_train.papers.li2018.expmap import CMU_LAYOUT, OUTPUT_FRAMES, PROTOCOL_WINDOW, SEED_FRAMES, ExpmapMaterial
 from motet_train.papers.li2018.stepwise import Stepwise
 from motet_train.recipes.predict import possible
@@ -21,48 +23,23 @@ from motet_train.recipes.recipe import AUGMENTED, Job, Recipe, Visits
 from motet_train.runs import Run
 from motet_train.trainer import Part
 
-CODE = Training(steps=20_000, every=500, learning_rate=5e-5, decay=(0.99, 10_000), l2=0.0005, adversary=0.01)
-PAPER_TRAINING = Training(steps=20_000, every=500, learning_rate=2e-4, batch=64, l2=0.001, adversary=0.01)
-"""Section 4.1. How long it trains is not said there: 20,000 steps are the code's. The error is divided by the number of
-channels, as in the code, while eq. 7 sums over them; so both regularisers weigh that many times as much as in eq. 9."""
-
-SHORT_TRAINING = Training(steps=2000, every=100, falling=0.7, l2=1.4e-5, average=0.99)
-"""What learns best in a quarter of an hour on a CPU, by the error on held-out files: a higher learning rate, which
-falls; the paper's weight of the squared weights, .001, relative to an error that eq. 7 sums over 70 channels; no
-adversary, which doubles the time and brings nothing; and the running mean of the weights, as of motet's own
-predictor."""
-
-RESIDUAL = Training(steps=3000, every=250, falling=0.5, clip=5.0, average=0.99)
-"""Clipped as in Martinez et al. 2017; after 1,500 steps Adam is off by .62 on held-out files, and their SGD by .88."""
-
-TAUGHT = Training(every=100, falling=0.5, clip=25.0, average=0.99)
-"""Of nets that are taught the next frame: the clipping is that of Jain et al. 2016, who took SGD and more steps. How
-many each takes here was set by time; with twice as many, which three of them were tried with, the error on held-out
-files is smaller by seven per cent at most, see docs/predict.md."""
+PRESETS = read_toml(__file__, "recipes.toml")
 
 
-def _recipe(model: str, config: Any, training: Training, visits: Visits = AUGMENTED) -> Recipe:
-    derived = ("dimensions", "parts") if model == "srnn" else ("dimensions",)
-    return Recipe("predict", model, "free_run", config, derived, training, visits, {"horizon": OUTPUT_FRAMES})
+def _recipes(model: str) -> dict[str, Recipe]:
+    """The recipes of a model in recipes.toml, by the names of their presets."""
+    derived = {"dimensions": 0, "parts": ()} if model == "srnn" else {"dimensions": 0}
+    recipes = {}
+    for name, preset in PRESETS[model].items():
+        config = configured(SYSTEMS[model][1], {**derived, **preset.get("config", {})})
+        visits = Visits(**preset["visits"]) if "visits" in preset else AUGMENTED
+        training = configured(Training, preset["training"])
+        defaults = {"horizon": OUTPUT_FRAMES}
+        recipes[name] = Recipe("predict", model, "free_run", config, tuple(derived), training, visits, defaults)
+    return recipes
 
 
-RECIPES: Mapping[str, Mapping[str, Recipe]] = {
-    "convseq2seq": {
-        "default": _recipe("convseq2seq", convseq2seq.Config(0, padding="same", loss="distance"), SHORT_TRAINING),
-        "paper": _recipe("convseq2seq", convseq2seq.Config(0, padding="paper"), PAPER_TRAINING, Visits()),
-        "code": _recipe(
-            "convseq2seq",
-            convseq2seq.Config(0, padding="paper", dropout=(0.2, 0.2, 0.5), predicted_share=0.95),
-            CODE,
-            Visits(),
-        ),
-    },
-    "rrnn": {"default": _recipe("rrnn", recurrent.RRNNConfig(0), RESIDUAL)},
-    "erd": {"default": _recipe("erd", recurrent.ERDConfig(0), replace(TAUGHT, steps=900))},
-    "lstm-3lr": {"default": _recipe("lstm-3lr", recurrent.LSTM3LRConfig(0), replace(TAUGHT, steps=700))},
-    "srnn": {"default": _recipe("srnn", srnn.Config(0, ()), replace(TAUGHT, steps=650, learning_rate=3e-3))},
-    "lstm-ae": {"default": _recipe("lstm-ae", recurrent.LSTMAEConfig(0), replace(TAUGHT, steps=750))},
-}
+RECIPES: Mapping[str, Mapping[str, Recipe]] = {model: _recipes(model) for model in PRESETS}
 """Model -> name of a preset -> recipe."""
 
 

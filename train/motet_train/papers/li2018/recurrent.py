@@ -76,7 +76,7 @@ class RRNN(System):
 
 @dataclass(frozen=True)
 class LSTM3LRConfig:
-    """Sizes of LSTM-3LR.
+    """Sizes of LSTM-3LR, and, with others, of ERD.
 
     encoder, decoder: units of the fully connected layers before and after the LSTMs; a linear layer to the D channels
     comes last. rectified: whether these layers have rectifiers. layers: number of LSTMs. units: of each LSTM.
@@ -88,16 +88,6 @@ class LSTM3LRConfig:
     units: int = 1000
     decoder: tuple[int, ...] = ()
     rectified: bool = False
-
-
-@dataclass(frozen=True)
-class ERDConfig(LSTM3LRConfig):
-    """Sizes of ERD."""
-
-    encoder: tuple[int, ...] = (500, 500)
-    layers: int = 2
-    decoder: tuple[int, ...] = (500, 100)
-    rectified: bool = True
 
 
 class LSTM(nn.Module):

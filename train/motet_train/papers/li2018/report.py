@@ -83,14 +83,14 @@ class Results:
         ]
         return "\n\n".join(tables)
 
-    def to_json(self) -> dict[str, dict[str, Any]]:
+    def to_json(self) -> Json:
         """The figures of each run and, under "zero_velocity", "constant_velocity" and so on, of the floors.
 
         Each is "windows_8" and so on -> action, or "mean" -> "frame_1" and so on. For several models also "grouped":
         title of each group of several runs -> their names as "runs", and the figures of their mean and of "spread".
         """
         floors = {key(name): _nested(parts) for name, parts in self.errors.items() if name in FLOORS}
-        figures: dict[str, dict[str, Any]] = {}
+        figures: dict[str, Json] = {}
         for name in self.models:
             figures[name] = {**_nested(self.errors[name]), **floors}
         if len(self.models) > 1:
@@ -119,22 +119,21 @@ def protocol_results(models: Models, corpus: ExpmapCorpus) -> Results:
     scaling = scaling_of(corpus.train)
     test = {action: list(files.values()) for action, files in corpus.test.items()}
     measured: dict[str, Parts] = {}
-    with tqdm(systems.items(), unit=" systems", disable=None, leave=False) as bar:
-        for name, system in bar:
-            few = predictions(system, test, scaling, 8, corpus.layout)
-            many = predictions(system, test, scaling, 256, corpus.layout)
-            by_kind = {FEW: errors(few), MANY: errors(many), ANGLE_ERRORS: errors(many, rotation_errors)}
-            measured[name] = _with_means(by_kind, complete(corpus))
+    for name, system in tqdm(systems.items(), unit=" systems", disable=None, leave=False):
+        few = predictions(system, test, scaling, 8, corpus.layout)
+        many = predictions(system, test, scaling, 256, corpus.layout)
+        by_kind = {FEW: errors(few), MANY: errors(many), ANGLE_ERRORS: errors(many, rotation_errors)}
+        measured[name] = _with_means(by_kind, complete(corpus))
     return Results(models, corpus, seed_groups(models), measured)
 
 
-def _with_means(by_kind: Mapping[str, Mapping[str, Array]], actions: Sequence[str]) -> dict[tuple[str, str], Array]:
+def _with_means(by_kind: Mapping[str, Mapping[str, Array]], actions: Sequence[str]) -> Parts:
     """The errors of each kind and action, and of each kind the mean over some actions."""
     parts = {}
     for kind, by_action in by_kind.items():
-        for action, error in by_action.items():
+        mean = np.mean([by_action[action] for action in actions], axis=0)
+        for action, error in {**by_action, MEAN: mean}.items():
             parts[kind, action] = error
-        parts[kind, MEAN] = np.mean([by_action[action] for action in actions], axis=0)
     return parts
 
 
@@ -186,12 +185,11 @@ def _stem(names: Sequence[str]) -> str:
     return (stems.pop() if len(stems) == 1 < len(names) else "") or names[0]
 
 
-def protocol_table(systems: Errors, corpus: ExpmapCorpus, spreads: Errors | None = None) -> str:
+def protocol_table(systems: Errors, corpus: ExpmapCorpus, spreads: Errors) -> str:
     """A text table: frames and true times, then for each action the systems, and below them the published rows.
 
     spreads: of systems that are means of several seeds, shown in brackets behind the mean.
     """
-    spreads = spreads or {}
     room = 6 if spreads else 0
     rows = _head(corpus, room)
     if spreads:
@@ -275,13 +273,17 @@ def harness_table(models: Models, groups: Groups) -> str:
         recipe = trainings[0].get("recipe", {})
         data = trainings[0].get("data", {})
         # what a recipe leaves out stays empty
-        cells = ["" if recipe.get(key) is None else f"{recipe[key]:g}" for key in settings]
-        files = "" if data.get("files") is None else f"{data['files']:g}"
+        cells = [_cell(recipe.get(key), "g") for key in settings]
+        files = _cell(data.get("files"), "g")
         held_out = str(len(data.get("validation", ()))) if "files" in data else ""
         # a range where the runs of a group differ
         seeds, steps, kept = (_range(trainings, key) for key in ("seed", "steps", "kept_step"))
         rows.append((f"  {title}", seeds, files, held_out, *cells, steps, kept, recipe.get("keep", "")))
     return aligned(rows)
+
+
+def _cell(value: Any, form: str) -> str:
+    return "" if value is None else format(value, form)
 
 
 def _range(trainings: Sequence[Json], key: str) -> str:
@@ -296,8 +298,8 @@ def cost_table(models: Models, groups: Groups) -> str:
     for title, runs in groups.items():
         trainings = [models[name].manifest.training for name in runs]
         seconds = [training["seconds"] for training in trainings if "seconds" in training]
-        parameters = f"{trainings[0]['parameters']:,}" if "parameters" in trainings[0] else ""
-        mean = f"{np.mean(seconds):.0f}" if seconds else ""
+        parameters = _cell(trainings[0].get("parameters"), ",")
+        mean = _cell(np.mean(seconds) if seconds else None, ".0f")
         rows.append((f"  {title}", parameters, mean, "; ".join(sorted(set(map(_machine, trainings))))))
     return aligned(rows, left=(0, 3))
 

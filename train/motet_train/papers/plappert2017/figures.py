@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -24,15 +25,15 @@ def describe_drawings(model: DescribeModel, corpus: SplitStore, run: Path | None
     """Figures 5, 6, 9a and 10. run: the folder with the training log, if there is one."""
     records = corpus.described(range(len(corpus.store.records)))
     sentences = corpus.references(records)
-    contexts = Contexts(model.embed(corpus.motions(records)))
+    draw = contexts(model.embed(corpus.motions(records)))
     figures: dict[str, Callable[[], Figure]] = {
-        "figure-9a-contexts-of-motions": lambda: contexts.draw(ACTIONS, sentences, "Contexts of motions"),
-        "figure-10-walking": lambda: contexts.draw(DIRECTION_PATTERNS, sentences, "Contexts of walking", "walk"),
+        "figure-9a-contexts-of-motions": partial(draw, ACTIONS, sentences, "Contexts of motions"),
+        "figure-10-walking": partial(draw, DIRECTION_PATTERNS, sentences, "Contexts of walking", "walk"),
     }
     if run is not None:
-        figures["figure-5-loss"] = lambda: losses(run)
+        figures["figure-5-loss"] = partial(losses, run)
     if moves(corpus.motion(records[0])):
-        figures["figure-6-descriptions"] = lambda: descriptions(model, corpus)
+        figures["figure-6-descriptions"] = partial(descriptions, model, corpus)
     return figures
 
 
@@ -40,16 +41,16 @@ def generate_drawings(model: GenerateModel, corpus: SplitStore, run: Path | None
     """Figures 7, 8 and 9b. run: as in :func:`describe_drawings`."""
     known = known_sentences(model, corpus, corpus.described(range(len(corpus.store.records))))
     with unknown_words_allowed():
-        contexts = Contexts(model.embed([sentence for _, sentence in known]))
+        draw = contexts(model.embed([sentence for _, sentence in known]))
     sentences = [(sentence,) for _, sentence in known]
     figures: dict[str, Callable[[], Figure]] = {
-        "figure-9b-contexts-of-sentences": lambda: contexts.draw(ACTIONS, sentences, "Contexts of sentences")
+        "figure-9b-contexts-of-sentences": partial(draw, ACTIONS, sentences, "Contexts of sentences")
     }
     if run is not None:
-        figures["figure-7-loss"] = lambda: losses(run)
+        figures["figure-7-loss"] = partial(losses, run)
     texts = [sentence for sentence, *_ in ASKED.values() if knows(model, sentence, every_word=True)]
     if texts and moves(corpus.motion(known[0][0])):
-        figures["figure-8-generated"] = lambda: generated(model, texts)
+        figures["figure-8-generated"] = partial(generated, model, texts)
     return figures
 
 
@@ -67,27 +68,25 @@ def losses(run: Path) -> Figure:
     return picture
 
 
-class Contexts:
+def contexts(vectors: Floats) -> Callable[..., Figure]:
     """Context vectors (N, C) laid out in a plane by t-SNE, once for all pictures of them."""
+    perplexity = min(30.0, (len(vectors) - 1) / 3)
+    places = TSNE(2, perplexity=perplexity, init="pca", random_state=0).fit_transform(vectors)
 
-    def __init__(self, vectors: Floats) -> None:
-        perplexity = min(30.0, (len(vectors) - 1) / 3)
-        self.places = TSNE(2, perplexity=perplexity, init="pca", random_state=0).fit_transform(vectors)
-
-    def draw(
-        self, colours: Patterns, sentences: Sequence[Sequence[str]], title: str, only: str | None = None
-    ) -> Figure:
+    def draw(colours: Patterns, sentences: Sequence[Sequence[str]], title: str, only: str | None = None) -> Figure:
         """Each vector in the colour of the attribute that half of its sentences name; only: show those of an action."""
         kinds = [_kind(row, colours, only) for row in sentences]
         picture, (axes,) = panels(1, 1, (7, 6), title)
         for number, kind in enumerate([*colours, "other"]):
-            chosen = self.places[[other == kind for other in kinds]]
+            chosen = places[[other == kind for other in kinds]]
             colour = "lightgrey" if kind == "other" else f"C{number}"
             if len(chosen):
                 axes.scatter(chosen[:, 0], chosen[:, 1], s=12, color=colour, label=f"{kind} ({len(chosen)})")
         axes.set(xticks=[], yticks=[])
         axes.legend(fontsize=7)
         return picture
+
+    return draw
 
 
 def _kind(sentences: Sequence[str], colours: Patterns, only: str | None) -> str | None:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.bundle.graph import GraphSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.data.batches import Batch
 from motet_train.models.motion_to_language import LanguageNet, SummaryHead
@@ -247,7 +247,6 @@ class LanguageToMotion(LanguageNet):
         """The encoder and the step, each with its contract."""
         config = self.config
         units = sum(config.decoder_units)
-        moments = ("batch", config.components, config.channels)
         words = id_rows("words", "words")
         lengths = id_rows("lengths")
         context = float_rows("context", 2 * config.encoder_units[-1])
@@ -255,8 +254,8 @@ class LanguageToMotion(LanguageNet):
         state = float_rows("state", units)
         outputs = (
             float_rows("log_weights", config.components),
-            TensorSpec("means", moments),
-            TensorSpec("stds", moments),
+            float_rows("means", config.components, config.channels),
+            float_rows("stds", config.components, config.channels),
             float_rows("active"),
             float_rows("next_state", units),
         )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -124,8 +125,7 @@ def _fit(path: Path, motion: Motion, first_path: Path, first: Motion) -> Motion:
         raise DataError(f"{path} does not match {first_path}: {error}") from error
 
 
-@dataclass(frozen=True, eq=False)
-class BodyParts:
+class BodyParts(NamedTuple):
     """The body parts of a figure.
 
     names: the parts that have channels; a limb is named by its topmost joint. of_channel: (D,) the part of each
@@ -194,10 +194,10 @@ def period(frames: Array) -> float:
 
 
 def _autocorrelation(signal: Array, lag: int) -> float:
-    count = len(signal) - lag
-    return float((signal[lag:] * signal[:count]).sum() / count)
+    products = signal[lag:] * signal[: len(signal) - lag]
+    return float(products.sum() / len(products))
 
 
 def is_periodic(sequences: Sequence[Array]) -> bool:
     """Whether all sequences (T, D) of a motion repeat their poses, as walking does and bending over does not."""
-    return all(bool(np.isfinite(period(frames))) for frames in sequences)
+    return all(np.isfinite(period(frames)) for frames in sequences)

@@ -4,8 +4,6 @@ Every experiment runs without noise (variety 0) unless it says so. Letters in sh
 D channels, L labels.
 """
 
-from itertools import combinations
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -53,31 +51,30 @@ def _change(before: float, after: float) -> float:
     return abs(after / before - 1) if before > 0 else float("nan")
 
 
-def convergence(study: ControlStudy, starts: int = 100, sigma: float = 1.0) -> Figures:
+def convergence(study: ControlStudy) -> Figures:
     """Walking from past codes with Gaussian noise: the number on the loop within 3 s that stay on it (figure 5.2)."""
     rng = np.random.default_rng(0)
     clip = study.reference.motions[study.walk][0]
-    first_frames = rng.integers(0, len(clip) - study.model.taps, starts)
+    first_frames = rng.integers(0, len(clip) - study.model.taps, 100)
     clean = np.concatenate([study.training_history("walk", int(frame)) for frame in first_frames])
-    noisy = clean + sigma * rng.standard_normal(clean.shape)
+    noisy = clean + rng.standard_normal(clean.shape)
     times = study.reaches(study.hold(noisy, "walk", 6.0).frames, "walk")
-    return {"converged": float((times <= 3).sum()), "median_s": float(np.median(times)), "max_s": float(times.max())}
+    return {"converged": (times <= 3).sum(), "median_s": np.median(times), "max_s": times.max()}
 
 
-def synchronisation(study: ControlStudy, starts: int = 10) -> Figures:
+def synchronisation(study: ControlStudy) -> Figures:
     """Replay the left leg's codes half a cycle late: does the right leg follow (figures 5.3, 5.4)?
 
     It follows if its phase on the recorded loop comes within 5 % of a cycle of the left leg's, and stays there.
     """
-    if study.legs is None:
+    if not study.legs:
         return {}
-    seconds = arrival(late_left_leg(study, starts)[1] < 0.05, study.fps)
-    return {"share": float((seconds <= 1).mean()), "max_s": float(seconds.max())}
+    seconds = arrival(late_left_leg(study, 10)[1] < 0.05, study.fps)
+    return {"share": (seconds <= 1).mean(), "max_s": seconds.max()}
 
 
 def late_left_leg(study: ControlStudy, starts: int) -> tuple[Array, Array]:
     """Frames (T, B, D) with the left leg half a cycle late, and the legs' difference in phase in cycles (T-2, B)."""
-    assert study.legs is not None
     left, right = study.legs
     taps = study.model.taps
     # record the loop, and start at equal phases of its second cycle
@@ -133,12 +130,12 @@ def gait_transitions(study: ControlStudy, count: int = 20) -> Figures:
     times = np.concatenate([times_to_run, times_to_walk])
     jumps = np.concatenate([jumps_to_run, jumps_to_walk])
     return {
-        "share": float(np.isfinite(times).mean()),
-        "median_s": float(np.median(times)),
-        "max_s": float(times.max()),
-        "under_half": float((times < 0.5).mean()),
-        "jump": float(jumps.max()),
-        "jump_ratio": float(jumps.max()) / study.reference.largest_jump,
+        "share": np.isfinite(times).mean(),
+        "median_s": np.median(times),
+        "max_s": times.max(),
+        "under_half": (times < 0.5).mean(),
+        "jump": jumps.max(),
+        "jump_ratio": jumps.max() / study.reference.largest_jump,
     }
 
 
@@ -148,30 +145,34 @@ def gait_control(study: ControlStudy, gait: ArrayLike) -> Array:
     return study.control(walk=1 - g, run=g)
 
 
-def ramp(study: ControlStudy, seconds: float = 5.0) -> Array:
-    """The gait parameter (T,) up in ``seconds``, held for 3 s, down as slowly, held for 3 s (figure 5.6)."""
-    up = np.linspace(0, 1, study.frames(seconds))
+def ramp(study: ControlStudy) -> Array:
+    """The gait parameter (T,) up in 5 s, held for 3 s, down as slowly, held for 3 s (figure 5.6)."""
+    up = np.linspace(0, 1, study.frames(5.0))
     hold = study.frames(3.0)
     return np.concatenate([up, np.ones(hold), up[::-1], np.zeros(hold)])
 
 
-def ramp_hysteresis(study: ControlStudy, seconds: float = 5.0, starts: int = 4) -> Figures:
-    """The gait parameter at which the nearer loop changes on ramps up and down (thesis 5.3): means over starts.
+def gait_run(study: ControlStudy, gait: Array, starts: int = 1) -> Recording:
+    """Runs from equal phases of walking under a gait parameter (T,)."""
+    return study.play(study.start(study.phases("walk", starts)[0]), gait_control(study, gait))
+
+
+def ramp_hysteresis(study: ControlStudy) -> Figures:
+    """The gait parameter at which the nearer loop changes on ramps up and down (thesis 5.3): means over four starts.
 
     ramp_width: the difference of both; ramp_width_least: its least. NaN if a run never changes its loop.
     """
-    gait = ramp(study, seconds)
-    frames = study.play(study.start(study.phases("walk", starts)[0]), gait_control(study, gait)).frames
-    running = study.nearer_to_run(frames)
+    gait = ramp(study)
+    running = study.nearer_to_run(gait_run(study, gait, 4).frames)
     half = len(gait) // 2
     up, runs = _crossing(study, gait[:half], running[:half])
     down, walks = _crossing(study, gait[half:], ~running[half:])
     width = np.where(runs & walks, up - down, np.nan)
     return {
-        "ramp_width": float(width.mean()),
-        "ramp_width_least": float(width.min()),
-        "ramp_up": float(up.mean()),
-        "ramp_down": float(down.mean()),
+        "ramp_width": width.mean(),
+        "ramp_width_least": width.min(),
+        "ramp_up": up.mean(),
+        "ramp_down": down.mean(),
     }
 
 
@@ -182,69 +183,69 @@ def _crossing(study: ControlStudy, gait: Array, changed: Mask) -> tuple[Array, M
     return gait[frame], np.isfinite(time)
 
 
-def constant_hysteresis(study: ControlStudy, points: int = 41, starts: int = 4) -> Figures:
+def constant_hysteresis(study: ControlStudy) -> Figures:
     """From each loop at constant gait parameters: up to which one walking persists, and down to which running.
 
-    A gait persists at a parameter if it does for 15 s from all starts.
+    A gait persists at a parameter if it does for 15 s from four starts.
     """
-    grid = np.linspace(0, 1, points)
-    walks = _persists(study, "walk", grid, starts)
-    runs = _persists(study, "run", grid, starts)
+    grid = np.linspace(0, 1, 41)
+    walks = _persists(study, "walk", grid)
+    runs = _persists(study, "run", grid)
     # the unbroken ranges from either end of the grid
     last_walk = int(np.cumprod(walks).sum()) - 1
-    first_run = points - int(np.cumprod(runs[::-1]).sum())
-    if last_walk < 0 or first_run == points:
+    first_run = len(grid) - int(np.cumprod(runs[::-1]).sum())
+    if last_walk < 0 or first_run == len(grid):
         return {"constant_width": float("nan")}
     walk_to = grid[last_walk]
     run_to = grid[first_run]
-    return {"constant_width": float(walk_to - run_to), "walk_to": float(walk_to), "run_to": float(run_to)}
+    return {"constant_width": walk_to - run_to, "walk_to": walk_to, "run_to": run_to}
 
 
-def _persists(study: ControlStudy, role: str, grid: Array, starts: int) -> Mask:
+def _persists(study: ControlStudy, role: str, grid: Array) -> Mask:
     """Whether a gait persists at each gait parameter of a grid (N,)."""
-    session = study.start(np.tile(study.phases(role, starts)[0], (len(grid), 1, 1)))
-    control = gait_control(study, np.repeat(grid, starts))
+    session = study.start(np.tile(study.phases(role, 4)[0], (len(grid), 1, 1)))
+    control = gait_control(study, np.repeat(grid, 4))
     session.set_control(control)
     for _ in range(study.frames(13.0)):
         session.step()
     # judge the last two seconds
     frames = study.play(session, np.repeat(control[None], study.frames(2.0), axis=0)).frames
     running = study.nearer_to_run(frames).mean(axis=0) > 0.5
-    persists: Mask = (running == (role == "run")).reshape(len(grid), starts).all(axis=1)
+    persists: Mask = (running == (role == "run")).reshape(len(grid), 4).all(axis=1)
     return persists
 
 
-def sampled_runs(study: ControlStudy, variety: float = 1.0, runs: int = 4) -> Figures:
+def sampled_runs(study: ControlStudy) -> Figures:
     """Four sampled runs of one transition, and four sampled minutes of walking (thesis 5.3, figure 5.7c).
 
     differ: the least RMS z between two transitions in their first second. arrive: the share that runs in the last
     half second of two. kept: the share of walking frames nearer to the walking loop. energy: of the walk's legs.
     """
     reference = study.reference
-    history = study.phases("walk", 1)[0].repeat(runs, axis=0)
+    history = study.phases("walk", 1)[0].repeat(4, axis=0)
     # from four phases of walking: to a run, and on walking for a minute
-    frames = study.hold(history, "run", 2.0, variety=variety).frames
-    walk = study.hold(history, "walk", 60.0, variety=variety).frames
+    frames = study.hold(history, "run", 2.0, variety=1.0).frames
+    walk = study.hold(history, "walk", 60.0, variety=1.0).frames
     # the last 20 seconds of that minute
     ends = np.moveaxis(walk[-study.frames(20.0) :], 1, 0)
     periods = [period(reference.leg_angles(end)) for end in ends]
     energies = [reference.energy_ratio(end, study.walk) for end in ends]
     return {
-        "variety": variety,
+        "variety": 1.0,
         "differ": _least_difference(reference.z(frames[: study.frames(1.0)])),
-        "arrive": float(study.nearer_to_run(frames[-study.frames(0.5) :]).all(axis=0).mean()),
-        "kept": float(1 - study.nearer_to_run(walk).mean()),
-        "period_s": float(np.median(periods)) / study.fps,
+        "arrive": study.nearer_to_run(frames[-study.frames(0.5) :]).all(axis=0).mean(),
+        "kept": 1 - study.nearer_to_run(walk).mean(),
+        "period_s": np.median(periods) / study.fps,
         "energy": float(np.mean(energies)),
     }
 
 
 def _least_difference(z: Array) -> float:
     """The least RMS difference between two of runs (T, B, D)."""
-    differences = []
-    for first, second in combinations(range(z.shape[1]), 2):
-        differences.append(np.sqrt(((z[:, second] - z[:, first]) ** 2).mean()))
-    return float(min(differences))
+    from scipy.spatial.distance import pdist  # imported here, so that training does not load it
+
+    runs = np.moveaxis(z, 1, 0).reshape(z.shape[1], -1)
+    return float(pdist(runs).min() / np.sqrt(runs.shape[1]))
 
 
 def depth(study: ControlStudy, frames: Array) -> tuple[Array, Array]:
@@ -252,7 +253,6 @@ def depth(study: ControlStudy, frames: Array) -> tuple[Array, Array]:
 
     Also returns the deepest training poses (N, D).
     """
-    assert study.bend is not None
     clip = study.reference.motions[study.bend][0]
     z = study.reference.z(clip)
     bottom = int(((z - z[0]) ** 2).sum(axis=1).argmax())
@@ -261,27 +261,27 @@ def depth(study: ControlStudy, frames: Array) -> tuple[Array, Array]:
     return along, upsample(clip[bottom - 4 : bottom + 5])
 
 
-def bends(study: ControlStudy, count: int = 40, seconds: float = 6.0) -> Figures:
-    """Bend from equal phases of walking and of running: the share executed within ``seconds``, and the least depth.
+def bends(study: ControlStudy) -> Figures:
+    """Bend from 40 phases of walking and of running: the share executed within 6 s, and the least depth.
 
     A bend is executed if it reaches the training motion's deepest poses and rises again (thesis 5.4, figure 5.9).
     """
     figures = {}
     for role, ending in (("walk", ""), ("run", "_from_run")):
-        frames = study.hold(study.phases(role, count)[0], "bend", seconds).frames
+        frames = study.hold(study.phases(role, 40)[0], "bend", 6.0).frames
         along, deepest = depth(study, frames)
         down = (study.reference.distance(frames, deepest) < 0.5) & (along > 0.8)
         first = np.where(down.any(axis=0), down.argmax(axis=0), len(frames))
         risen = np.any((np.arange(len(frames))[:, None] > first) & (along < 0.3), axis=0)
-        figures[f"share{ending}"] = float(risen.mean())
-        figures[f"depth{ending}"] = float(along.max(axis=0).min())
+        figures[f"share{ending}"] = risen.mean()
+        figures[f"depth{ending}"] = along.max(axis=0).min()
     return figures
 
 
-def interruptions(study: ControlStudy, count: int = 10) -> Figures:
+def interruptions(study: ControlStudy) -> Figures:
     """Walk, bend, and run in the middle of the bend: the longest time until running, for each moment and overall."""
-    runs = interrupted(study, count)
-    seconds = {f"{name}_s": float(study.reaches(run.frames, "run").max()) for name, run in runs.items()}
+    runs = interrupted(study, 10)
+    seconds = {f"{name}_s": study.reaches(run.frames, "run").max() for name, run in runs.items()}
     return {"interrupt_s": max(seconds.values()), **seconds}
 
 
@@ -313,7 +313,7 @@ def standing_feet(study: ControlStudy) -> Figures:
     balls = [joints.get(f"{side}Toes", joints[f"{side}Foot"]) for side in ("left", "right")]  # or ankles
     figures: Figures = {}
     for role, label in (("walk", study.walk), ("run", study.run)):
-        if label is None:
+        if not label:
             continue
         recorded = [lay_root_path(model.contract.features(clip)) for clip in study.reference.motions[label]]
         figures |= _feet([model.run(f"{label} 20s")], balls, f"_{role}")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from motet.motion.rotations import Array
 from motet_train.evaluate.figures import SPACING, Drawings, bodies, panels
-from motet_train.papers.tdbn.experiments import gait_control, interrupted, late_left_leg, ramp
+from motet_train.papers.tdbn.experiments import gait_run, interrupted, late_left_leg, ramp
 from motet_train.papers.tdbn.study import ControlStudy, Leg, Recording
 
 WALK_COLOUR = "#2f6fdb"
@@ -20,14 +20,14 @@ BEND_COLOUR = "#2f9e5b"
 def drawings(study: ControlStudy) -> Drawings:
     """The figures that the clips allow: most need two gaits, some legs, the last a motion that ends."""
     figures: dict[str, Callable[[ControlStudy], Figure]] = {"figure-5.2-limit-cycle": limit_cycle}
-    if study.legs is not None:
+    if study.legs:
         figures["figure-5.3-perturbed-walk"] = perturbed_walk
         figures["figure-5.4-synchronisation"] = synchronisation
-    if study.run is not None:
+    if study.run:
         figures["figure-5.5-transition"] = transition
         figures["figure-5.6-hysteresis"] = hysteresis
         figures["figure-5.7-bifurcation"] = bifurcation
-    if study.run is not None and study.bend is not None:
+    if study.run and study.bend:
         figures["figure-5.10-interruption"] = interruption
     return {name: partial(draw, study) for name, draw in figures.items()}
 
@@ -38,7 +38,7 @@ def limit_cycle(study: ControlStudy) -> Figure:
     clean = np.repeat(study.phases("walk", 20)[0], 5, axis=0)
     frames = study.hold(clean + rng.standard_normal(clean.shape), "walk", 3.0).frames
     figure, (left, right) = panels(1, 2, (9, 4.5), "100 starts with Gaussian noise on the past codes")
-    plane = _plane(study, study.loop("walk").frames[:, 0], left, right)
+    plane = _plane(study, study.loop_frames("walk"), left, right)
     for row in range(frames.shape[1]):
         left.plot(*plane(frames[:, row]).T, color=WALK_COLOUR, linewidth=0.4, alpha=0.5)
     _dots(right, plane(frames[0]), RUN_COLOUR, "first frame")
@@ -58,9 +58,8 @@ def synchronisation(study: ControlStudy) -> Figure:
     """Figure 5.4: the thigh's angle of both legs, before and after the left one is made late."""
     before, after = _made_late(study, 2.0)
     frames = np.concatenate([before, after])
-    spread = study.loop("walk").frames[:, 0].std(axis=0)
+    spread = study.loop_frames("walk").std(axis=0)
     figure, (axes,) = panels(1, 1, (9, 3.5), "The right leg follows the left one")
-    assert study.legs is not None
     for leg, colour, name in zip(study.legs, (RUN_COLOUR, WALK_COLOUR), ("left", "right"), strict=True):
         thigh = _thigh(study, leg, spread)
         axes.plot(np.arange(len(frames)) / study.fps, frames[:, thigh], color=colour, label=name)
@@ -88,15 +87,15 @@ def transition(study: ControlStudy) -> Figure:
     before = study.frames(1.0)
     after = study.frames(1.2)
     track = np.repeat([0.0, 1.0], [before, after])
-    frames = study.play(study.start(study.phases("walk", 1)[0]), gait_control(study, track)).frames[:, 0]
+    frames = gait_run(study, track).frames[:, 0]
     return _strip(study, frames, before, "Control changes from walking to running at the line")
 
 
 def hysteresis(study: ControlStudy) -> Figure:
     """Figure 5.6: the first principal component over time on ramps up and down, and over the gait parameter."""
     gait = ramp(study)
-    frames = study.play(study.start(study.phases("walk", 1)[0]), gait_control(study, gait)).frames[:, 0]
-    loops = np.concatenate([study.loop(role).frames[:, 0] for role in ("walk", "run")])
+    frames = gait_run(study, gait).frames[:, 0]
+    loops = np.concatenate(list(map(study.loop_frames, ("walk", "run"))))
     line = _plane(study, loops)(frames)[:, 0]
     half = len(gait) // 2
     figure, axes = panels(1, 3, (13, 3.8), "A gait parameter from 0 (walk) to 1 (run) and back in 5 s")
@@ -121,8 +120,13 @@ def _sweeps(axes: Axes, gait: Array, line: Array, sweep: int) -> None:
 
 def bifurcation(study: ControlStudy) -> Figure:
     """Figure 5.7: between the loops, by a sudden switch, a slow ramp, and four times sampled."""
-    loops = [study.loop(role).frames[:, 0] for role in ("walk", "run")]
-    runs = _ways_to_run(study)
+    loops = list(map(study.loop_frames, ("walk", "run")))
+    start = study.phases("walk", 1)[0]
+    runs = {
+        "sudden": study.hold(start, "run", 2.0),
+        "5 s ramp": gait_run(study, ramp(study)[: study.frames(6.0)]),
+        "sampled, four runs": study.hold(start.repeat(4, axis=0), "run", 2.0, variety=1.0),
+    }
     figure, axes = panels(1, 3, (13, 4.3), "From the walking loop (blue) to the running loop (red)")
     plane = _plane(study, np.concatenate(loops), *axes)
     for panel, (name, run) in zip(axes, runs.items(), strict=True):
@@ -133,17 +137,6 @@ def bifurcation(study: ControlStudy) -> Figure:
             panel.plot(*plane(path).T, ".-", color="black", linewidth=0.7, markersize=2.5)
         panel.set_title(name)
     return figure
-
-
-def _ways_to_run(study: ControlStudy) -> dict[str, Recording]:
-    """Runs from the walking to the running loop."""
-    start = study.phases("walk", 1)[0]
-    gait = ramp(study)[: study.frames(6.0)]
-    return {
-        "sudden": study.hold(start, "run", 2.0),
-        "5 s ramp": study.play(study.start(start), gait_control(study, gait)),
-        "sampled, four runs": study.hold(start.repeat(4, axis=0), "run", 2.0, variety=1.0),
-    }
 
 
 def interruption(study: ControlStudy) -> Figure:

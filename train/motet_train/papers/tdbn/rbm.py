@@ -117,15 +117,12 @@ class Layer(ABC):
         self.generator = generator
         self.ascents = {name: Ascent(value.data, learning.decay) for name, value in net.named_parameters()}
 
+    @abstractmethod
     def epoch(self, number: int) -> float:
         """Learn for an epoch, counted from 0, and return the mean squared error of the last reconstruction.
 
         DivergedError if weights grow without bound.
         """
-        return self._learn(schedule(self.learning, number, self.probabilities, self.generator))
-
-    @abstractmethod
-    def _learn(self, epoch: Epoch) -> float: ...
 
 
 class Stage(NamedTuple):
@@ -201,7 +198,9 @@ class RBMLayer(Layer):
         self.frames = frames
 
     @torch.inference_mode()
-    def _learn(self, epoch: Epoch) -> float:
+    def epoch(self, number: int) -> float:
+        """As in any :class:`Layer`."""
+        epoch = schedule(self.learning, number, self.probabilities, self.generator)
         # one draw for a whole epoch: small draws cost more than the arithmetic
         uniform, normal = self._noise(len(epoch.batches))
         for rows, noise, jitter in zip(epoch.batches, uniform, normal, strict=True):
@@ -397,7 +396,9 @@ class CRBMLayer(Layer):
         self.recall = recall
 
     @torch.no_grad()
-    def _learn(self, epoch: Epoch) -> float:
+    def epoch(self, number: int) -> float:
+        """As in any :class:`Layer`."""
+        epoch = schedule(self.learning, number, self.probabilities, self.generator)
         for rows in epoch.batches:
             past, control = self._windows(rows)
             error = self._update(past, self.data.visible[rows], control, epoch)

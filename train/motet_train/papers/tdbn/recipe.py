@@ -18,6 +18,8 @@ from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import MotionContract, living
 from motet_train import distributed
 from motet_train.data.errors import DataError
+from motet_train.data.table import read_toml
+from motet_train.models.net import configured
 from motet_train.papers.tdbn.clips import Clips, Sequences, body_parts, is_periodic
 from motet_train.papers.tdbn.rbm import Layer, Stage
 from motet_train.papers.tdbn.report import missed_goals, study_of
@@ -27,10 +29,8 @@ from motet_train.runs import Run, RunError
 from motet_train.trainer import Line, Part, kept
 
 RECIPES = {
-    "default": Recipe("control", "tdbn", "session", TDBNConfig()),
-    "pure": Recipe("control", "tdbn", "session", TDBNConfig().pure()),
-    "unclamped": Recipe("control", "tdbn", "session", TDBNConfig().unclamped()),
-    "thesis": Recipe("control", "tdbn", "session", TDBNConfig.thesis()),
+    name: Recipe("control", "tdbn", "session", configured(TDBNConfig, preset))
+    for name, preset in read_toml(__file__, "presets.toml").items()
 }
 BASELINES = {"default": Recipe("control", "angle-crbm", "session", AngleCRBMConfig())}
 
@@ -151,6 +151,7 @@ class DivergenceLearner:
     patience: int | None = None
     first = 0
     target = 0.0
+    layer: Layer
 
     def __init__(
         self,
@@ -171,7 +172,6 @@ class DivergenceLearner:
         for first, last in pairwise(self.bounds):
             self.ends += [*range(first, last, EPOCHS_A_CHUNK)[1:], last]
         self.parts: dict[str, Part] = {"net": net, **others, "learning": self}
-        self.layer: Layer | None = None
         self.done = 0
         self.fewest = 1000  # more goals than exist
 
@@ -181,7 +181,6 @@ class DivergenceLearner:
         if start == self.bounds[number]:
             self.stages[number].begin()
             self.layer = self.stages[number].layer()
-        assert self.layer is not None
         for self.done in range(start + 1, stop + 1):
             yield self.done, self.layer.epoch(self.done - 1 - self.bounds[number]), 1.0
 
@@ -198,7 +197,6 @@ class DivergenceLearner:
 
     def state_dict(self) -> Json:
         """Where learning is: the epochs done, the velocities of the layer, the generator."""
-        assert self.layer is not None
         velocities = {name: ascent.velocity for name, ascent in self.layer.ascents.items()}
         generator = self.generator.get_state()
         return {"done": self.done, "fewest": self.fewest, "velocities": velocities, "generator": generator}

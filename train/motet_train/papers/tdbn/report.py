@@ -9,28 +9,13 @@ import numpy as np
 from motet.bundle.fields import Json
 from motet.papers.tdbn_control import TdbnModel
 from motet_train.data.errors import DataError
-from motet_train.evaluate.tables import Goals, Report, gathered, reached
+from motet_train.evaluate.tables import Report, gathered, reached, read_goals
 from motet_train.papers.tdbn import experiments
 from motet_train.papers.tdbn.clips import BodyParts, Clips, body_parts, is_periodic
 from motet_train.papers.tdbn.study import ControlStudy, Leg, Reference
 
-# fmt: off
-GOALS: Goals = {
-    "train.seconds": (None, 30), "train.reconstruction": (None, 0.25),
-    "cycle.period_error": (None, 0.02), "cycle.drift": (None, 0.005), "cycle.energy": (0.7, 1.1),
-    "cycle.converged": (99, None), "cycle.median_s": (None, 1.2),
-    "cycle_run.energy": (0.7, 1.1),
-    "sync.share": (1, None), "sync.max_s": (None, 1),
-    "gait.share": (1, None), "gait.median_s": (None, 0.45), "gait.under_half": (0.8, None),
-    "gait.jump_ratio": (None, 1),
-    "hysteresis.ramp_width": (0.4, None), "hysteresis.constant_width": (0.25, None),
-    "bend.share": (0.95, None), "bend.share_from_run": (0.95, None), "bend.interrupt_s": (None, 0.8),
-    "feet.slide_walk": (None, 0.025), "feet.speed_walk": (None, 0.15), "feet.acceleration_walk": (None, 6),
-    "feet.slide_run": (None, 0.06), "feet.speed_run": (None, 0.15), "feet.acceleration_run": (None, 11),
-    "random.leap": (None, 26),
-}
-# fmt: on
-"""Figure -> (least, most), the goals of the default recipe, whose clips show walk, run and bend."""
+GOALS = read_goals("control")
+"""Of the default recipe, whose clips show walk, run and bend."""
 
 
 def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
@@ -48,21 +33,18 @@ def study_of(model: TdbnModel, clips: Clips) -> ControlStudy:
     gaits = [label for label in by_name if is_periodic(motions[label])]
     if not gaits:
         raise DataError("the experiments need clips of a periodic motion, such as walking")
-    run = gaits[1] if len(gaits) > 1 else None
-    bend = next((label for label in motions if label not in gaits), None)
+    run = gaits[1] if len(gaits) > 1 else ""
+    bend = next((label for label in motions if label not in gaits), "")
     return ControlStudy(model, reference, gaits[0], run, bend, _legs(parts, model.codes))
 
 
-def _legs(parts: BodyParts, codes: int) -> tuple[Leg, Leg] | None:
+def _legs(parts: BodyParts, codes: int) -> list[Leg]:
     """The channels and codes of the left and the right leg, if there are legs."""
-    if not parts.legs:
-        return None
     # codes are the channels themselves, or the same number of each part
     of_code = parts.of_channel
     if codes != len(of_code):
         of_code = np.repeat(np.arange(len(parts.names)), codes // len(parts.names))
-    left, right = (Leg(np.flatnonzero(parts.of_channel == leg), np.flatnonzero(of_code == leg)) for leg in parts.legs)
-    return left, right
+    return [Leg(np.flatnonzero(parts.of_channel == leg), np.flatnonzero(of_code == leg)) for leg in parts.legs]
 
 
 Experiment = Callable[[ControlStudy], Mapping[str, float]]
@@ -76,12 +58,12 @@ def experiments_of(study: ControlStudy) -> dict[str, list[Experiment]]:
         "feet": [experiments.standing_feet],
         "random": [experiments.leaps],
     }
-    if study.run is not None:
+    if study.run:
         groups["cycle_run"] = [partial(experiments.limit_cycle, role="run")]
         groups["gait"] = [experiments.gait_transitions]
         groups["hysteresis"] = [experiments.ramp_hysteresis, experiments.constant_hysteresis]
         groups["variety"] = [experiments.sampled_runs]
-        if study.bend is not None:
+        if study.bend:
             groups["bend"] = [experiments.bends, experiments.interruptions]
     return groups
 

@@ -7,7 +7,7 @@ net generates.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,8 +25,8 @@ from motet.steering.pose import Pose
 from motet.steering.recorded import Recording
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
-from motet_train.data.table import Gait
-from motet_train.papers.tdbn.rbm import Learning
+from motet_train.data.table import Gait, read_toml
+from motet_train.models.net import configured
 from motet_train.papers.tdbn.recipe import train_lessons, untrained
 from motet_train.papers.tdbn.tdbn import AngleCRBMConfig, Lessons, TDBNConfig
 from motet_train.recipes.recipe import Job, Recipe
@@ -43,7 +43,7 @@ def controls_of(velocities: ArrayLike) -> Array:
     shares = np.asarray(velocities, dtype=np.float64) / FULL_CONTROL
     # a value for each direction of each velocity
     both = np.stack([shares, -shares], axis=-1)
-    return np.asarray(np.clip(both, 0, 1).reshape(*shares.shape[:-1], len(LABELS)))
+    return np.clip(both, 0, 1).reshape(*shares.shape[:-1], len(LABELS))
 
 
 def course(features: Motion) -> Array:
@@ -58,30 +58,9 @@ def course(features: Motion) -> Array:
 GAIT_SPEEDS = {"walk": (0.3, 1.8), "run": (1.8, 4.0)}
 """Range of speeds of each gait, m/s. The net has no gaits: it walks or runs depending on the speed."""
 
-TDBN = TDBNConfig(
-    hidden_per_part=60,
-    control_units=8,
-    past_noise=0.1,
-    unrolled=12,
-    borrowed_past=0.0,
-    borrowed_control=0.0,
-    onset=100.0,
-    restarts=1,
-    tries=1,
-    rounds=1,
-    rbm=Learning(40, rate=1e-2, final_rate=0.03, batch=50, temperature=(1.0, 0.38)),
-    crbm=Learning(60, rate=1e-2, final_rate=0.05, batch=50, temperature=(0.38, 0.38)),
-)
-
-CRBM = AngleCRBMConfig(
-    taps=6,
-    control_units=4,
-    free_units=200,
-    past_noise=0.3,
-    past_rate=2e-3,
-    iterations=10,
-    crbm=Learning(120, rate=1e-2, final_rate=0.03, batch=50, decay=2e-5, temperature=(1.0, 1.0)),
-)
+STEERED_NETS = read_toml(__file__, "steered.toml")
+TDBN: TDBNConfig = configured(TDBNConfig, STEERED_NETS["tdbn"])
+CRBM: AngleCRBMConfig = configured(AngleCRBMConfig, STEERED_NETS["crbm"])
 
 RECIPES = {
     "default": Recipe("control", "tdbn", "session", TDBN),
@@ -98,11 +77,12 @@ def train_steered(store: Store, job: Job, data: str = "") -> Run:
     """
     store.needs_sixd("steering is trained on")
     config = replace(job.recipe.config, fps=store.fps)
-    recorded = _recorded(store)
+    known = {gait.name: gait for gait in gaits_of(store)}
+    recorded = recordings(store, tuple(known.get(name, Gait(name, (), ())) for name in GAIT_SPEEDS))
     contract, motions = mirrored_too(store, recorded)
-    assert contract.skeleton is not None
+    assert store.skeleton is not None
     # the net, with the mean and scale of all frames
-    net = untrained(config, contract.skeleton, contract.channels, len(LABELS))
+    net = untrained(config, store.skeleton, store.channels, len(LABELS))
     net.measure_by(contract.mean, contract.std * config.sigma)
     control = {"labels": LABELS, "starts": dict.fromkeys(LABELS, _start(recorded, config.taps))}
     about = {"data": {"name": data, "recordings": len(recorded), "frames": sum(map(len, motions))}}
@@ -115,13 +95,6 @@ def _lessons(motions: Sequence[Motion]) -> Lessons:
     sequences = [motion.values for motion in motions]
     controls = [controls_of(course(motion)) for motion in motions]
     return Lessons([sequences], [controls], [1.0])
-
-
-def _recorded(store: Store) -> list[Recording]:
-    """The recordings of :data:`GAIT_SPEEDS`; DataError if a gait has none."""
-    known = {gait.name: gait for gait in gaits_of(store)}
-    gaits = tuple(known.get(name, Gait(name, (), ())) for name in GAIT_SPEEDS)
-    return recordings(store, gaits)
 
 
 def _start(recorded: Sequence[Recording], taps: int) -> list[list[float]]:
@@ -142,28 +115,21 @@ def mirrored_too(store: Store, recorded: Sequence[Recording]) -> tuple[MotionCon
     return replace(contract, mean=every.mean(axis=0), std=living(every.std(axis=0), store.units)), motions
 
 
-@dataclass(frozen=True, eq=False)
 class Driven:
     """A control model with :data:`LABELS` in place of :class:`motet.steering.model.SteerModel`, with the part of its
     interface that measures use."""
 
-    model: TdbnModel
-    gaits: tuple[str, ...] = tuple(GAIT_SPEEDS)
+    gaits = tuple(GAIT_SPEEDS)
+    speeds = GAIT_SPEEDS
+
+    def __init__(self, model: TdbnModel) -> None:
+        self.model = model
+        self.fps = model.fps
 
     @staticmethod
     def fits(model: TdbnModel) -> bool:
         """Whether a model can be steered."""
         return model.labels == LABELS and model.contract.representation == "root_sixd"
-
-    @property
-    def fps(self) -> float:
-        """Ticks per second."""
-        return self.model.fps
-
-    @property
-    def speeds(self) -> dict[str, tuple[float, float]]:
-        """The slowest and the fastest speed of each gait, m/s."""
-        return GAIT_SPEEDS
 
     def start(self, start: str | None = None, *, characters: int = 1, hold_feet: bool = True) -> "DrivenSession":
         """A session of standing figures; ``start`` is ignored. hold_feet: with the foot lock."""

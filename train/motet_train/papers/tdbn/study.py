@@ -4,11 +4,11 @@ Frames are compared in z units: each channel relative to its standard deviation 
 that are constant there. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,8 +99,7 @@ class Reference:
         return float((np.diff(self.leg_angles(frames), axis=0) ** 2).mean())
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(NamedTuple):
     """A run with all its codes: frames (T, B, D), codes (T, B, H)."""
 
     frames: Array
@@ -111,8 +110,7 @@ class Recording:
         return np.stack([self.codes[time - taps + 1 : time + 1, row] for time in np.asarray(times, dtype=int)])
 
 
-@dataclass(frozen=True, eq=False)
-class Leg:
+class Leg(NamedTuple):
     """Indices of a leg's channels, and of its codes."""
 
     channels: Indices
@@ -123,16 +121,16 @@ class Leg:
 class ControlStudy:
     """A control model with its training motions, and the loops that several experiments need.
 
-    walk, run: the labels of two periodic motions; run is None if there is only one. bend: the label of a motion that
-    ends, or None. legs: the left and the right one, if the skeleton has legs.
+    walk, run: the labels of two periodic motions; run is "" if there is only one. bend: the label of a motion that
+    ends, or "". legs: the left and the right one, if the skeleton has legs.
     """
 
     model: TdbnModel
     reference: Reference
     walk: str
-    run: str | None
-    bend: str | None
-    legs: tuple[Leg, Leg] | None
+    run: str
+    bend: str
+    legs: Sequence[Leg]
 
     @property
     def fps(self) -> float:
@@ -193,13 +191,17 @@ class ControlStudy:
     def _loops(self) -> dict[str, Recording]:
         return {}
 
+    def loop_frames(self, role: str) -> Array:
+        """The frames (T, D) of a gait's loop."""
+        return self.loop(role).frames[:, 0]
+
     def loop_points(self, role: str) -> Array:
         """A gait's loop as points (N, D), upsampled."""
-        return upsample(self.loop(role).frames[:, 0])
+        return upsample(self.loop_frames(role))
 
     def cycle(self, role: str) -> float:
         """The period in frames of a gait's loop, or a second if it has none, so that experiments still run."""
-        cycle = period(self.reference.z(self.loop(role).frames[:, 0]))
+        cycle = period(self.reference.z(self.loop_frames(role)))
         return cycle if np.isfinite(cycle) else self.fps
 
     def phases(self, role: str, count: int) -> tuple[Codes, Array]:

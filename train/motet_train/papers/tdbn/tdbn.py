@@ -2,7 +2,7 @@
 
 Where the thesis' text and its author's code differ, the default follows what works (docs/results/tdbn.md shows both):
 control units stay clamped in the reconstruction, binary layers are annealed, and the root's rotation is among the
-channels; :meth:`TDBNConfig.thesis` is the text.
+channels; the preset ``thesis`` is the text.
 
 Letters in shapes: B rows, T frames, D channels, H codes, K taps, L labels, C control units, F free hidden units, N
 numbers of noise for the codes of a frame.
@@ -11,7 +11,7 @@ numbers of noise for the codes of a frame.
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any, Self, get_type_hints
 
@@ -19,10 +19,10 @@ import torch
 from torch import Tensor, nn
 
 from motet.bundle.fields import Json
-from motet.bundle.graph import GraphSpec, TensorSpec
+from motet.bundle.graph import GraphSpec
 from motet.representation.contract import Z_LIMIT
 from motet_train.evaluate.tables import Figures
-from motet_train.models.net import Graphs, Net, configured, encoder_and_step, normalised
+from motet_train.models.net import Graphs, Net, configured, encoder_and_step, float_rows, normalised
 from motet_train.papers.tdbn.rbm import (
     CRBM,
     RBM,
@@ -117,12 +117,12 @@ class ControlNet(Net):
         """The training of the net, layer after layer (thesis 3.3), and further parts that have a state."""
 
     def begin_crbm(self, generator: torch.Generator) -> None:
-        """Initialise the weights of the CRBM."""
+        """Initialise the weights of the CRBM; biases are 0."""
         for parameter in self.crbm.parameters():
-            parameter.zero_()
-        for weight in (self.crbm.past_weight, self.crbm.hidden_weight, self.crbm.free_past_weight):
-            if weight is not None:
-                weight.normal_(0.0, self.config.initial, generator=generator)
+            if parameter.ndim > 1:
+                parameter.normal_(0.0, self.config.initial, generator=generator)
+            else:
+                parameter.zero_()
 
     def crbm_layer(
         self,
@@ -176,31 +176,27 @@ class ControlNet(Net):
         channels = len(self.mean)
         free = self.crbm.free_units
         inputs = [
-            _spec("history", self.config.taps, codes),
-            _spec("control", len(self.expansion)),
-            _spec("noise", self.noise_units + free),
-            _spec("variety", 1),
-            _spec("temperature", 1),
+            float_rows("history", self.config.taps, codes),
+            float_rows("control", len(self.expansion)),
+            float_rows("noise", self.noise_units + free),
+            float_rows("variety", 1),
+            float_rows("temperature", 1),
         ]
         if free:
-            inputs.append(_spec("codes", codes))
+            inputs.append(float_rows("codes", codes))
         outputs = (
-            _spec("next_codes", codes),
-            _spec("frame", channels),
-            _spec("next_history", self.config.taps, codes),
+            float_rows("next_codes", codes),
+            float_rows("frame", channels),
+            float_rows("next_history", self.config.taps, codes),
         )
         step = GraphSpec(tuple(inputs), outputs, {"history": "next_history"})
-        encoder = GraphSpec((_spec("frames", channels),), (_spec("codes", codes),))
+        encoder = GraphSpec((float_rows("frames", channels),), (float_rows("codes", codes),))
         return encoder_and_step(self, encoder, step)
-
-
-def _spec(name: str, *sizes: int) -> TensorSpec:
-    return TensorSpec(name, ("batch", *sizes))
 
 
 @dataclass(frozen=True)
 class TDBNConfig:
-    """Sizes and training of the net; the bundle that ships was trained by :meth:`pure`.
+    """Sizes and training of the net; the bundle that ships was trained by the preset ``pure``.
 
     root_rotation: whether it is among the channels: 59 of CMU's skeleton, otherwise the thesis' 56. control_units:
     for each label. gait_units: above 0, two labels share one block of that size, all 0 for the first and all 1 for
@@ -237,26 +233,6 @@ class TDBNConfig:
     )
     crbm: Learning = field(default_factory=lambda: Learning(80, rate=6e-3, final_rate=0.3, temperature=(1.0, 0.38)))
 
-    @staticmethod
-    def thesis() -> "TDBNConfig":
-        """The thesis' text: 56 angles, CD-1, control units unclamped in the reconstruction, no annealing (5.2 to 5.4).
-
-        The second hidden layer is one block of 20 units for two gaits (5.3), and three equal parts for three motions
-        (5.4), which 7 units each come nearest to.
-        """
-        rbm = Learning(1000, temperature=(1.0, 1.0))
-        crbm = Learning(100, temperature=(1.0, 1.0))
-        net = TDBNConfig(root_rotation=False, control_units=7, gait_units=20, rbm=rbm, crbm=crbm)
-        return replace(net.unclamped(), sigma=1.0, past_noise=0.0, onset=1.0, temperature=1.0)
-
-    def pure(self) -> "TDBNConfig":
-        """The recipe whose windows borrow nothing, with its choice among six nets on two RBMs."""
-        return replace(self, borrowed_past=0.0, borrowed_control=0.0, onset=100.0, restarts=2, tries=3, rounds=1)
-
-    def unclamped(self) -> "TDBNConfig":
-        """:meth:`pure` with control units inferred in the reconstruction, as the thesis' text has it (5.3)."""
-        return replace(self.pure(), clamped=False, restarts=1, tries=1)
-
 
 class TDBN(ControlNet):
     """The temporal deep belief net with its normalisation: degrees in, codes as state, degrees out (thesis 4).
@@ -291,24 +267,20 @@ class TDBN(ControlNet):
         """
         config = self.config
         rbms = RBM(self.rbm.mask, config.restarts).to(self.mean.device)
-        stages = []
-        for _ in range(config.rounds):
-            stages.append(self._rbm_stage(rbms, lessons, generator))
-            for number in [*range(config.restarts)] * config.tries:
-                stages.append(self._crbm_stage(rbms, number, lessons, generator))
-        return stages, {"rbms": rbms}
-
-    def _rbm_stage(self, rbms: RBM, lessons: Lessons, generator: torch.Generator) -> Stage:
-        """The RBMs, side by side."""
-        config = self.config
 
         def begin() -> None:
             rbms.weight.normal_(0.0, config.initial, generator=generator).mul_(rbms.mask)
             rbms.visible_bias.zero_()
             rbms.hidden_bias.zero_()
 
+        # the RBMs, side by side
         layer = partial(RBMLayer, rbms, *self._frames(lessons), config.rbm, generator)
-        return Stage(config.rbm.epochs, begin, layer, whole=False)
+        stages = []
+        for _ in range(config.rounds):
+            stages.append(Stage(config.rbm.epochs, begin, layer, whole=False))
+            for number in [*range(config.restarts)] * config.tries:
+                stages.append(self._crbm_stage(rbms, number, lessons, generator))
+        return stages, {"rbms": rbms}
 
     def _crbm_stage(self, rbms: RBM, number: int, lessons: Lessons, generator: torch.Generator) -> Stage:
         """A CRBM on one of the RBMs."""
