@@ -105,7 +105,7 @@ CEILINGS = {
     "motet_train.data": 18_700,
     "motet_train.evaluate": 52_400,
     "motet_train.models": 24_700,
-    "motet_train.papers": 39_600,
+    "motet_train.papers": 39_500,
     "motet_train.recipes": 15_900,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets

@@ -5,7 +5,6 @@ D channels, L labels.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from motet.errors import MotionError
 from motet.figures.feet.contacts import lay_root_path
@@ -139,10 +138,9 @@ def gait_transitions(study: ControlStudy, count: int = 20) -> Figures:
     }
 
 
-def gait_control(study: ControlStudy, gait: ArrayLike) -> Array:
+def gait_control(study: ControlStudy, gait: Array) -> Array:
     """Controls (..., L) of a gait parameter (...): walk 1 - g, run g."""
-    g = np.asarray(gait, dtype=np.float64)
-    return study.control(walk=1 - g, run=g)
+    return study.control(walk=1 - gait, run=gait)
 
 
 def ramp(study: ControlStudy) -> Array:

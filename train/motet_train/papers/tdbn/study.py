@@ -4,7 +4,7 @@ Frames are compared in z units: each channel relative to its standard deviation 
 that are constant there. Letters in shapes: T frames, B characters, D channels, K taps, H codes, L labels.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
@@ -56,7 +56,7 @@ class Reference:
     def z(self, frames: Array) -> Array:
         """The moving channels of frames (..., D) in z units; the mean is not subtracted."""
         moving = np.isfinite(self.std)
-        return np.asarray(frames, dtype=np.float64)[..., moving] / self.std[moving]
+        return frames[..., moving] / self.std[moving]
 
     def leg_angles(self, frames: Array) -> Array:
         """The moving leg channels of frames (..., D)."""
@@ -105,9 +105,9 @@ class Recording(NamedTuple):
     frames: Array
     codes: Codes
 
-    def histories(self, times: ArrayLike, taps: int, row: int = 0) -> Codes:
+    def histories(self, times: Iterable[int], taps: int, row: int = 0) -> Codes:
         """The histories (N, K, H) just after some frames of one character."""
-        return np.stack([self.codes[time - taps + 1 : time + 1, row] for time in np.asarray(times, dtype=int)])
+        return np.stack([self.codes[time - taps + 1 : time + 1, row] for time in times])
 
 
 class Leg(NamedTuple):
@@ -143,7 +143,7 @@ class ControlStudy:
 
     def control(self, **weights: ArrayLike) -> Array:
         """Control values (..., L) by role: walk, run, bend."""
-        values = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in weights.values()))
+        values = np.broadcast_arrays(*weights.values())
         track = np.zeros((*values[0].shape, len(self.model.labels)))
         for role, value in zip(weights, values, strict=True):
             track[..., self.model.labels.index(getattr(self, role))] = value
