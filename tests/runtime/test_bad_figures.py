@@ -87,11 +87,10 @@ MAPS = {
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_a_figure_that_is_no_humans_is_refused_and_is_no_character(name: str, tmp_path: Path) -> None:
+def test_a_figure_that_is_no_humans_is_refused_and_is_no_character(name: str, tmp_path: Path, out: Path) -> None:
     figure, said = FIGURES[name]
-    source, out = tmp_path / "in.npz", tmp_path / "out"
+    source = tmp_path / "in.npz"
     motet.write(source, figure())
-    out.mkdir()
     for options in ((out / "a.vrma",), (out / "a.bvh", "--like", SKELETONS / "rokoko.bvh")):
         refused = run("convert", source, *options)
         check_refused(refused, said, out, 1)
@@ -102,9 +101,7 @@ def test_a_figure_that_is_no_humans_is_refused_and_is_no_character(name: str, tm
 
 
 @pytest.mark.parametrize("entries", MAPS)
-def test_a_map_that_does_not_fit_is_refused(entries: str, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
+def test_a_map_that_does_not_fit_is_refused(entries: str, tmp_path: Path, out: Path) -> None:
     (tmp_path / "map.json").write_text(entries)
     refused = run("convert", MIXAMO, out / "a.bvh", "--map", tmp_path / "map.json")
     check_refused(refused, MAPS[entries], out, 1)
@@ -112,9 +109,8 @@ def test_a_map_that_does_not_fit_is_refused(entries: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("verb", [("convert",), ("describe",), ("predict", "--frames", "3")])
-def test_a_glb_that_moves_a_thing_is_refused(verb: tuple[str, ...], tmp_path: Path) -> None:
-    source, out = tmp_path / "cube.glb", tmp_path / "out"
-    out.mkdir()
+def test_a_glb_that_moves_a_thing_is_refused(verb: tuple[str, ...], tmp_path: Path, out: Path) -> None:
+    source = tmp_path / "cube.glb"
     glb.write(source, dancing(4))
     gltf = parse(source)
     document = json.loads(json.dumps(gltf.document))

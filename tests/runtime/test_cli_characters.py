@@ -126,9 +126,8 @@ def test_every_command_writes_a_character(tmp_path: Path, clips: Path) -> None:
         assert motet.clips(out) == (name.strip(), "old")
 
 
-def test_what_cannot_be_written_onto_is_said_before_work(tmp_path: Path) -> None:
-    avatar, out = character(tmp_path / "avatar.glb"), tmp_path / "out"
-    out.mkdir()
+def test_what_cannot_be_written_onto_is_said_before_work(tmp_path: Path, out: Path) -> None:
+    avatar = character(tmp_path / "avatar.glb")
     for options, said in (
         (("--onto", avatar, "-o", out / "a.bvh"), "cannot write files of type '.bvh'; expected one of .glb .vrm"),
         (("--onto", "mixamo", "-o", out / "a.glb"), "--onto takes a character with its mesh (.glb .gltf .vrm)"),

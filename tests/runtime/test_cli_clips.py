@@ -27,19 +27,15 @@ def frames(folder: Path) -> dict[str, int]:
     return {path.name: len(motet.read(path)) for path in folder.iterdir()}
 
 
-def test_all_clips_go_where_their_names_can_be(many: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
+def test_all_clips_go_where_their_names_can_be(many: Path, tmp_path: Path, out: Path) -> None:
     result = run("convert", many, "--clip", "all", "-o", out / "{name}-{clip}.npz")
     assert (result.exit_code, result.stderr) == (0, "")
     assert frames(out) == {f"many-{label}.npz": 3 + i for i, label in enumerate(LABELS)}
     np.testing.assert_array_equal(motet.read(out / "many-A_B.npz").values, motet.read(f"{many}#A|B").values)
 
 
-def test_a_clip_is_named_in_the_path_or_for_all_paths(many: Path, tmp_path: Path) -> None:
+def test_a_clip_is_named_in_the_path_or_for_all_paths(many: Path, tmp_path: Path, out: Path) -> None:
     other = write_clips(tmp_path / "other.glb", [("Run", dancing(20)), ("歩く", dancing(21))])
-    out = tmp_path / "out"
-    out.mkdir()
     assert run("convert", f"{many}#Walk", other, "--clip", "2", "-o", out / "{clip}.npz").exit_code == 0
     assert frames(out) == {"Walk.npz": 3, "歩く.npz": 21}
     assert run("convert", many, out / "Walk.npz", "--clip", "歩く").exit_code == 0
@@ -48,10 +44,8 @@ def test_a_clip_is_named_in_the_path_or_for_all_paths(many: Path, tmp_path: Path
     assert (frames(out)["n-1.npz"], frames(out)["n-2.npz"]) == (3, 4)
 
 
-def test_a_file_of_one_motion_is_its_own_clip(many: Path, tmp_path: Path) -> None:
+def test_a_file_of_one_motion_is_its_own_clip(many: Path, tmp_path: Path, out: Path) -> None:
     motet.write(tmp_path / "stroll.npz", dancing(9))
-    out = tmp_path / "out"
-    out.mkdir()
     result = run("convert", many, tmp_path / "stroll.npz", "-o", out / "{clip}.npz")
     assert result.exit_code == 0
     assert result.stderr == f"motet: {many}: reading the first of 6 clips, 'Walk'; the next is many.glb#a/b: c?\n"

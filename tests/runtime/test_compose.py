@@ -22,11 +22,6 @@ HIPS = [HUMANOID.index(f"{side}UpperLeg") for side in ("left", "right")]
 PLAN = "0s at 1 2 facing 90 a person walks; 3s at 4 3 a person waves; 4.5s facing 45; 6s"
 
 
-@pytest.fixture(scope="module")
-def model() -> motet.CodesModel:
-    return motet.load("generate")
-
-
 def facing(motion: Motion) -> Array:
     """Degrees, by the line from hip to hip."""
     left, right = (positions(motion)[:, joint] for joint in HIPS)
@@ -38,17 +33,17 @@ def frame(seconds: float) -> int:
     return round(30 * seconds) - 1
 
 
-def test_without_anything_to_meet_it_is_the_story(model: motet.CodesModel) -> None:
-    found = motet.compose(model, parse_plan("0s a person jumps; 2s a person waves; 5s"), seed=3)
-    story = model.story(["a person jumps", "a person waves"], seconds=[2, 3], seed=3)
+def test_without_anything_to_meet_it_is_the_story(codes_model: motet.CodesModel) -> None:
+    found = motet.compose(codes_model, parse_plan("0s a person jumps; 2s a person waves; 5s"), seed=3)
+    story = codes_model.story(["a person jumps", "a person waves"], seconds=[2, 3], seed=3)
     assert len(found.motion) == 150
     assert not found.met
     np.testing.assert_allclose(positions(found.motion)[:, 0], positions(story.motion)[:, 0], atol=0.01)
     assert [(one.text, one.action) for one in found.passages] == [(one.text, one.action) for one in story.passages]
 
 
-def test_places_and_facings_are_met_and_told(model: motet.CodesModel) -> None:
-    found = motet.compose(model, parse_plan(PLAN))
+def test_places_and_facings_are_met_and_told(codes_model: motet.CodesModel) -> None:
+    found = motet.compose(codes_model, parse_plan(PLAN))
     root = positions(found.motion)[:, 0]
     for at, place in ((0, (1, 2)), (3, (4, 3))):
         np.testing.assert_allclose(root[max(0, frame(at)), [0, 2]], place, atol=0.02)
@@ -60,17 +55,17 @@ def test_places_and_facings_are_met_and_told(model: motet.CodesModel) -> None:
     assert next(one.action for one in found.passages) == "walk, steered"
 
 
-def test_what_is_not_met_is_told(model: motet.CodesModel) -> None:
+def test_what_is_not_met_is_told(codes_model: motet.CodesModel) -> None:
     """What is told of a motion that somebody else made."""
-    still = model.story("a person stands still", seconds=3).motion
+    still = codes_model.story("a person stands still", seconds=3).motion
     root, turned = positions(still)[:, 0], facing(still)
     place, seen = met(still, [Moment(1.0, place=(3.0, 4.0), facing=120.0)])
     assert place.off == pytest.approx(100 * math.dist(root[29, [0, 2]], (3, 4)), rel=1e-6)
     assert seen.off == pytest.approx(abs(120 - turned[29]), abs=5)
 
 
-def test_a_start_moves_all_of_it(model: motet.CodesModel) -> None:
-    here, there = (motet.compose(model, parse_plan(f"0s {at} a person walks; 3s at {to}; 4s")).motion
+def test_a_start_moves_all_of_it(codes_model: motet.CodesModel) -> None:
+    here, there = (motet.compose(codes_model, parse_plan(f"0s {at} a person walks; 3s at {to}; 4s")).motion
                    for at, to in (("", "1 2"), ("at 5 6 facing 90", "7 5")))  # fmt: skip
     one, other = positions(here), positions(there)
     turned = np.stack([one[..., 2] + 5, one[..., 1], 6 - one[..., 0]], axis=-1)  # a quarter turn to the left
@@ -78,9 +73,9 @@ def test_a_start_moves_all_of_it(model: motet.CodesModel) -> None:
 
 
 @pytest.mark.parametrize("text", ["a person walks", "a person stands still"])
-def test_the_pose_of_another_figure_is_met(model: motet.CodesModel, text: str) -> None:
+def test_the_pose_of_another_figure_is_met(codes_model: motet.CodesModel, text: str) -> None:
     moments = [Moment(0, text), Moment(2, pose=HAND_UP), Moment(4)]
-    found = motet.compose(model, moments)
+    found = motet.compose(codes_model, moments)
     (met,) = found.met
     assert met.off < 5
     assert met.late < 0.1
@@ -90,24 +85,24 @@ def test_the_pose_of_another_figure_is_met(model: motet.CodesModel, text: str) -
     assert hand[frame(3)] < head[frame(3)]
 
 
-def test_poses_that_follow_each_other_at_once_and_at_the_ends(model: motet.CodesModel) -> None:
+def test_poses_that_follow_each_other_at_once_and_at_the_ends(codes_model: motet.CodesModel) -> None:
     moments = [Moment(at, "a person stands still" if not at else None, pose=HAND_UP) for at in (0, 0.4, 1, 2)]
-    found = motet.compose(model, moments)
+    found = motet.compose(codes_model, moments)
     assert all(one.off < 5 for one in found.met)
     assert len(found.met) == 4
     steps = np.linalg.norm(np.diff(positions(found.motion), axis=0), axis=-1)
     assert steps.max() < 0.15  # metres a frame
 
 
-def test_feet_do_not_slide_more_than_when_steered(model: motet.CodesModel) -> None:
-    found = motet.compose(model, parse_plan("0s a person walks; 3s at 1 3; 6s at 4 4"))
+def test_feet_do_not_slide_more_than_when_steered(codes_model: motet.CodesModel) -> None:
+    found = motet.compose(codes_model, parse_plan("0s a person walks; 3s at 1 3; 6s at 4 4"))
     toes = positions(found.motion)[:, [HUMANOID.index(f"{side}Toes") for side in ("left", "right")]]
     speeds = 30 * np.linalg.norm(np.diff(toes[..., [0, 2]], axis=0), axis=-1)
     assert np.median(speeds.min(axis=1)) < 0.06  # of the foot that stands, m/s
     assert positions(found.motion)[..., 1].min() > -0.02
 
 
-def test_a_file_a_script_and_the_command_say_the_same(model: motet.CodesModel, tmp_path: Path) -> None:
+def test_a_file_a_script_and_the_command_say_the_same(codes_model: motet.CodesModel, tmp_path: Path) -> None:
     motet.write(tmp_path / "up.bvh", motet.read(SKELETONS / "mixamo.bvh", unit="cm"))
     rows = [
         {"at": 0, "text": "a person walks"},
@@ -122,7 +117,7 @@ def test_a_file_a_script_and_the_command_say_the_same(model: motet.CodesModel, t
         assert (left.at, left.text, left.facing, left.pose_at) == (right.at, right.text, right.facing, right.pose_at)
     out, own = tmp_path / "out.bvh", tmp_path / "own.bvh"
     said = json.loads(run("compose", tmp_path / "plan.json", "-o", out, "--json").stdout)
-    motet.write(own, motet.compose(model, other).motion)
+    motet.write(own, motet.compose(codes_model, other).motion)
     assert out.read_bytes().split(b"MOTION")[1] == own.read_bytes().split(b"MOTION")[1]
     assert [one["what"] for one in said["met"]] == ["place", "facing", "pose"]
     told = run("compose", script, "-o", out).stdout
@@ -203,21 +198,21 @@ def test_a_plan_names_motion_files_anywhere_and_no_others(tmp_path: Path) -> Non
     assert "1234" not in str(refused.value)
 
 
-def test_poses_under_the_ground_and_of_no_human_are_refused(model: motet.CodesModel) -> None:
-    still = model.story("a person stands still", seconds=1).motion
+def test_poses_under_the_ground_and_of_no_human_are_refused(codes_model: motet.CodesModel) -> None:
+    still = codes_model.story("a person stands still", seconds=1).motion
     deep = still.values - 0.5 * np.array([name == "hips.ty" for name in still.channels])
     sunk = Motion(deep, still.channels, still.units, still.fps, still.skeleton)
     box = motet.motion.Skeleton((motet.motion.Joint("box", -1, (0.0, 0.0, 0.0)),), 1.0)
     thing = Motion(np.zeros((1, 3)), ("box.tx", "box.ty", "box.tz"), ("m",) * 3, 30, box)
     for pose, said in ((sunk, "the pose of 1 s is 49 cm under the ground"), (thing, "the pose of 1 s: ")):
         with pytest.raises(motet.MotionError, match=said):
-            motet.compose(model, [Moment(0, "a person walks"), Moment(1, pose=pose), Moment(2)])
+            motet.compose(codes_model, [Moment(0, "a person walks"), Moment(1, pose=pose), Moment(2)])
 
 
 @pytest.mark.filterwarnings("ignore::motet.TextWarning")
-def test_an_unknown_prompt_warns_or_is_refused(model: motet.CodesModel) -> None:
+def test_an_unknown_prompt_warns_or_is_refused(codes_model: motet.CodesModel) -> None:
     moments = parse_plan("0s a person zorbs the moon; 2s")
     with pytest.warns(motet.TextWarning, match="zorbs"):
-        motet.compose(model, moments)
+        motet.compose(codes_model, moments)
     with pytest.raises(motet.TextError, match="zorbs"):
-        motet.compose(model, moments, strict=True)
+        motet.compose(codes_model, moments, strict=True)

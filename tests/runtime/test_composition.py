@@ -5,18 +5,12 @@ import pytest
 
 from motet.errors import TextError, TextWarning
 from motet.generate.model import CodesModel, Story
-from motet.models.load import load_as
 from motet.text.clauses import parts_of, sentences_of, stem, verbs_of
 
 VERBS = verbs_of(
     ["walking", "turning", "running", "jumping", "sitting", "drinking", "dancing", "bowing", "boxing", "something"]
 )
 COMPOSED = "he drinks, then he does a cartwheel"
-
-
-@pytest.fixture(scope="module")
-def model() -> CodesModel:
-    return load_as(CodesModel, "generate")
 
 
 @pytest.mark.parametrize(
@@ -75,38 +69,38 @@ def test_texts_are_cut_into_sentences_but_not_numbers() -> None:
     assert sentences_of("He walks 1.5 metres. He turns;\nhe sits!") == ["He walks 1.5 metres", "He turns", "he sits"]
 
 
-def test_what_one_action_shows_stays_whole(model: CodesModel) -> None:
+def test_what_one_action_shows_stays_whole(codes_model: CodesModel) -> None:
     known = "a person is walking, then stops"
-    assert model.parts(known) == [known]
-    assert model.parts(COMPOSED) == ["he drinks", "he does a cartwheel"]
+    assert codes_model.parts(known) == [known]
+    assert codes_model.parts(COMPOSED) == ["he drinks", "he does a cartwheel"]
 
 
-def test_a_composed_sentence_is_the_story_of_its_parts(model: CodesModel) -> None:
-    (made,) = model.generate(COMPOSED, seed=4)
-    told = model.story(["he drinks", "he does a cartwheel"], seed=4)
+def test_a_composed_sentence_is_the_story_of_its_parts(codes_model: CodesModel) -> None:
+    (made,) = codes_model.generate(COMPOSED, seed=4)
+    told = codes_model.story(["he drinks", "he does a cartwheel"], seed=4)
     assert isinstance(made, Story)
     assert [one.text for one in made.passages] == ["he drinks", "he does a cartwheel"]
     np.testing.assert_array_equal(made.frames, told.frames)
-    np.testing.assert_array_equal(made.frames, model.story(COMPOSED, seed=4).frames)
+    np.testing.assert_array_equal(made.frames, codes_model.story(COMPOSED, seed=4).frames)
 
 
-def test_whole_takes_it_as_one_action(model: CodesModel) -> None:
-    (made,) = model.generate(COMPOSED, whole=True)
+def test_whole_takes_it_as_one_action(codes_model: CodesModel) -> None:
+    (made,) = codes_model.generate(COMPOSED, whole=True)
     assert not isinstance(made, Story)
-    assert len(model.story(COMPOSED, whole=True).passages) == 1
+    assert len(codes_model.story(COMPOSED, whole=True).passages) == 1
 
 
-def test_seconds_are_those_of_all_parts(model: CodesModel) -> None:
-    (made,) = model.generate(COMPOSED, seconds=5)
-    assert len(made.frames) == round(5 * model.fps)
+def test_seconds_are_those_of_all_parts(codes_model: CodesModel) -> None:
+    (made,) = codes_model.generate(COMPOSED, seconds=5)
+    assert len(made.frames) == round(5 * codes_model.fps)
     assert isinstance(made, Story)
-    assert made.passages[0].stop == pytest.approx(2.5, abs=model.codec.seconds)
+    assert made.passages[0].stop == pytest.approx(2.5, abs=codes_model.codec.seconds)
 
 
-def test_strict_refuses_the_part_that_is_unknown(model: CodesModel) -> None:
+def test_strict_refuses_the_part_that_is_unknown(codes_model: CodesModel) -> None:
     with pytest.raises(TextError, match="plays the theremin"):
-        model.check("he drinks. he plays the theremin.")
+        codes_model.check("he drinks. he plays the theremin.")
     with pytest.warns(TextWarning, match="plays the theremin"):
-        model.generate("he drinks. he plays the theremin.")
+        codes_model.generate("he drinks. he plays the theremin.")
     with pytest.raises(TextError, match="knows no word of 'xyzzy'"):
-        model.generate("he drinks. xyzzy.")
+        codes_model.generate("he drinks. xyzzy.")

@@ -2,7 +2,6 @@
 
 import logging
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,8 @@ from fake_models import CONTRACT as OTHER_FIGURE
 from fake_models import manifest
 from test_mmm_figure import mmm
 
-import motet
 from motet.errors import ArgumentError, BundleError, MotionError
-from motet.motion import MIXAMO, Motion, from_humanoid, positions, to_humanoid
+from motet.motion import Motion, positions, to_humanoid
 from motet.motion.kinematics import local_rotations, local_translations, posed
 from motet.motion.rotations import axis_to_rotmat
 from motet.predict.fill import FillModel
@@ -26,16 +24,6 @@ pytestmark = pytest.mark.numeric
 @pytest.fixture(scope="module")
 def model() -> FillModel:
     return fill_model()
-
-
-@pytest.fixture(scope="module")
-def walk(clips: Path) -> Motion:
-    return motet.read(clips / "39_14.amc")
-
-
-@pytest.fixture(scope="module")
-def mixamo(walk: Motion) -> Motion:
-    return from_humanoid(to_humanoid(walk).motion, MIXAMO)
 
 
 def spoiled(motion: Motion, start: int, stop: int) -> Motion:

@@ -15,11 +15,6 @@ WALK, RUN = "39_14.amc", "09_07.amc"
 
 
 @pytest.fixture(scope="module")
-def walk(clips: Path) -> Motion:
-    return read_motion(clips / WALK)
-
-
-@pytest.fixture(scope="module")
 def model() -> FillModel:
     return motet.load("fill")
 
@@ -71,41 +66,31 @@ def test_joining_another_figure_says_so(tmp_path: Path, clips: Path) -> None:
     assert "motet: retargeted the second motion to the figure of the first" in result.stderr
 
 
-@pytest.mark.parametrize("text", ["1.0", "1-2", "a:b", "1:2:3", "", "nan:1", "1:inf", ":"])
-def test_a_gap_that_is_none(tmp_path: Path, clips: Path, text: str) -> None:
-    result = run("fill", clips / WALK, "--gap", text, "-o", tmp_path / "out.npz")
-    check_refused(result, "is no gap: give its start and stop in seconds, such as 1.0:2.0", tmp_path)
+NO_GAP = "is no gap: give its start and stop in seconds, such as 1.0:2.0"
+EITHER = "give --gap START:STOP, once or several times, or --loop"
+TRANSITION = "a transition takes more than 0 and at most 2 seconds"
+LOOP = ("fill", "--loop", "--seconds")
 
 
 @pytest.mark.parametrize(
-    "options", [(), ("--gap", "1:2", "--loop"), ("--gap", "1:2", "--seconds", 1), ("--seconds", 0.5)]
+    ("command", "said", "code"),
+    [
+        *((("fill", "--gap", gap), NO_GAP, 2) for gap in ("1.0", "1-2", "a:b", "1:2:3", "", "nan:1", "1:inf", ":")),
+        (("fill",), EITHER, 2),
+        (("fill", "--gap", "1:2", "--loop"), EITHER, 2),
+        (("fill", "--gap", "1:2", "--seconds", 1), EITHER, 2),
+        (("fill", "--seconds", 0.5), EITHER, 2),
+        (("fill", "--gap", "3:3.325"), "at the very end", 1),
+        *(((*LOOP, seconds), TRANSITION, 1) for seconds in (0, -1, 5)),
+        *((("join", "{run}", "--seconds", seconds), TRANSITION, 2) for seconds in (0, -1, 5)),
+        (("join", "{run}", "--bundle", "predict"), "bundle predict is for 'predict'; need one for 'fill'", 2),
+    ],
 )
-def test_either_gaps_or_a_loop(tmp_path: Path, clips: Path, options: tuple[object, ...]) -> None:
-    result = run("fill", clips / WALK, *options, "-o", tmp_path / "out.npz")
-    check_refused(result, "give --gap START:STOP, once or several times, or --loop", tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("gap", "said"), [("0:1", "at the very start"), ("3:3.325", "at the very end"), ("2:1", "is empty")]
-)
-def test_gaps_that_a_file_does_not_have(tmp_path: Path, clips: Path, gap: str, said: str) -> None:
-    result = run("fill", clips / WALK, "--gap", gap, "-o", tmp_path / "out.npz")
-    check_refused(result, said, tmp_path, code=1)
-
-
-@pytest.mark.parametrize("seconds", [0, -1, 5])
-def test_transitions_that_are_none(tmp_path: Path, clips: Path, seconds: float) -> None:
-    said = "a transition takes more than 0 and at most 2 seconds"
-    check_refused(
-        run("join", clips / WALK, clips / RUN, "--seconds", seconds, "-o", tmp_path / "o.npz"), said, tmp_path
-    )
-    looped = run("fill", clips / WALK, "--loop", "--seconds", seconds, "-o", tmp_path / "o.npz")
-    check_refused(looped, said, tmp_path, code=1)
-
-
-def test_a_bundle_of_another_verb_is_refused(tmp_path: Path, clips: Path) -> None:
-    result = run("join", clips / WALK, clips / RUN, "--bundle", "predict", "-o", tmp_path / "o.npz")
-    check_refused(result, "bundle predict is for 'predict'; need one for 'fill'", tmp_path)
+def test_what_cannot_be_filled_is_refused(
+    command: tuple[object, ...], said: str, code: int, tmp_path: Path, clips: Path
+) -> None:
+    verb, *options = (str(word).format(run=clips / RUN) for word in command)
+    check_refused(run(verb, clips / WALK, *options, "-o", tmp_path / "out.npz"), said, tmp_path, code)
 
 
 def test_pages_say_what_is_filled(tmp_path: Path, clips: Path) -> None:

@@ -34,17 +34,6 @@ def predictor() -> PredictModel:
     return motet.load_as(PredictModel, "predict")
 
 
-@pytest.fixture(scope="module")
-def walk(clips: Path) -> Motion:
-    return motet.read(clips / "39_14.amc")
-
-
-@pytest.fixture(scope="module")
-def mixamo(walk: Motion) -> Motion:
-    """The walk on a skeleton of Mixamo's names, without thumbs and with another number of joints in the neck."""
-    return motet.from_humanoid(motet.to_humanoid(walk).motion, MIXAMO)
-
-
 @pytest.mark.parametrize("bundle", ["describe", "predict", "tdbn"])
 def test_files_of_the_models_own_joints_are_taken_as_they_are(bundle: str, tmp_path: Path, clips: Path) -> None:
     contract = motet.load(bundle).contract

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from motet import ControlError, SteerModel, SteerSession, load
+from motet import ControlError, SteerModel, SteerSession
 from motet.figures.humanoid import BONES, HUMANOID
 from motet.motion.rotations import Array, conjugate, quat_rotated
 from motet.steering import look_layer as looking
@@ -14,11 +14,6 @@ from motet.steering.pose import Pose
 from motet.steering.scripts import parse_orders
 
 AROUND = [(0, 1.6, 3), (2, 1.6, 2), (-2.5, 1.2, 1.2), (1, 0, 3), (-1, 2.5, 2.5)]
-
-
-@pytest.fixture(scope="module")
-def model() -> SteerModel:
-    return load("control")
 
 
 def ticks(session: SteerSession, count: int) -> list[Pose]:
@@ -49,8 +44,8 @@ def palm(pose: Pose, hand: str) -> Array:
     return wrist + (tip - wrist) * reaching.PALM / 0.18
 
 
-def test_heads_look_at_points_while_figures_walk(model: SteerModel) -> None:
-    session = model.start(characters=len(AROUND))
+def test_heads_look_at_points_while_figures_walk(steer_model: SteerModel) -> None:
+    session = steer_model.start(characters=len(AROUND))
     session.control(speed=[0, 1.3, 0, 1.3, 0.8])
     session.look_at(AROUND)
     for pose in ticks(session, 60)[30:]:
@@ -63,8 +58,8 @@ def test_heads_look_at_points_while_figures_walk(model: SteerModel) -> None:
         assert np.degrees(np.arccos(((way * wanted).sum(axis=1) / far).clip(max=1)))[inside].max() < 1.5
 
 
-def test_no_gaze_goes_farther_or_faster_than_people_turn_their_heads(model: SteerModel) -> None:
-    session, seen = model.start(), []
+def test_no_gaze_goes_farther_or_faster_than_people_turn_their_heads(steer_model: SteerModel) -> None:
+    session, seen = steer_model.start(), []
     for angle in np.linspace(0, 6 * np.pi, 270):  # around the head, three times in nine seconds
         session.look_at((0.7 * np.sin(angle), 1.6, 0.7 * np.cos(angle)))
         seen.append(gaze(session.tick())[0])
@@ -74,12 +69,12 @@ def test_no_gaze_goes_farther_or_faster_than_people_turn_their_heads(model: Stee
     found = np.array(seen)
     assert np.abs(found[:, 0]).max() < np.degrees(looking.LookSettings().aside) + 1
     assert np.abs(found[:, 1]).max() < np.degrees(looking.LookSettings().up) + 1
-    assert np.abs(np.diff(found, axis=0)).max() * model.fps < 600
+    assert np.abs(np.diff(found, axis=0)).max() * steer_model.fps < 600
     assert np.ptp(found[:, 0]) > 160  # over both shoulders
 
 
-def test_a_look_begins_and_ends_smoothly_and_leaves_nothing(model: SteerModel) -> None:
-    looks, plain = model.start(), model.start()
+def test_a_look_begins_and_ends_smoothly_and_leaves_nothing(steer_model: SteerModel) -> None:
+    looks, plain = steer_model.start(), steer_model.start()
     ticks(looks, 10), ticks(plain, 10)
     looks.look_at((3, 1.6, 1))
     turned = [gaze(looks.tick())[0, 0] - gaze(plain.tick())[0, 0] for _ in range(45)]
@@ -91,11 +86,11 @@ def test_a_look_begins_and_ends_smoothly_and_leaves_nothing(model: SteerModel) -
     np.testing.assert_array_equal(looks.tick().rotations, plain.tick().rotations)
 
 
-def test_hands_are_at_points_and_arms_keep_their_lengths(model: SteerModel) -> None:
+def test_hands_are_at_points_and_arms_keep_their_lengths(steer_model: SteerModel) -> None:
     points = np.array([(0.2, 1.3, 0.45), (0.5, 1.5, 0.2), (0.1, 1.7, 0.3), (0.3, 0.95, 0.2), (-0.1, 1.2, 0.35)])
     for hand, sign in (("left", 1), ("right", -1)):
         own = points * [sign, 1, 1]
-        session, plain = (model.start(characters=len(points)) for _ in range(2))
+        session, plain = (steer_model.start(characters=len(points)) for _ in range(2))
         session.reach(hand, own)  # type: ignore[arg-type]
         pose, other = ticks(session, 60)[-1], ticks(plain, 60)[-1]
         np.testing.assert_allclose(palm(pose, hand), own, atol=2e-3)
@@ -107,9 +102,9 @@ def test_hands_are_at_points_and_arms_keep_their_lengths(model: SteerModel) -> N
             assert np.linalg.norm(bone, axis=1) == pytest.approx(0.28 if upper == "UpperArm" else 0.25, abs=1e-6)
 
 
-def test_a_point_out_of_reach_is_reached_for_and_told(model: SteerModel) -> None:
+def test_a_point_out_of_reach_is_reached_for_and_told(steer_model: SteerModel) -> None:
     points = np.array([(0.3, 1.4, 5.0), (0.2, 1.3, 0.4), (0.1, 1.2, -0.5)])  # too far, near, behind the back
-    session = model.start(characters=3)
+    session = steer_model.start(characters=3)
     session.reach("left", points)
     poses = ticks(session, 60)
     assert session.out_of_reach.tolist() == [[True, False], [False, False], [True, False]]
@@ -120,17 +115,17 @@ def test_a_point_out_of_reach_is_reached_for_and_told(model: SteerModel) -> None
     chest, _ = joint(poses[-1], "upperChest")
     side = quat_rotated(conjugate(chest[2:]), (palm(poses[-1], "left") - joint(poses[-1], "leftUpperArm")[1])[2:])[0]
     assert side @ [1, 0, 1] / np.sqrt(2) / np.linalg.norm(side) > np.cos(reaching.ReachSettings().widest) - 0.01
-    speeds = np.linalg.norm(np.diff([palm(pose, "left") for pose in poses], axis=0), axis=2) * model.fps
+    speeds = np.linalg.norm(np.diff([palm(pose, "left") for pose in poses], axis=0), axis=2) * steer_model.fps
     assert speeds.max() < 5
     session.reach("left", None)
     assert not session.out_of_reach.any() or ticks(session, 1)
-    plain = model.start(characters=3)
+    plain = steer_model.start(characters=3)
     np.testing.assert_array_equal(ticks(session, 60)[-1].contacts, ticks(plain, 121)[-1].contacts)
     assert not session.out_of_reach.any()
 
 
-def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(model: SteerModel) -> None:
-    session = model.start()
+def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(steer_model: SteerModel) -> None:
+    session = steer_model.start()
     session.reach("right", (-0.2, 1.2, 0.4))
     ticks(session, 45)
     for t in range(30):
@@ -159,8 +154,8 @@ def test_a_hand_follows_a_point_that_moves_at_once_and_one_that_leaps_smoothly(m
         ((0, 1, 2), "first", "ids must be numbers"),
     ],
 )
-def test_points_that_make_no_sense_are_refused(model: SteerModel, points: Any, ids: Any, said: str) -> None:
-    session = model.start(characters=3)
+def test_points_that_make_no_sense_are_refused(steer_model: SteerModel, points: Any, ids: Any, said: str) -> None:
+    session = steer_model.start(characters=3)
     before = session.snapshot()
     with pytest.raises(ControlError, match=said):
         session.look_at(points, ids=ids)
@@ -172,9 +167,9 @@ def test_points_that_make_no_sense_are_refused(model: SteerModel, points: Any, i
         session.reach("both", (0, 1, 2))  # type: ignore[arg-type]
 
 
-def test_a_script_sends_a_figure_to_a_point(model: SteerModel) -> None:
-    session = model.start()
-    poses = list(session.follow(parse_orders("walk 1s, go to 1 3 facing 90 8s, stop 1s", model.gaits)))
+def test_a_script_sends_a_figure_to_a_point(steer_model: SteerModel) -> None:
+    session = steer_model.start()
+    poses = list(session.follow(parse_orders("walk 1s, go to 1 3 facing 90 8s, stop 1s", steer_model.gaits)))
     assert len(poses) == 300
     x, z, facing = poses[-1].ground[0]
     assert np.hypot(x - 1, z - 3) < 0.1
