@@ -5,7 +5,9 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,29 +28,21 @@ def test_describe_is_three_lines_of_python(clips: Path) -> None:
     assert printed == [found.to_json() for found in model.describe(motion)]
 
 
-def test_generate_is_three_lines_of_python(tmp_path: Path) -> None:
-    run("generate", "a person walks", "-o", tmp_path / "cli.bvh")
-    model = motet.load("generate")
-    best = model.generate("a person walks")[0]
-    best.write(tmp_path / "library.bvh")
+@pytest.mark.parametrize(
+    ("command", "made"),
+    [
+        (("generate", "a person walks"), lambda _: motet.load("generate").generate("a person walks")[0]),
+        (("predict", "{clips}/39_14.amc"), lambda clips: motet.load("predict").predict(motet.read(clips / WALK))),
+        (("control", "run 1s, walk 1s"), lambda _: motet.load("control").run("run 1s, walk 1s")),
+        (("control", "run 1s, walk 1s", "--bundle", "tdbn"), lambda _: motet.load("tdbn").run("run 1s, walk 1s")),
+    ],
+)
+def test_a_command_is_three_lines_of_python(
+    command: tuple[str, ...], made: Callable[[Path], Any], tmp_path: Path, clips: Path
+) -> None:
+    run(*(word.format(clips=clips) for word in command), "-o", tmp_path / "cli.bvh")
+    motet.write(tmp_path / "library.bvh", made(clips))
     assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
-
-
-def test_predict_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
-    run("predict", clips / WALK, "-o", tmp_path / "cli.bvh")
-    model = motet.load("predict")
-    following = model.predict(motet.read(clips / WALK))
-    motet.write(tmp_path / "library.bvh", following)
-    assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
-
-
-def test_control_is_three_lines_of_python(tmp_path: Path) -> None:
-    for bundle in ("control", "tdbn"):
-        run("control", "run 1s, walk 1s", "--bundle", bundle, "-o", tmp_path / "cli.bvh")
-        model = motet.load(bundle)
-        motion = model.run("run 1s, walk 1s")
-        motet.write(tmp_path / "library.bvh", motion)
-        assert (tmp_path / "cli.bvh").read_bytes() == (tmp_path / "library.bvh").read_bytes()
 
 
 def test_embed_is_three_lines_of_python(tmp_path: Path, clips: Path) -> None:
@@ -74,14 +68,16 @@ def test_each_file_is_tried_and_each_failure_is_named(tmp_path: Path, clips: Pat
     "command",
     [
         ("control", "--bundle", "tdbn", "walk .5s", "--in-place"),
-        ("predict", "{clips}/39_14.amc", "--frames", "5"),
-        ("fill", "{clips}/39_14.amc", "--gap", "1:1.5"),
+        ("predict", "{source}", "--frames", "5"),
+        ("fill", "{source}", "--gap", ".5:.7"),
     ],
 )
 def test_commands_write_every_format(tmp_path: Path, clips: Path, command: tuple[str, ...]) -> None:
+    source = tmp_path / "source.npz"
+    motet.write(source, motet.read(clips / WALK).resample(30)[:40])
     for extension in WRITTEN:
         out = tmp_path / f"out{extension}"
-        assert run(*(word.format(clips=clips) for word in command), "-o", out).exit_code == 0
+        assert run(*(word.format(source=source) for word in command), "-o", out).exit_code == 0
         assert out.stat().st_size > 500
 
 
@@ -103,12 +99,6 @@ def test_results_are_numbered_where_no_name_is_asked_for(tmp_path: Path, clips: 
     for number, source in enumerate((RUN, WALK), start=1):
         expected = motet.read(clips / source).values
         np.testing.assert_array_equal(motet.read(tmp_path / f"out-{number}.npz").values, expected)
-
-
-def test_predict_carries_several_motions_on_as_it_does_each(clips: Path) -> None:
-    model, motions = motet.load("predict"), [motet.read(clips / WALK), motet.read(clips / RUN)]
-    for one, motion in zip(model.predict(motions, frames=4), motions, strict=True):
-        np.testing.assert_array_equal(one.values, model.predict(motion, frames=4).values)
 
 
 def test_a_unit_for_a_mixed_folder_loses_no_file(tmp_path: Path, clips: Path) -> None:
@@ -142,10 +132,9 @@ def test_a_unit_loses_no_file_of_a_folder_that_is_searched_and_is_the_one_reason
 
 
 def test_the_frame_rate_and_the_skeleton_of_an_amc_can_be_told(tmp_path: Path, clips: Path) -> None:
-    skeleton = tmp_path / "skeleton.asf"
+    skeleton = tmp_path / "elsewhere.txt"
     skeleton.write_bytes((clips / WALK).with_suffix(".asf").read_bytes())
     (tmp_path / "walk.amc").write_bytes((clips / WALK).read_bytes())
-    skeleton = skeleton.rename(tmp_path / "elsewhere.txt")
     out = tmp_path / "out.npz"
     assert run("convert", tmp_path / "walk.amc", out, "--fps-in", 60, "--asf", skeleton).exit_code == 0
     assert motet.read(out).fps == 60

@@ -1,6 +1,5 @@
 """Folders, patterns and zips of motions: which files are meant, and that every verb answers them as it does each."""
 
-import json
 import pickle
 import zipfile
 from dataclasses import replace
@@ -77,13 +76,6 @@ def test_describe_says_the_same_of_a_folder_by_two_processes_and_of_a_zip(
     ]
     for said, there in ((zipped.stdout, one.stdout), (zipped.stderr, one.stderr)):
         assert said == there.replace(str(folder), str(packed))
-
-
-def test_describe_of_many_is_what_it_is_of_each(folder: Path) -> None:
-    found = {row["input"]: row["hypotheses"] for row in json.loads(run("describe", folder, "--json").stdout)}
-    model = motet.load("describe")
-    for path in (folder / "0.bvh", folder / "b" / "39_14.amc"):
-        assert found[f"{path}"] == [one.to_json() for one in model.describe(motet.read(path))]
 
 
 def test_embed_and_convert_write_the_same_by_two_processes(folder: Path, tmp_path: Path) -> None:

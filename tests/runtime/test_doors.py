@@ -86,6 +86,8 @@ def test_what_is_wrong_is_named(models: Models, door: Door, expected: str) -> No
 def test_what_has_a_motion_is_written(models: Models, tmp_path: Path) -> None:
     motet.write(tmp_path / "a.npz", models.generated)  # type: ignore[arg-type]
     np.testing.assert_array_equal(motet.read(tmp_path / "a.npz").values, models.motion.values)
+    models.generated.write(tmp_path / "b.npz")
+    assert (tmp_path / "b.npz").read_bytes() == (tmp_path / "a.npz").read_bytes()
 
 
 def test_a_plan_may_be_a_script(models: Models) -> None:
