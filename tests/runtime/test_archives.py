@@ -68,13 +68,6 @@ def test_nothing_is_unpacked_to_where_a_name_leads(tmp_path: Path, name: str) ->
     assert list(tmp_path.iterdir()) == [packed]
 
 
-def test_a_zip_of_nothing_but_strange_names_has_no_motions(tmp_path: Path) -> None:
-    (tmp_path / "private.bvh").write_bytes(BVH)
-    packed = zipped(tmp_path / "c.zip", (f"{tmp_path}/private.bvh", b"junk"))
-    with pytest.raises(motet.FormatError, match="no motion files"):
-        files_of([packed])
-
-
 def test_a_link_and_a_name_that_is_not_listed_are_refused(tmp_path: Path) -> None:
     packed = zipped(tmp_path / "c.zip", ("link.bvh", b"/etc/passwd"), mode=stat.S_IFLNK | 0o777)
     for name in ("link.bvh", "none.bvh"):
@@ -90,20 +83,15 @@ def test_a_zip_in_a_zip_is_not_opened(tmp_path: Path) -> None:
         pass
 
 
-def test_a_bomb_is_not_unpacked(tmp_path: Path) -> None:
+def test_a_bomb_is_not_unpacked_whatever_its_zip_announces(tmp_path: Path) -> None:
     packed = zipped(tmp_path / "bomb.zip", ("a.bvh", b"\0" * (archives.SMALL_FILE + 1)))
     with pytest.raises(motet.FormatError, match=r"a\.bvh: cannot be unpacked: it has more than 16777216 bytes"):
         Source(packed / "a.bvh").read()
     with ZipFiles(packed) as files, pytest.raises(motet.FormatError):
         files.unpack("a.bvh", tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_what_a_zip_announces_is_not_trusted(tmp_path: Path) -> None:
-    packed = zipped(tmp_path / "bomb.zip", ("a.bvh", b"\0" * (archives.SMALL_FILE + 1)))
     content = bytearray(packed.read_bytes())
-    entry = content.index(b"PK\x01\x02")
-    struct.pack_into("<L", content, entry + 24, 1000)  # of its unpacked size
+    struct.pack_into("<L", content, content.index(b"PK\x01\x02") + 24, 1000)  # of its unpacked size
     packed.write_bytes(content)
     with pytest.raises(motet.FormatError, match="cannot be unpacked"):
         Source(packed / "a.bvh").read()

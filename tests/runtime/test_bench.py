@@ -80,13 +80,6 @@ def test_what_is_no_comparison_is_refused_before_anything_is_measured(
     assert quick == []
 
 
-def test_a_busy_machine_is_said(monkeypatch: pytest.MonkeyPatch, quick: list[str]) -> None:
-    busy = Machine(**{**vars(HERE), "load": 1.5})
-    monkeypatch.setattr(Machine, "here", staticmethod(lambda: busy))
-    assert "the machine is busy (load 1.5 on 2 cores): figures are too low" in run("bench", "--bundle", "fill").stderr
-    assert quick == ["fill"]
-
-
 def test_a_load_is_that_of_others_while_it_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     counts = iter([2, 1, 3] * 9)
     waits: list[float] = []
@@ -105,18 +98,17 @@ def test_a_load_is_that_of_others_while_it_is_measured(tmp_path: Path, monkeypat
     assert machine.wanted_by_others() == 0.6
 
 
-def test_an_overloaded_machine_measures_nothing_without_force(
-    monkeypatch: pytest.MonkeyPatch, quick: list[str]
+@pytest.mark.parametrize(("load", "options", "code"), [(1.5, (), 0), (3.0, (), 2), (3.0, ("--force",), 0)])
+def test_a_busy_machine_is_said_and_an_overloaded_one_measures_nothing_without_force(
+    load: float, options: tuple[str, ...], code: int, monkeypatch: pytest.MonkeyPatch, quick: list[str]
 ) -> None:
-    busy = Machine(**{**vars(HERE), "load": 3.0})
+    busy = Machine(**{**vars(HERE), "load": load})
     monkeypatch.setattr(Machine, "here", staticmethod(lambda: busy))
-    refused = run("bench", "--bundle", "fill")
-    assert (refused.exit_code, quick) == (2, [])
-    assert "the machine is busy (load 3.0 on 2 cores): wait until" in refused.stderr
-    assert "--force" in refused.stderr
-    forced = run("bench", "--bundle", "fill", "--force")
-    assert (forced.exit_code, quick) == (0, ["fill"])
-    assert "figures are too low" in forced.stderr
+    result = run("bench", "--bundle", "fill", *options)
+    assert (result.exit_code, quick) == ((0, ["fill"]) if code == 0 else (2, []))
+    assert f"the machine is busy (load {load} on 2 cores): " in result.stderr
+    assert ("figures are too low" if code == 0 else "wait until") in result.stderr
+    assert ("--force" in result.stderr) == (code == 2)
 
 
 def test_the_ceilings_are_those_of_a_product_and_a_copy(monkeypatch: pytest.MonkeyPatch) -> None:

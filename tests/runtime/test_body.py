@@ -23,6 +23,21 @@ def volume(places, triangles):
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
+def turned_about_z(degrees):
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+
+
+def bent(mesh, bends):
+    """Corners of the body in its T-pose but for some joints, each turned in its parent."""
+    turns, places = np.tile(np.eye(3), (len(T_POSE), 1, 1)), T_POSE.copy()
+    for at, joint in enumerate(HUMANOID.joints):
+        if joint.parent >= 0:
+            turns[at] = turns[joint.parent] @ bends.get(joint.name, np.eye(3))
+            places[at] = places[joint.parent] + turns[joint.parent] @ (T_POSE[at] - T_POSE[joint.parent])
+    return mesh.carried(turns, places - np.einsum("jab,jb->ja", turns, T_POSE))
+
+
 @pytest.mark.parametrize(("level", "most"), [(0, 5200), (1, 1300), (2, 300)])
 def test_the_body_is_closed_and_carried_whole(level, most):
     mesh = human_mesh(level)
@@ -52,15 +67,9 @@ def test_the_body_stands_on_the_ground_around_its_joints():
 @pytest.mark.parametrize("slope", [0, 20, 40])
 def test_shoulders_go_on_from_the_neck(slope):
     """From the front the outline falls from neck to arm without a notch or a cliff, also if collar bones slope."""
-    mesh, names = human_mesh(), [joint.name for joint in HUMANOID.joints]
-    turns, places = np.tile(np.eye(3), (len(names), 1, 1)), T_POSE.copy()
-    for at, joint in enumerate(HUMANOID.joints):
-        angle = {"leftShoulder": -slope, "leftUpperArm": slope - 80}.get(joint.name, 0)
-        if joint.parent >= 0:
-            turns[at] = turns[joint.parent] @ turned_about_z(angle)
-            places[at] = places[joint.parent] + turns[joint.parent] @ (T_POSE[at] - T_POSE[joint.parent])
-    corners = mesh.carried(turns, places - np.einsum("jab,jb->ja", turns, T_POSE))
-    left = [names.index(name) for name in ("upperChest", "neck", "leftShoulder", "leftUpperArm")]
+    mesh = human_mesh()
+    corners = bent(mesh, {"leftShoulder": turned_about_z(-slope), "leftUpperArm": turned_about_z(slope - 80)})
+    left = [HUMANOID.index(name) for name in ("upperChest", "neck", "leftShoulder", "leftUpperArm")]
     is_left = (mesh.weights * np.isin(mesh.joints, left)).sum(axis=1) > 0.5
     own = mesh.triangles[is_left[mesh.triangles].all(axis=1)]
     shares = np.array([(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]) / 8
@@ -68,11 +77,6 @@ def test_shoulders_go_on_from_the_neck(slope):
     outline = [height[(x > at) & (x < at + 0.01)].max() for at in np.arange(0.07, 0.2, 0.01)]
     assert np.diff(outline).max() < 0.006
     assert np.diff(outline).min() > -0.03
-
-
-def turned_about_z(degrees):
-    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
 
 
 def test_a_loft_of_a_square_is_a_box():
@@ -112,14 +116,9 @@ def test_weights_even_out_as_by_a_matrix():
 
 @pytest.mark.parametrize(("bone", "axis", "least"), [("LowerLeg", 0, 0.9), ("UpperLeg", 0, 0.85), ("LowerArm", 1, 0.9)])
 def test_a_body_keeps_its_volume_where_it_bends(bone, axis, least):
-    mesh, names = human_mesh(), [joint.name for joint in HUMANOID.joints]
-    turns, places = np.tile(np.eye(3), (len(names), 1, 1)), T_POSE.copy()
-    bent = np.roll(np.roll(turned_about_z(90), axis + 1, axis=0), axis + 1, axis=1)
-    for at, joint in enumerate(HUMANOID.joints):
-        if joint.parent >= 0:
-            turns[at] = turns[joint.parent] @ (bent if joint.name == f"left{bone}" else np.eye(3))
-            places[at] = places[joint.parent] + turns[joint.parent] @ (T_POSE[at] - T_POSE[joint.parent])
-    corners = mesh.carried(turns, places - np.einsum("jab,jb->ja", turns, T_POSE))
+    mesh = human_mesh()
+    bend = np.roll(np.roll(turned_about_z(90), axis + 1, axis=0), axis + 1, axis=1)
+    corners = bent(mesh, {f"left{bone}": bend})
     assert least < volume(corners, mesh.triangles) / volume(mesh.places, mesh.triangles) < 1.1
 
 
