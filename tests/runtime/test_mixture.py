@@ -75,18 +75,6 @@ def test_as_the_naive_search_of_each_row(width: int, candidates: int, heat: floa
             assert one.log_likelihood == pytest.approx(other.log_likelihood, abs=1e-3)
 
 
-def test_a_row_does_not_depend_on_its_batch() -> None:
-    step, context, seeds = frame_step(2, SIZE, CONTEXT), contexts(5), [8, 7, 6, 5, 4]
-    together = search(step, context, seeds, 3, 2, 1.0, 10)
-    for i in (0, 3):
-        (alone,) = search(step, context[i : i + 1], seeds[i : i + 1], 3, 2, 1.0, 10)
-        for one, other in zip(together[i], alone, strict=True):
-            np.testing.assert_array_equal(one.frames, other.frames)
-            assert one.log_likelihood == other.log_likelihood
-    other = search(step, context[:1], [9], 3, 2, 1.0, 10)
-    assert not np.array_equal(other[0][0].frames[0], together[0][0].frames[0])
-
-
 def test_one_candidate_gives_independent_samples_of_the_mixture() -> None:
     """Against the mixture's own moments and the flag's probability, over many hypotheses."""
     step, context = frame_step(2, SIZE, CONTEXT, stop=0.5), contexts(1)
@@ -145,37 +133,3 @@ def test_motions_are_neither_empty_nor_longer_than_allowed() -> None:
         for row in search(step, context, range(4), 3, 2, 1.0, 7):
             assert [len(sample.frames) for sample in row] == [length] * 3
             assert all(np.isfinite(sample.log_likelihood) for sample in row)
-
-
-def test_no_motion_comes_twice() -> None:
-    step, context = frame_step(2, SIZE, CONTEXT), contexts(6)
-    for row in search(step, context, range(6), 4, 6, 1.0, 5):
-        assert len({sample.frames.tobytes() for sample in row}) == 4
-
-
-def test_more_candidates_find_likelier_frames() -> None:
-    step, context = frame_step(2, SIZE, CONTEXT, stop=-50.0), contexts(8)
-    likelihoods = [
-        np.mean([row[0].log_likelihood for row in search(step, context, range(8), 3, n, 1.0, 10)]) for n in (1, 4, 16)
-    ]
-    assert likelihoods[0] < likelihoods[1] < likelihoods[2]
-
-
-def test_a_hypothesis_that_ended_is_ranked_by_its_own_length() -> None:
-    """In other units every density changes by a constant factor, and nothing else changes."""
-    step, context = frame_step(2, SIZE, CONTEXT), contexts(6)
-
-    def scaled(frame: NDArray[np.float32], **rest: NDArray[np.float32]) -> tuple[NDArray[np.float32], ...]:
-        units = np.append(np.full(SIZE, 1000.0), 1).astype(np.float32)
-        first = (frame == 1).all(axis=1, keepdims=True)
-        out = step({"frame": np.where(first, frame, frame * units), **rest})
-        return out["log_weights"], out["means"] / 1000, out["stds"] / 1000, out["active"], out["next_state"]
-
-    plain = search(step, context, range(6), 3, 3, 1.0, 12)
-    other = search(FakeGraph(step.spec, scaled), context, range(6), 3, 3, 1.0, 12)
-    for row, changed in zip(plain, other, strict=True):
-        assert [len(s.frames) for s in row] == [len(s.frames) for s in changed]
-        for one, two in zip(row, changed, strict=True):
-            np.testing.assert_allclose(one.frames, two.frames * 1000, atol=1e-3)
-            gain = len(one.frames) * SIZE * np.log(1000)
-            assert two.log_likelihood == pytest.approx(one.log_likelihood + gain, abs=1e-2)
