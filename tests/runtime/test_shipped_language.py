@@ -11,6 +11,7 @@ from memory import traced
 
 from motet.errors import MotionError
 from motet.formats import read_motion
+from motet.models.describe import Part
 from motet.models.load import load
 from motet.models.nearest_neighbour import NOTHING
 from motet.motion.motion import Motion
@@ -60,16 +61,6 @@ def test_what_is_no_human_action_is_not_described_surely(clips: Path) -> None:
     with pytest.raises(MotionError):
         model.describe(walk[:1])
     assert "walk" in model.describe(replace(walk, values=walk.values[::-1].copy()))[0].text
-
-
-def test_a_long_time_of_standing_is_one_part(clips: Path) -> None:
-    model = load("describe")
-    pose = model.prepared(read_motion(clips / "39_14.amc"))
-    values = np.repeat(pose.values[-1:], 900 * round(pose.fps), axis=0)
-    values[:, :3] = 0
-    parts = model.timeline(replace(pose, values=values))
-    assert len(parts) == 1
-    assert parts[0].stop == pytest.approx(900, abs=1)
 
 
 def test_a_walk_that_turns_left_travels_and_turns_and_is_written_alike_every_time(tmp_path: Path) -> None:
@@ -136,9 +127,9 @@ def test_hours_of_standing_take_no_more_memory_than_minutes(clips: Path) -> None
     model = load("describe")
     pose = model.prepared(read_motion(clips / "39_14.amc"))
     held = []
-    for frames in (3000, 12_000):
+    for frames in (2000, 9000):
         motion = replace(pose, values=upright(pose, frames))
-        held.append(traced(lambda motion=motion: model.timeline(motion)))
-        (part,) = model.timeline(motion)
-        assert (part.start, part.stop, part.confident) == (0, frames / pose.fps, False)
-    assert held[1] - held[0] < 9000 * 8 * len(pose.channels) / 5
+        parts: list[Part] = []
+        held.append(traced(lambda motion=motion, parts=parts: parts.extend(model.timeline(motion))))
+        assert [(part.start, part.stop, part.confident) for part in parts] == [(0, frames / pose.fps, False)]
+    assert held[1] - held[0] < 7000 * 8 * len(pose.channels) / 5
