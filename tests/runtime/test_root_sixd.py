@@ -9,7 +9,7 @@ from figures import walker
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.motion import Motion, mirror, positions
+from motet.motion import Motion, positions
 from motet.motion.kinematics import euler_of, local_rotations
 from motet.motion.rotations import axis_to_rotmat, rotvec_to_rotmat
 from motet.representation.contract import MotionContract, named, sequences
@@ -101,16 +101,6 @@ def test_a_motion_that_is_gone_on_with_says_where_and_which_way(metres_per_unit:
     np.testing.assert_allclose(metres(found), metres(motion)[50:], atol=1e-9)
     # the first frame's rates count: they lead from the last frame before
     assert not np.allclose(metres(found)[0], metres(motion)[49])
-
-
-@pytest.mark.parametrize("name", CLIPS)
-def test_mirrored_frames_are_those_of_the_mirrored_motion(clips: Path, name: str) -> None:
-    motion = slow(clips, name)
-    features = SIXD.features(motion)
-    flip, expected = SIXD.mirror(features), SIXD.features(mirror(motion))
-    np.testing.assert_allclose(flip(features.values), expected.values, atol=1e-9)
-    np.testing.assert_array_equal(flip(flip(features.values)), features.values)
-    assert np.abs(flip(features.values) - features.values).max() > 0.1
 
 
 def cartwheel(frames: int = 90, fps: float = 30.0, turn: float = 40.0) -> Motion:
