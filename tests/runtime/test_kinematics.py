@@ -6,7 +6,7 @@ from figures import walker
 
 from motet.errors import MotionError
 from motet.formats import read_motion
-from motet.motion.kinematics import euler_of, global_transforms, local_rotations, positions, with_channels
+from motet.motion.kinematics import euler_of, local_rotations, positions, with_channels
 from motet.motion.motion import Motion
 
 pytestmark = pytest.mark.numeric
@@ -57,17 +57,6 @@ def test_positions_are_what_the_definition_says(name, clips):
     fast = positions(motion)
     for frame in (0, len(motion) // 2, len(motion) - 1):
         np.testing.assert_allclose(fast[frame], naive_positions(motion, frame), atol=1e-10)
-
-
-def test_rotations_are_rotations_and_positions_keep_bones_as_long():
-    motion = walker()
-    rotations, places = global_transforms(motion)
-    product = rotations @ np.swapaxes(rotations, -1, -2)
-    np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), product.shape), atol=1e-12)
-    parents = [joint.parent for joint in motion.skeleton.joints[1:]]
-    lengths = np.linalg.norm(places[:, 1:] - places[:, parents], axis=-1)
-    expected = np.linalg.norm(motion.skeleton.offsets[1:], axis=-1)
-    np.testing.assert_allclose(lengths, np.broadcast_to(expected, lengths.shape), atol=1e-12)
 
 
 def test_units_do_not_matter():

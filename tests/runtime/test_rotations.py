@@ -63,15 +63,6 @@ def test_quaternions_and_vectors_give_back_their_rotation():
     np.testing.assert_allclose(rotvec_to_rotmat(vectors), rotations, atol=1e-12)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_continuous_euler_undoes_leaps(order):
-    smooth = np.cumsum(RNG.normal(0, 0.05, (400, 2, 3)), axis=0)
-    leaping = rotmat_to_euler(euler_to_rotmat(smooth, order), order)
-    leaping[0] = smooth[0]
-    result = continuous_euler(leaping)
-    np.testing.assert_allclose(result, smooth, atol=1e-9)
-
-
 def test_scipy_agrees():
     rotation = pytest.importorskip("scipy.spatial.transform").Rotation
     rotations = rotation.from_rotvec(ANGLES)
