@@ -10,6 +10,7 @@ from fake_models import FakeGraph, manifest, spec
 from figures import walker
 
 import motet
+from motet.decode.loop import advance
 from motet.errors import BundleError, DecodingError, MotionError
 from motet.formats import read_motion, write_motion
 from motet.motion.kinematics import local_rotations, positions
@@ -124,16 +125,6 @@ def test_exponential_maps_do_not_leap() -> None:
     assert np.abs(np.diff(figure.values[:, place : place + 3], axis=0)).max() > 3
     assert np.abs(np.diff(smooth.values[:, place : place + 3], axis=0)).max() < 0.5
     np.testing.assert_array_equal(smooth.values[-1], figure.values[-1])
-
-
-def test_another_frame_rate_ends_with_the_same_frame() -> None:
-    motion = walker(41, fps=120.0)
-    found = motion.resample(FPS, to_end=True)
-    np.testing.assert_array_equal(found.values, motion.values[::4])
-    np.testing.assert_array_equal(motion[:40].resample(FPS, to_end=True).values, motion.values[3:40:4])
-    slow = walker(9, fps=24.0).resample(FPS, to_end=True)
-    assert len(slow) == 11
-    np.testing.assert_allclose(slow.values[-1], walker(9, fps=24.0).values[-1], atol=1e-9)
 
 
 def test_a_stream_gives_what_the_whole_motion_gives() -> None:
@@ -256,6 +247,17 @@ def test_what_knows_its_errors_tells_them_in_centimetres() -> None:
     assert sure.expected_errors([]).shape == (0, HORIZON)
     with pytest.raises(BundleError, match="4 errors for a horizon of 3"):
         telling({**sizes, "N": HORIZON + 1})
+
+
+def test_the_step_hands_out_frame_by_frame_what_is_taken_at_once() -> None:
+    model = motet.load("predict")
+    contract = model.contract
+    noise = np.random.default_rng(0).normal(size=(5, model.seed_frames, len(contract.channels)))
+    seeds = contract.mean + contract.std * 0.3 * noise
+    state = {"trajectory": model.graphs["encoder"]({"frames": seeds.astype(np.float32)})["trajectory"]}
+    for frame in model.next_frames(seeds, model.horizon).swapaxes(0, 1):
+        stepped, state = advance(model.graphs["step"], state, {})
+        np.testing.assert_array_equal(stepped["frame"], frame)
 
 
 def test_a_stream_of_another_figure_gives_what_the_whole_motion_gives(clips) -> None:
