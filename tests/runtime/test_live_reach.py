@@ -92,9 +92,7 @@ def test_fingers_do_all_on_a_phone_held_upright(file: Path, tmp_path: Path) -> N
         page.open(file, ready="window.motet?.hands.buttons[9]")
         page.value("motet.state.pause = true, motet.pilot = null")
         assert page.value(BEYOND) == []
-        x, y, wide = page.value(
-            "(({ x, y, width }) => [x, y, width])(document.querySelector('#stick').getBoundingClientRect())"
-        )
+        x, y, wide = page.value(ROUND)
         page.touch("touchStart", (x + wide / 2, y + wide / 2))
         page.touch("touchMove", (x + wide / 2, y))
         assert np.hypot(*page.value("motet.hands.pushed")) == pytest.approx(1, abs=0.02)

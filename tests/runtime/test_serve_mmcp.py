@@ -20,7 +20,11 @@ from motet.motion import HUMANOID, Motion, from_humanoid, global_transforms, rig
 from motet.motion.rotations import Array
 
 pytest.importorskip("motionmcp")
-uvicorn = pytest.importorskip("uvicorn")
+pytest.importorskip("uvicorn")
+import uvicorn
+from motionmcp import client
+
+from motet.serve.application import app
 
 WALK = {"type": "text", "prompt": "a person walks forward", "duration_frames": 60}
 QUARTER = [0.0, 0.0, 0.5**0.5, 0.5**0.5]
@@ -31,8 +35,6 @@ PAGE = Path(__file__).parents[2] / "docs/blender.md"
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    from motet.serve.application import app
-
     config = uvicorn.Config(app(mmcp=True), port=0, log_level="error")
     server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run)
@@ -46,18 +48,18 @@ def url() -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def skeleton(url: str) -> Any:
-    from motionmcp import client
-
     (model,) = client.get_capabilities(url)["models"]
     return model["canonical_skeleton"]
 
 
+def body(skeleton: Any, **request: Any) -> dict[str, Any]:
+    """A request for a walk, but for what else it says."""
+    return {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": [WALK], **request}
+
+
 def ask(url: str, skeleton: Any, **request: Any) -> list[dict[str, Any]]:
     """The samples of an answer."""
-    from motionmcp import client
-
-    request = {"segments": [WALK], "options": {"seed": 5}, **request}
-    document = client.generate(url, {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, **request})
+    document = client.generate(url, body(skeleton, **{"options": {"seed": 5}, **request}))
     samples: list[dict[str, Any]] = client.parse_gltf_samples(document)
     return samples
 
@@ -97,8 +99,6 @@ def told(seed: int, *texts: str, frames: int = 60) -> Motion:
 
 
 def test_capabilities_say_what_it_can(url: str) -> None:
-    from motionmcp import client
-
     (model,) = client.get_capabilities(url)["models"]
     assert [joint["name"] for joint in model["canonical_skeleton"]["joints"]] == list(HUMANOID.names)
     assert model["supported_constraints"] == ["root_path", "pose_keyframe"]
@@ -137,10 +137,7 @@ def test_other_frame_rates_have_the_same_motion(url: str, skeleton: Any) -> None
 
 
 def test_a_seed_that_is_not_given_is_drawn_and_told(url: str, skeleton: Any) -> None:
-    from motionmcp import client
-
-    request = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": [WALK]}
-    documents = [client.generate(url, request) for _ in range(2)]
+    documents = [client.generate(url, body(skeleton)) for _ in range(2)]
     seeds = [int(one["extensions"]["MMCP_motion"]["notes"][0]["message"].split()[-1]) for one in documents]
     assert seeds[0] != seeds[1]
     again = ask(url, skeleton, options={"seed": seeds[0]})
@@ -218,11 +215,8 @@ def test_a_loop_ends_as_it_began(url: str, skeleton: Any) -> None:
 
 
 def test_unknown_words_are_noted(url: str, skeleton: Any) -> None:
-    from motionmcp import client
-
     segments = [{**WALK, "prompt": "a person zorbs and walks"}]
-    request = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": segments}
-    notes = client.generate(url, request)["extensions"]["MMCP_motion"]["notes"]
+    notes = client.generate(url, body(skeleton, segments=segments))["extensions"]["MMCP_motion"]["notes"]
     assert any(note["code"] == "unknown_words" and "zorbs" in note["message"] for note in notes)
 
 
@@ -284,8 +278,8 @@ TREE = {"joints": [{"name": "trunk", "parent": None, "rest_translation": [0, 1, 
     ],
 )
 def test_what_cannot_be_answered_is_refused(url: str, skeleton: Any, request_: Any, code: str, said: str) -> None:
-    body = {"protocol_version": "1.0", "model": "motet", "skeleton": skeleton, "segments": [WALK], **request_}
-    post = urllib.request.Request(f"{url}/generate", json.dumps(body).encode())  # the SDK's client sends no NaN
+    content = json.dumps(body(**{"skeleton": skeleton, **request_})).encode()
+    post = urllib.request.Request(f"{url}/generate", content)  # the SDK's client sends no NaN
     with pytest.raises(urllib.error.HTTPError) as refused:
         urllib.request.urlopen(post)
     error = json.load(refused.value)["error"]
