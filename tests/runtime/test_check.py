@@ -165,11 +165,9 @@ def test_each_line_is_printed_before_the_next_file_is_read(folder: Path, monkeyp
     assert done == ["look", "print"] * 5 + ["print"]  # and the bracket
 
 
-def test_refusals(folder: Path, tmp_path: Path) -> None:
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    check_refused(run("check", empty), "no motion files", empty)
-    check_refused(run("check", folder, "-o", empty / "a.bvh"), "ends in .html", empty)
-    check_refused(run("check"), "Missing argument", empty)
-    gone = run("check", empty / "gone.bvh")
+def test_refusals(folder: Path, out: Path) -> None:
+    check_refused(run("check", out), "no motion files", out)
+    check_refused(run("check", folder, "-o", out / "a.bvh"), "ends in .html", out)
+    check_refused(run("check"), "Missing argument", out)
+    gone = run("check", out / "gone.bvh")
     assert (gone.exit_code, gone.stdout.split(maxsplit=2)[1:]) == (1, ["unreadable", "no such file\n"])

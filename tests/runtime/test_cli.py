@@ -188,13 +188,6 @@ def test_bad_input_gets_one_message_and_writes_nothing(
     check_refused(result, said, out, code)
 
 
-def test_the_runtime_imports_neither_torch_nor_onnx() -> None:
-    heavy = "{'torch', 'onnx', 'scipy', 'matplotlib'}"
-    code = f"import motet, motet.cli.predict, motet.cli.convert, sys; print(sorted({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
 def test_a_command_without_its_extra_says_how_to_get_it(tmp_path: Path) -> None:
     """As in an environment without torch: the import system finds no torch."""
     (tmp_path / "sitecustomize.py").write_text(

@@ -134,14 +134,12 @@ def test_what_is_only_nearest_is_after_a_question_mark(folder: Path) -> None:
     assert seen == {True, False}
 
 
-def test_refusals(folder: Path, tmp_path: Path) -> None:
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    check_refused(run("search", "xyz", folder), "knows no word of 'xyz'", empty)
-    check_refused(run("search", "", folder), "has no words", empty)
-    check_refused(run("search", "walks", empty), "no motion files", empty)
-    check_refused(run("search", empty / "gone.bvh", folder), "gone.bvh", empty)
-    check_refused(run("search", "walks", folder, "--index", empty / "no" / "x.npz"), "does not exist", empty)
+def test_refusals(folder: Path, out: Path) -> None:
+    check_refused(run("search", "xyz", folder), "knows no word of 'xyz'", out)
+    check_refused(run("search", "", folder), "has no words", out)
+    check_refused(run("search", "walks", out), "no motion files", out)
+    check_refused(run("search", out / "gone.bvh", folder), "gone.bvh", out)
+    check_refused(run("search", "walks", folder, "--index", out / "no" / "x.npz"), "does not exist", out)
     assert not (folder / INDEX_FILE).exists()
 
 
