@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from figures import walker
@@ -59,7 +61,7 @@ def test_axes_that_are_no_mirror_images_are_converted(seed):
     motion = symmetric("zyx", (10.0, 20.0, 30.0), rng.uniform(-180, 180, (5, 16)), axis)
     joints = list(motion.skeleton.joints)
     joints[2] = Joint("rarm", 0, joints[2].offset, "xyz", axis)
-    motion = Motion(motion.values, motion.channels, motion.units, 30, Skeleton(tuple(joints)))
+    motion = replace(motion, skeleton=Skeleton(tuple(joints)))
     result = mirror(motion)
     np.testing.assert_allclose(positions(result), mirrored_places(motion), atol=1e-8)
     np.testing.assert_allclose(positions(mirror(result)), positions(motion), atol=1e-8)
@@ -76,11 +78,9 @@ def test_a_channel_that_lacks_is_added():
 def test_other_lateral_axes():
     motion = walker()
     turned = tuple(Joint(j.name, j.parent, (j.offset[2], j.offset[1], j.offset[0])) for j in motion.skeleton.joints)
-    skeleton = Skeleton(turned)
-    assert lateral_axis(skeleton) == 2
-    result = mirror(Motion(motion.values, motion.channels, motion.units, 30, skeleton))
-    expected = mirrored_places(Motion(motion.values, motion.channels, motion.units, 30, skeleton), axis=2)
-    np.testing.assert_allclose(positions(result), expected, atol=1e-9)
+    motion = replace(motion, skeleton=Skeleton(turned))
+    assert lateral_axis(motion.skeleton) == 2
+    np.testing.assert_allclose(positions(mirror(motion)), mirrored_places(motion, axis=2), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["02_06", "09_07", "39_14"])

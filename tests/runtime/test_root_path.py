@@ -47,7 +47,7 @@ def test_trembling_does_not_drive_it(clips):
     motion = read_motion(clips / "39_14.amc")
     noise = np.random.default_rng(0).normal(0, 0.2, motion.values.shape)
     noise[:, :3] = 0
-    assert error_of(Motion(motion.values + noise, motion.channels, motion.units, motion.fps, motion.skeleton))[0] < 0.1
+    assert error_of(replace(motion, values=motion.values + noise))[0] < 0.1
 
 
 def test_the_lowest_joint_of_the_feet_is_on_the_ground_in_a_walk(clips):
@@ -116,9 +116,7 @@ def test_a_jump_on_the_spot_goes_up_and_comes_down(height):
 
 def test_units_that_are_not_known_are_judged_by_the_figure(clips):
     motion = read_motion(clips / "39_14.amc")
-    nameless = Skeleton(motion.skeleton.joints)
-    unknown = Motion(motion.values, motion.channels, motion.units, motion.fps, nameless)
-    assert error_of(unknown)[0] < 0.06
+    assert error_of(replace(motion, skeleton=Skeleton(motion.skeleton.joints)))[0] < 0.06
 
 
 def test_an_old_path_is_replaced_and_the_angles_stay(clips):
