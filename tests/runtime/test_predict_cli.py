@@ -53,6 +53,20 @@ def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Pat
     assert np.abs(np.diff(steps))[len(walk) - 3 : len(walk) + 3].max() < 0.3 * steps.mean()  # no jolt at the seam
 
 
+@pytest.fixture(scope="module")
+def bad(clips: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of motions that cannot be continued."""
+    folder = tmp_path_factory.mktemp("bad")
+    walk = read_motion(clips / WALK)
+    write_motion(folder / "walker.npz", walker())
+    write_motion(folder / "short.npz", walk[:36])
+    write_motion(folder / "still.npz", walk.select(walk.channels[3:]))
+    write_motion(folder / "nan.bvh", walk)
+    text = (folder / "nan.bvh").read_text().splitlines()
+    (folder / "nan.bvh").write_text("\n".join([*text[:-1], text[-1].replace(text[-1].split()[7], "nan", 1)]))
+    return folder
+
+
 @pytest.mark.parametrize(
     ("code", "arguments", "said"),
     [
@@ -73,20 +87,10 @@ def test_append_writes_the_motion_before_what_follows(tmp_path: Path, clips: Pat
     ],
 )
 def test_bad_input_gets_one_message_and_writes_nothing(
-    code: int, arguments: list[str], said: str, tmp_path: Path, clips: Path
+    code: int, arguments: list[str], said: str, tmp_path: Path, clips: Path, bad: Path
 ) -> None:
-    out, bad = tmp_path / "out", tmp_path / "bad"
-    out.mkdir()
-    bad.mkdir()
-    walk = read_motion(clips / WALK)
-    write_motion(bad / "walker.npz", walker())
-    write_motion(bad / "short.npz", walk[:36])
-    write_motion(bad / "unit.bvh", walk)
-    write_motion(bad / "still.npz", walk.select(walk.channels[3:]))
-    text = (bad / "unit.bvh").read_text().splitlines()
-    (bad / "nan.bvh").write_text("\n".join([*text[:-1], text[-1].replace(text[-1].split()[7], "nan", 1)]))
-    result = run("predict", *(argument.format(out=out, clips=clips, bad=bad) for argument in arguments))
-    check_refused(result, said, out, code)
+    result = run("predict", *(argument.format(out=tmp_path, clips=clips, bad=bad) for argument in arguments))
+    check_refused(result, said, tmp_path, code)
 
 
 def test_a_page_says_where_the_prediction_begins(tmp_path: Path, clips: Path) -> None:
