@@ -97,16 +97,16 @@ CEILINGS = {
     "motet.representation": 9_400,
     "motet.search": 3_600,
     "motet.serve": 16_800,
-    "motet.steering": 57_700,
+    "motet.steering": 57_800,
     "motet.text": 6_000,
     "motet_export": 12_300,
     "motet_train": 9_300,
     "motet_train.cli": 7_900,
-    "motet_train.data": 18_700,
+    "motet_train.data": 19_600,
     "motet_train.evaluate": 52_400,
     "motet_train.models": 24_700,
     "motet_train.papers": 39_500,
-    "motet_train.recipes": 15_900,
+    "motet_train.recipes": 16_000,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

@@ -293,6 +293,11 @@ def test_resumed_training_is_the_same_to_the_bit(folder: Path, parts: tuple[obje
     assert all(torch.equal(whole[name], again[name]) for name in whole)
     other = trained(*given, tmp_path / "other", *parts, "--seed", 1).model.state_dict()
     assert any(not torch.equal(whole[name], other[name]) for name in whole)
+    # a writer takes up both parts of another
+    of_writer = ("--codec", tmp_path / "whole", "--actions", tmp_path / "whole")
+    taken = trained(*given, tmp_path / "taken", *of_writer)
+    assert all(torch.equal(whole[name], value) for name, value in taken.model.state_dict().items())
+    assert taken.manifest["training"]["codec"] == Run.load(tmp_path / "whole").manifest["training"]["codec"]
     # codec and net of actions are what they were
     for name, prefix in (("codec", "codec"), ("actions", "text")):
         kept = torch.load(folder / name / "weights.pt", weights_only=True)

@@ -25,6 +25,9 @@ LEVEL_FOR = 0.1
 COLLAR_SLOPE = 10.0
 """Degrees by which collar bones slope below the horizontal when the arms hang."""
 
+COLLARS = {side: HUMANOID.offsets[HUMANOID.index(f"{side}UpperArm")] for side in ("left", "right")}
+"""Collar bones (3,) of the humanoid at rest, in metres."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -84,17 +87,28 @@ def with_even_collars(features: Motion) -> Motion:
     Marker sets give them slopes of 0 (CMU's) to 40 degrees (ACCAD's), with which other figures' shoulders droop.
     """
     local = joint_rotations(features)
+    turns = {}
+    for side, collar in COLLARS.items():
+        turns[side] = sloping(side, rotated(local[f"{side}Shoulder"], collar).mean(axis=0))
+    return with_turned_collars(features, turns)
+
+
+def sloping(side: str, direction: Array) -> Array:
+    """The rotation matrix (3, 3) that swings a collar bone from a direction (3,), seen from the chest, to the slope."""
+    outwards = COLLARS[side][0]
+    return swing(direction, np.array([outwards, -abs(outwards) * np.tan(np.radians(COLLAR_SLOPE)), 0.0]))
+
+
+def with_turned_collars(features: Motion, turns: dict[str, Array]) -> Motion:
+    """Features whose collar bones are turned by a matrix (3, 3) a side, seen from the chest; arms keep directions."""
+    local = joint_rotations(features)
     values = features.values.copy()
-    for side in ("left", "right"):
+    for side, turn in turns.items():
         collar = local[f"{side}Shoulder"]
-        arm = local[f"{side}UpperArm"]
-        # swing the collar bone's mean direction to the desired one
-        rest = HUMANOID.offsets[HUMANOID.index(f"{side}UpperArm")]
-        sloping = np.array([rest[0], -abs(rest[0]) * np.tan(np.radians(COLLAR_SLOPE)), 0.0])
-        even_collar = product(swing(rotated(collar, rest).mean(axis=0), sloping), collar)
+        turned_collar = product(turn, collar)
         # the upper arm undoes that
-        same_arm = product(product(inverse(even_collar), collar), arm)
-        for bone, rotations in ((f"{side}Shoulder", even_collar), (f"{side}UpperArm", same_arm)):
+        same_arm = product(product(inverse(turned_collar), collar), local[f"{side}UpperArm"])
+        for bone, rotations in ((f"{side}Shoulder", turned_collar), (f"{side}UpperArm", same_arm)):
             columns = [features.channels.index(f"{bone}.{kind}") for kind in SIXD_KINDS]
             values[:, columns] = rotmat_to_sixd(rotations)
     return replace(features, values=values)

@@ -562,9 +562,9 @@ def smooth_length(vectors: Tensor, least: float) -> Tensor:
 
 
 def joint_weights(contract: MotionContract, parts: tuple[str, ...], times: float) -> Tensor:
-    """The weights (J,) of joints in a loss, mean 1: those of some parts of both sides weigh ``times`` the others."""
+    """The weights (J,) of joints in a loss, mean 1: those of some parts, of both sides, weigh ``times`` the others."""
     assert contract.skeleton is not None
-    heavy: list[str] = []
+    heavy = list(parts)
     for side in LEFT_RIGHT:
         heavy += [sided(side, part) for part in parts]
     weights = np.array([times if name.startswith(tuple(heavy)) else 1.0 for name in contract.skeleton.names])

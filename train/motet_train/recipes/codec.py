@@ -12,6 +12,7 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
+from motet_train.data.habits import without_habits
 from motet_train.data.sixd_windows import SixdWindows, Window
 from motet_train.data.store import Store, split
 from motet_train.descent import GradientLearner, Term, Terms
@@ -25,9 +26,9 @@ from motet_train.runs import Run
 
 @dataclass(frozen=True)
 class CodecVisits:
-    """frames: of a window. ends: weight of hands and feet. sharp: weight of the sharpness of movement, which sets the
-    jerk of decoded motions. settled: whether further training keeps the codes of a codec; if not, motions that it
-    decodes badly are drawn more often (:func:`badly_shown`)."""
+    """frames: of a window. ends: weight of hands, feet and the head. sharp: weight of the sharpness of movement, which
+    sets the jerk of decoded motions. settled: whether further training keeps the codes of a codec; if not, motions that
+    it decodes badly are drawn more often (:func:`badly_shown`)."""
 
     frames: int = 64
     ends: float = 3.0
@@ -61,6 +62,7 @@ def train_codec(store: Store, job: Job, data: str, by: str, start: Run | None = 
     start: a codec to train further; if its codes are settled, only the decoder is trained.
     """
     store.needs_sixd("a codec is trained on")
+    store = without_habits(store)
     visits = job.recipe.visits
     parts = split(store.records, 0, by)
     contract = store.contract(parts.train)
@@ -97,7 +99,7 @@ def _learner(
     """Learns to decode windows to the frames that they were encoded from."""
     visits = job.recipe.visits
     book = net.book.numpy().astype(np.float64)
-    weights = joint_weights(contract, ("Foot", "Toes", "LowerArm", "Hand"), visits.ends).to(job.device)
+    weights = joint_weights(contract, ("Foot", "Toes", "LowerArm", "Hand", "head"), visits.ends).to(job.device)
     validation_window = validation.draw(128, book, np.random.default_rng(0))
     return GradientLearner(
         net.to(job.device),

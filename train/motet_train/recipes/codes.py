@@ -18,6 +18,7 @@ from motet.representation.root_block import poses_of
 from motet_train.data.acts import acts
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
+from motet_train.data.habits import without_habits
 from motet_train.data.sentences import Actions
 from motet_train.data.sixd_windows import CodeBatch, CodedMotion, Codes, CodeWindows, memory_of, with_way
 from motet_train.data.store import Store
@@ -69,7 +70,8 @@ RECIPES = {"default": DEFAULT}
 
 def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions: Run) -> Run:
     """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store
-    and split. DataError if they were not."""
+    and split, or of another writer that has them. DataError if they were not."""
+    store = without_habits(store)
     corpus = divided(store, mirror=True, by=by)
     shown = spoken(store, corpus.parts.train)
     sentences = {"vocabulary": list(corpus.vocabulary.words), "actions": described(shown)}
@@ -90,7 +92,8 @@ def _add_parts(about: dict[str, Any], codec: Run, actions: Run) -> None:
     """Add to a manifest the actions of a run, and how it and a codec were trained."""
     about |= {key: actions.manifest[key] for key in ("actions", "common") if key in actions.manifest}
     for part, run in (("codec", codec), ("actions", actions)):
-        about["training"][part] = origin(run.manifest["training"])
+        training = run.manifest["training"]
+        about["training"][part] = training[part] if isinstance(run.model, MotionCodes) else origin(training)
 
 
 def _untrained(config: CodeModelConfig, codec: MotionCodec, actions: ActionNet, memory: Tensor) -> MotionCodes:
@@ -149,10 +152,13 @@ def alike_distance(memory: Memory) -> float:
 
 
 def _parts(codec: Run, actions: Run, sentences: Json) -> tuple[MotionCodec, ActionNet]:
-    """The nets of two runs; DataError for other runs, or for a net of actions that was trained on other sentences."""
-    if not isinstance(codec.model, MotionCodec):
+    """The nets of two runs, of parts or of writers that have them; DataError for other runs, or for a net of actions
+    that was trained on other sentences."""
+    codec_net = codec.model.codec if isinstance(codec.model, MotionCodes) else codec.model
+    action_net = actions.model.text if isinstance(actions.model, MotionCodes) else actions.model
+    if not isinstance(codec_net, MotionCodec):
         raise DataError(f"codes need the run of a codec (motet train codec), not of {codec.manifest['model']}")
-    if not isinstance(actions.model, ActionNet):
+    if not isinstance(action_net, ActionNet):
         kind = actions.manifest["model"]
         raise DataError(f"codes need the run of a net of actions (motet train actions), not of {kind}")
     if any(actions.manifest[key] != value for key, value in sentences.items()):
@@ -160,7 +166,7 @@ def _parts(codec: Run, actions: Run, sentences: Json) -> tuple[MotionCodec, Acti
         raise DataError(
             f"the net of actions {name} was trained on other sentences: train it on the same data and split"
         )
-    return codec.model, actions.model
+    return codec_net, action_net
 
 
 @torch.no_grad()

@@ -126,6 +126,7 @@ def _figures(prompt: Prompt, tracks: Sequence[Track]) -> Figures:
         "share": _mean([prompt.passes(track) for track in tracks]) if tracks else 0.0,
         "turn": _mean([track.turn for track in tracks]) if prompt.turns else np.nan,
         "slide": _mean([slide(track) for track in tracks]) if prompt.walk else np.nan,
+        "head": _mean([head_pitch(track) for track in tracks]) if prompt.walk else np.nan,
         "jerk": _mean([jerk(track.points, RATE) for track in tracks]),
         "depth": _mean([depth(track) for track in tracks]),
         "seconds": _mean([track.seconds for track in tracks]),
@@ -160,6 +161,12 @@ def slide(track: Track) -> float:
     balls = track.points[:, BALLS]
     ground = ground_of(track.points[:, feet_of(HUMANOID), 1])
     return skate(balls, balls[..., 1] - ground, 0.04, RATE)
+
+
+def head_pitch(track: Track) -> float:
+    """How far the head is pitched forward, in degrees: the mean over all frames."""
+    top = track.body("head_end") - track.body("head")
+    return float(np.degrees(np.arctan2(top[:, 2], top[:, 1])).mean())
 
 
 def depth(track: Track) -> float:
@@ -207,7 +214,7 @@ def _groups(kind: str, rows: Mapping[str, Figures], known: list[str]) -> Report:
 def _quality(rows: Mapping[str, Figures]) -> Figures:
     """The mean quality of the motions of all prompts."""
     quality = {}
-    for key in ("slide", "jerk", "depth", "spread", "seconds"):
+    for key in ("slide", "head", "jerk", "depth", "spread", "seconds"):
         quality[key] = _mean([row[key] for row in rows.values()])
     return quality
 
