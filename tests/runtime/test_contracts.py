@@ -18,7 +18,13 @@ pytestmark = pytest.mark.numeric
 
 Array = NDArray[Any]
 CLIPS = Path(__file__).parents[2] / "train" / "motet_train" / "data" / "cmu"
-SENTENCES = ("a person walks", "he jumps, then bows", "a person waves")
+SENTENCES = (
+    "a person walks",
+    "he jumps, then bows",
+    "a person waves",
+    "a person runs and turns left",
+    "a person walks slowly to the right",
+)
 GAPS = ([(1.0, 1.5)], [(0.5, 0.9), (1.5, 1.8)], [(1.2, 1.6)])
 
 

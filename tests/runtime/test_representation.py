@@ -70,6 +70,13 @@ def test_frames_come_back_as_a_motion_from_the_origin_or_after_another(name: str
         np.testing.assert_allclose(positions(read_motion(tmp_path / f"{number}.bvh")), positions(motion), atol=1e-6)
 
 
+def test_vectors_of_joints_are_not_planted() -> None:
+    motion = walker(80)
+    contract = contract_of("root_vectors", motion)
+    frames = contract.frames(motion)
+    np.testing.assert_array_equal(contract.motion(frames).values, contract.motion(frames, plant=False).values)
+
+
 def test_angles_get_a_path_and_stay_in_place_when_asked(clips: Path) -> None:
     motion = read_motion(clips / "39_14.amc")
     contract = contract_of("angles", motion)
