@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from web_cases import texts
+from web_crowd import ACTS, CROWD, FIGURES, STAND, Calls
 
 import motet
 from motet.bundle.bundle import Bundle
@@ -34,6 +35,8 @@ from motet.predict.model import PredictModel
 from motet.search.model import Index, IndexSettings, Member, SearchModel
 from motet.steering.acts import Act, ActSettings
 from motet.steering.model import SteerModel
+from motet.steering.pose import Pose
+from motet.steering.session import SteerSession
 from motet.text.vocabulary import EOS, SOS, SPECIALS, Vocabulary
 
 pytestmark = pytest.mark.numeric
@@ -317,6 +320,26 @@ STEERED: list[dict[str, Any]] = [
 :func:`turning_about`, and for "crouch" :func:`crouching`."""
 
 
+def obey(session: SteerSession, calls: Calls, acts: dict[str, Act | str | None]) -> None:
+    """Let a session do what is called by name, in this order."""
+    for name, given in calls.items():
+        if name in acts:
+            session.act(acts[name], **given)
+        elif name == "set_ground":
+            session.set_ground(GROUNDS.get(given))
+        elif isinstance(given, dict):
+            getattr(session, name)(**given)
+        else:
+            getattr(session, name)(given)
+
+
+def shown_rotations(pose: Pose) -> NDArray[Any]:
+    """Those of bones, the hips' in the world."""
+    rotations = pose.rotations.copy()
+    rotations[:, 0] = quat_product(pose.heading, rotations[:, 0])
+    return rotations
+
+
 def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[list[Any]]]:
     """Of two figures in every twelfth picture, 48 a second: ground, hips, rotations, contacts; and what happens to each
     after each call."""
@@ -324,29 +347,47 @@ def steered(model: SteerModel, hold_feet: bool) -> tuple[list[list[Any]], list[l
     acts: dict[str, Act | str | None] = {"end": None, "jump": "jump"}
     for name, frames in (("act", turning_about()), ("crouch", crouching())):
         acts[name] = Act.of(name, np.array(frames, np.float32), model.fps, model.settings(ActSettings))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ControlWarning)
-        for calls in STEERED:
-            for name, given in calls.items():
-                if name in acts:
-                    session.act(acts[name], **given)
-                elif name == "set_ground":
-                    session.set_ground(GROUNDS.get(given))
-                elif isinstance(given, dict):
-                    getattr(session, name)(**given)
-                else:
-                    getattr(session, name)(given)
-            poses = [session.advance(1 / 48) for _ in range(36)]
-            found += poses[::12]
-            events = [event for pose in poses for event in pose.events]
-            happened.append([[[one.kind, one.name] for one in events if one.character == n] for n in range(2)])
+    for calls in STEERED:
+        with collected(ControlWarning):
+            obey(session, calls, acts)
+        poses = [session.advance(1 / 48) for _ in range(36)]
+        found += poses[::12]
+        events = [event for pose in poses for event in pose.events]
+        happened.append([[[one.kind, one.name] for one in events if one.character == n] for n in range(2)])
     rows: list[list[Any]] = []
     for pose in found:
-        rotations = pose.rotations.copy()
-        rotations[:, 0] = quat_product(pose.heading, rotations[:, 0])
-        parts = (pose.ground, pose.height[:, None], rotations.reshape(2, -1), pose.contacts)
-        rows.append(np.round(np.concatenate(parts, axis=1, dtype=np.float64), 6).tolist())
+        parts = (pose.ground, pose.height[:, None], shown_rotations(pose).reshape(2, -1), pose.contacts)
+        rows.append(np.round(np.concatenate(parts, axis=1, dtype=np.float64), 5).tolist())
     return rows, happened
+
+
+def crowded(model: SteerModel) -> dict[str, Any]:
+    """What the calls of :mod:`web_crowd` lead to. After each: of each figure ground, hips, and the sums of all bones'
+    rotations; who did what in which picture; and how many pictures hands were out of reach for, by their number."""
+    acts: dict[str, Act | str | None] = {"jump": "jump"}
+    for name, act in ACTS.items():
+        frames = np.array([np.add(STAND, share * np.subtract(act["last"], STAND)) for share in act["shares"]])
+        acts[name] = Act.of(name, frames, model.fps, model.settings(ActSettings))
+    made = [[len(act), act.legs] for act in acts.values() if isinstance(act, Act)]
+    session = model.start(characters=FIGURES)
+    rows, happened, beyond = [], [], []
+    for calls in CROWD:
+        with collected(ControlWarning):
+            obey(session, calls, acts)
+        events: dict[str, list[int]] = {}
+        missed = np.zeros(2 * FIGURES, int)
+        for picture in range(36):
+            pose = session.advance(1 / 48)
+            missed += session.out_of_reach.ravel()
+            for event in sorted(pose.events, key=lambda event: event.character):
+                events.setdefault(f"{event.kind} {event.name}".strip(), []).extend((event.character, picture))
+        turns = shown_rotations(pose)[..., :3].sum(axis=1)
+        parts = (pose.ground, pose.height[:, None], turns)
+        rows.append(np.round(np.concatenate(parts, axis=1, dtype=np.float64), 5).tolist())
+        happened.append(events)
+        beyond.append([[int(hand), int(missed[hand])] for hand in np.flatnonzero(missed)])
+    kept = {"stand": STAND, "acts": ACTS, "calls": CROWD, "made": made}
+    return {**kept, "rows": rows, "happened": happened, "beyond": beyond}
 
 
 def answers() -> dict[str, Any]:
@@ -374,6 +415,7 @@ def answers() -> dict[str, Any]:
         "steered": steered(control, hold_feet=False)[0],
         "held": held,
         "happened": happened,
+        "crowd": crowded(control),
     }
 
 

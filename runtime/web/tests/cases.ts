@@ -4,6 +4,7 @@ import { Bundle, type TextTables } from "../src/bundle/bundle.js";
 import {
   actOf,
   ControlModel,
+  type ControlSession,
   DescribeModel,
   FillModel,
   GenerateModel,
@@ -301,6 +302,38 @@ const GROUNDS = {
   ridges: (_: number, z: number) => 0.15 * Math.sin(6 * z),
 };
 
+type Some = { ids?: number[]; upper?: boolean };
+type Go = Way & { points: number[][] | null };
+type Points = { points: number[] | number[][] | null };
+type Call = {
+  put?: number[][];
+  push?: number[];
+  control?: Told;
+  look_at?: Some & Points;
+  reach?: Some & Points & { hand: "left" | "right" };
+  keep_apart?: number | null;
+  go_to?: Go;
+  go_along?: Go;
+  set_ground?: keyof typeof GROUNDS | null;
+};
+type Acts = Record<string, Parameters<ControlSession["act"]>[0]>;
+
+/** Let a session do what is called by name. */
+function obey(session: ControlSession, calls: Call, acts: Acts): void {
+  const { put, push, control, keep_apart, go_to, go_along, look_at, reach, set_ground } = calls;
+  for (const [name, given] of Object.entries(calls))
+    if (name in acts) session.act(acts[name]!, given as Some);
+  if (look_at) session.lookAt(look_at.points, look_at);
+  if (reach) session.reach(reach.hand, reach.points, reach);
+  if (put) session.put(put);
+  if (push) session.push(push);
+  if (control) session.control(control);
+  if (keep_apart !== undefined) session.keepApart(keep_apart);
+  if (go_to) session.goTo(go_to.points, go_to);
+  if (go_along) session.goAlong(go_along.points!, go_along);
+  if (set_ground !== undefined) session.setGround(set_ground && GROUNDS[set_ground]);
+}
+
 /** The calls of python.json, and some pictures of each, with the feet held and without. */
 async function steers(read: Read): Promise<void> {
   const { model } = await loaded(read, "control", ControlModel);
@@ -309,42 +342,14 @@ async function steers(read: Read): Promise<void> {
     [true, python.held],
   ] as const) {
     const session = model.start({ characters: 2, holdFeet });
-    const turn = actOf(model, "act", python.acted.flat());
-    const squat = actOf(model, "crouch", python.crouched.flat());
-    type Go = Way & { points: number[][] | null };
-    type Some = { ids?: number[] };
-    type Points = { points: number[] | number[][] | null };
-    type Call = {
-      put?: number[][];
-      push?: number[];
-      control?: Told;
-      act?: { ids: number[]; upper?: boolean };
-      crouch?: { ids: number[]; upper?: boolean };
-      end?: Some;
-      jump?: Some;
-      look_at?: Some & Points;
-      reach?: Some & Points & { hand: "left" | "right" };
-      keep_apart?: number | null;
-      go_to?: Go;
-      go_along?: Go;
-      set_ground?: keyof typeof GROUNDS | null;
+    const acts: Acts = {
+      act: actOf(model, "act", python.acted.flat()),
+      crouch: actOf(model, "crouch", python.crouched.flat()),
+      end: null,
+      jump: "jump",
     };
     const found = (python.steering as Call[]).flatMap((calls, call) => {
-      const { put, push, control, act, crouch, end, jump } = calls;
-      const { keep_apart, go_to, go_along, look_at, reach, set_ground } = calls;
-      if (act) session.act(turn, act);
-      if (crouch) session.act(squat, crouch);
-      if (end) session.act(null, end);
-      if (jump) session.act("jump", jump);
-      if (look_at) session.lookAt(look_at.points, look_at);
-      if (reach) session.reach(reach.hand, reach.points, reach);
-      if (put) session.put(put);
-      if (push) session.push(push);
-      if (control) session.control(control);
-      if (keep_apart !== undefined) session.keepApart(keep_apart);
-      if (go_to) session.goTo(go_to.points, go_to);
-      if (go_along) session.goAlong(go_along.points!, go_along);
-      if (set_ground !== undefined) session.setGround(set_ground && GROUNDS[set_ground]);
+      obey(session, calls, acts);
       const pictures = Array.from({ length: 36 }, () => session.advance(1 / 48));
       const happened = [0, 1].map((figure) =>
         pictures.flatMap((poses) => poses[figure]!.events.map(({ kind, name }) => [kind, name ?? ""])),
@@ -363,6 +368,45 @@ async function steers(read: Read): Promise<void> {
       }),
     );
   }
+}
+
+/** Calls of twelve figures that reach most numbers of steering: where each is after each call and its bones' rotations, summed;
+ *  who did what in which picture; and for how many pictures hands were out of reach. */
+async function crowd(read: Read): Promise<void> {
+  const { model } = await loaded(read, "control", ControlModel);
+  const { stand, acts: given, calls, made, rows: wanted, happened, beyond } = python.crowd;
+  const acts: Acts = { jump: "jump" };
+  const lengths = Object.entries(given).map(([name, { last, shares }]) => {
+    const frames = shares.flatMap((share) => stand.map((value, at) => value + share * (last[at]! - value)));
+    const act = actOf(model, name, frames);
+    acts[name] = act;
+    return [act.height.length, act.legs];
+  });
+  equal(lengths, made, "frames of acts, and whether they are of the legs");
+  const session = model.start({ characters: wanted[0]!.length });
+  (calls as Call[]).forEach((call, at) => {
+    obey(session, call, acts);
+    const events: Record<string, number[]> = {};
+    const missed = Array<number>(2 * session.characters).fill(0);
+    let poses: ReturnType<ControlSession["advance"]> = [];
+    for (let picture = 0; picture < 36; picture++) {
+      poses = session.advance(1 / 48);
+      session.outOfReach.flat().forEach((is, hand) => (missed[hand]! += is ? 1 : 0));
+      poses.forEach((pose, figure) =>
+        pose.events.forEach(({ kind, name }) =>
+          (events[name ? `${kind} ${name}` : kind] ??= []).push(figure, picture),
+        ),
+      );
+    }
+    poses.forEach(({ ground, hips, rotations }, figure) => {
+      const bones = Object.values(rotations);
+      const turns = [0, 1, 2].map((axis) => bones.reduce((sum, turn) => sum + turn[axis]!, 0));
+      close([...ground, hips[1], ...turns], wanted[at]![figure]!, `figure ${figure} after call ${at}`);
+    });
+    equal(events, happened[at], `events after call ${at}`);
+    const out = missed.flatMap((count, hand) => (count ? [[hand, count]] : []));
+    equal(out, beyond[at], `pictures with hands out of reach after call ${at}`);
+  });
 }
 
 /** Words as they are, of a known stem, misspelt, common and unknown. */
@@ -399,6 +443,7 @@ export const cases: Case[] = [
   { name: "search embeds as Python does", run: search },
   { name: "control runs along targets as Python does", run: steersTargets },
   { name: "control steers as Python does, with feet held and without", run: steers },
+  { name: "control leads a crowd as Python does", run: crowd },
   { name: "a seed generates the motion that it does in Python", run: seeds },
   { name: "motions say what is shown, and what that lacks, as in Python", run: taken },
   { name: "a story, and its stream, are those of Python", run: story },

@@ -187,12 +187,17 @@ test("a session is restored, and figures move as each would alone", () => {
 });
 
 test("each of many searches in its turn, and moves as it would alone", () => {
-  const count = 40;
-  const crowd = model.start({ characters: count });
-  const alone = model.start({ phases: 3 });
-  crowd.control({ gait: "run", speed: 2.5, direction: Array.from({ length: count }, (_, at) => 9 * at) });
-  alone.control({ gait: "run", speed: 2.5, direction: 9 * 15 });
-  for (let at = 0; at < 40; at++) assert.deepEqual(crowd.tick()[15], alone.tick()[0]);
+  for (const [count, own] of [
+    [40, { phases: 3 }],
+    [32, { phases: 3 }],
+    [31, {}], // so few search when they are told something
+  ] as const) {
+    const crowd = model.start({ characters: count });
+    const alone = model.start(own);
+    crowd.control({ gait: "run", speed: 2.5, direction: Array.from({ length: count }, (_, at) => 9 * at) });
+    alone.control({ gait: "run", speed: 2.5, direction: 9 * 15 });
+    for (let at = 0; at < 40; at++) assert.deepEqual(crowd.tick()[15], alone.tick()[0]);
+  }
   for (const phases of [6, -1, 0.5, [0, 1, 2]]) {
     assert.throws(
       () => model.start({ characters: 2, phases }),
@@ -241,6 +246,8 @@ test("ground that fails, or gives no height, is refused with its place", () => {
   assert.throws(() => session.setGround(0 as never), /ground must be a function/);
   session.setGround((x, z) => (z > 1 ? NaN : x));
   assert.throws(() => session.tick(), /ground\(x, z\) gave NaN at x 0.5, z 2: a height is a number within/);
+  session.setGround(() => 10001);
+  assert.throws(() => session.tick(), /ground\(x, z\) gave 10001 at x 0.5, z 2: .* within 10000 m of 0/);
   const cause = new RangeError("no such tile");
   session.setGround(() => {
     throw cause;

@@ -55,7 +55,10 @@ export function reached(
   seconds: number,
 ): void {
   const rests = hand.weight.wanted[0]! + hand.weight.off[0]! < REACH_LAYER.LEAST_WEIGHT;
-  if (!hand.point && rests) return;
+  if (!hand.point && rests) {
+    hand.beyond = false;
+    return;
+  }
   // where the hand can be for its point, and whether that can be held
   const arm = armOf(pose, side);
   const goal = hand.point && withinReach(arm, inChest(pose, hand.point), side, settings);
