@@ -143,7 +143,7 @@ VERBS = {
     "expected errors": Verb(
         "predict",
         pieces,
-        lambda model, things, *_: list(model.expected_errors(things)) if things else [],
+        lambda model, things, *_: list(model.expected_errors(things)),
         reports=False,
     ),
     "predict by ConvSeq2Seq": Verb(

@@ -219,6 +219,8 @@ class PredictModel(BundleModel):
         if not self.knows_errors:
             raise DecodingError(f"{self!r} does not estimate its errors: it has no graph 'error'")
         travelled = [travelling(motion) for motion in motions_of(motions)]
+        if not travelled:
+            return np.zeros((0, self.horizon), dtype=np.float32)
         seeds = np.zeros((len(travelled), self.seed_frames, len(self.contract.channels)), dtype=np.float32)
         for row, motion in zip(seeds, travelled, strict=True):
             row[:] = self._seen(motion)[2]
