@@ -102,11 +102,11 @@ CEILINGS = {
     "motet_export": 12_300,
     "motet_train": 9_300,
     "motet_train.cli": 7_900,
-    "motet_train.data": 19_600,
+    "motet_train.data": 19_700,
     "motet_train.evaluate": 52_400,
     "motet_train.models": 24_700,
     "motet_train.papers": 39_500,
-    "motet_train.recipes": 16_000,
+    "motet_train.recipes": 16_100,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

@@ -293,15 +293,32 @@ def test_resumed_training_is_the_same_to_the_bit(folder: Path, parts: tuple[obje
     assert all(torch.equal(whole[name], again[name]) for name in whole)
     other = trained(*given, tmp_path / "other", *parts, "--seed", 1).model.state_dict()
     assert any(not torch.equal(whole[name], other[name]) for name in whole)
-    # a writer takes up both parts of another
-    of_writer = ("--codec", tmp_path / "whole", "--actions", tmp_path / "whole")
-    taken = trained(*given, tmp_path / "taken", *of_writer)
-    assert all(torch.equal(whole[name], value) for name, value in taken.model.state_dict().items())
-    assert taken.manifest["training"]["codec"] == Run.load(tmp_path / "whole").manifest["training"]["codec"]
     # codec and net of actions are what they were
     for name, prefix in (("codec", "codec"), ("actions", "text")):
         kept = torch.load(folder / name / "weights.pt", weights_only=True)
         assert all(torch.equal(whole[f"{prefix}.{key}"], kept[key]) for key in kept)
+
+
+def test_a_writer_is_trained_further_with_its_parts(folder: Path, parts: tuple[object, ...], tmp_path: Path) -> None:
+    first = trained("codes", CODES, folder / "store", tmp_path / "first", *parts)
+    of_first = ("--codec", tmp_path / "first", "--actions", tmp_path / "first", "--seed", 1, "--steps", 1)
+    further = trained("codes", CODES, folder / "store", tmp_path / "further", *of_first)
+    other = trained("codes", CODES, folder / "store", tmp_path / "other", *parts, "--seed", 1, "--steps", 1)
+    weights = first.model.state_dict()
+
+    def distance(run: Run) -> float:
+        return sum(float((value - weights[name]).abs().sum()) for name, value in run.model.state_dict().items())
+
+    assert 0 < distance(further) < 0.5 * distance(other)
+    training = further.manifest["training"]
+    assert training["codec"] == first.manifest["training"]["codec"]
+    assert training["start"]["command"] == first.manifest["training"]["command"]
+    # only one of the same sizes
+    larger = tmp_path / "larger.toml"
+    larger.write_text(CODES.replace("width = 12", "width = 24"))
+    command = ("train", "codes", "--data", folder / "store", "--config", larger, *of_first, "--out", tmp_path / "out")
+    result = CliRunner().invoke(main, [str(option) for option in command])
+    assert "first is a writer of other sizes" in result.output
 
 
 def test_codes_need_a_codec_and_a_net_of_the_same_actions(

@@ -1,7 +1,7 @@
 """The codec of motions: where its joints are, its codes, what its decoder sees, its windows, and its training."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,7 @@ def test_a_window_puts_the_root_back_where_it_was(mirrored: bool) -> None:
     """Frames relative to the way of a coarse book, and that way, are the places of the motion itself."""
     net, frames = codec(), frames_of(33)
     frames = CONTRACT.mirror(frames) if mirrored else frames
-    window = window_of(frames[None], 30.0, net.book.numpy().astype(np.float64), 4)
+    window = window_of(frames[None], frames[None], 30.0, net.book.numpy().astype(np.float64), 4)
     found = places_in_world(net, window.frames, window.way)[0]
     expected = positions(CONTRACT.motion(frames[:-1], plant=False)) * HUMANOID.unit_factor(1.0)
     np.testing.assert_allclose(found, expected, atol=1e-4)
@@ -207,7 +207,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_windows_are_parts_of_recordings_half_of_them_mirrored(store: Path) -> None:
     opened = Store.open(store)
     contract = opened.contract(range(20))
-    windows = SixdWindows(opened, (3, 5, 8), 16, 4, contract.mirror)
+    mended = replace(opened, frames=opened.frames + np.float32(1))
+    windows = SixdWindows(opened, mended, (3, 5, 8), 16, 4, contract.mirror)
     book = fit_book(windows.sequences(), 4, 8, 0)
     drawn = windows.draw(60, book, np.random.default_rng(0))
     parts = {}
@@ -219,10 +220,13 @@ def test_windows_are_parts_of_recordings_half_of_them_mirrored(store: Path) -> N
             parts[contract.mirror(part)[:, 3:].astype(np.float32).tobytes()] = record, True
     seen = [parts[given[:, 3:].numpy().tobytes()] for given in drawn.inputs]
     assert {record for record, _ in seen} == {3, 5, 8}
+    # what is shown is the same part of the mended motions
+    offset = (drawn.frames - drawn.inputs)[..., 3:].abs()
+    torch.testing.assert_close(offset, torch.ones_like(offset))
     assert 15 < sum(mirrored for _, mirrored in seen) < 45
     assert drawn.moves.max() < 8
     with pytest.raises(DataError, match="shorter than 101 frames"):
-        SixdWindows(opened, (3, 5), 100, 4, contract.mirror)
+        SixdWindows(opened, opened, (3, 5), 100, 4, contract.mirror)
 
 
 def test_windows_of_rare_actions_are_drawn_oftener(store: Path) -> None:
@@ -232,15 +236,15 @@ def test_windows_of_rare_actions_are_drawn_oftener(store: Path) -> None:
     lengths = np.array([len(opened.sequence(record)) - 16 for record in chosen], dtype=float)
     shown = np.sqrt([*[lengths[:3].sum()] * 3, lengths[3]])
     expected = lengths / shown / (lengths / shown).sum()
-    np.testing.assert_allclose(SixdWindows(opened, chosen, 16, 4, mirror).chances, expected)
+    np.testing.assert_allclose(SixdWindows(opened, opened, chosen, 16, 4, mirror).chances, expected)
     # where nothing is said of actions, each recording is one
-    alone = SixdWindows(without_actions(opened), chosen, 16, 4, mirror).chances
+    alone = SixdWindows(without_actions(opened), opened, chosen, 16, 4, mirror).chances
     np.testing.assert_allclose(alone, np.sqrt(lengths) / np.sqrt(lengths).sum())
 
 
 def test_windows_of_what_is_badly_shown_are_drawn_oftener(store: Path) -> None:
     opened = Store.open(store)
-    windows = SixdWindows(opened, (0, 4, 8), 16, 4, opened.contract(range(20)).mirror)
+    windows = SixdWindows(opened, opened, (0, 4, 8), 16, 4, opened.contract(range(20)).mirror)
     book, before = fit_book(windows.sequences(), 4, 8, 0), windows.chances
     middles = list(windows.middles(book))
     for record, window in zip((0, 4, 8), middles, strict=True):

@@ -24,14 +24,16 @@ from motet_train.data.store import Store
 
 Codes = NDArray[np.int64]
 
+Flags = NDArray[np.bool_]
+
 
 @dataclass(frozen=True, eq=False)
 class Window(Rows):
     """B windows for a codec.
 
     frames: (B, T, D) in the contract's units, the first three channels as a codec's decoder gives them. inputs:
-    (B, T, D) as the encoder takes them. moves: (B, N) int64 entries of the book. way: (B, T, 3) the poses that the
-    moves lead to, each repeated for the frames of its step.
+    (B, T, D) as the encoder takes them, as recorded. moves: (B, N) int64 entries of the book. way: (B, T, 3) the poses
+    that the moves lead to, each repeated for the frames of its step.
     """
 
     frames: Tensor
@@ -43,9 +45,13 @@ class Window(Rows):
 class SixdWindows:
     """Draws windows of ``frames`` frames of some records, half of them mirrored."""
 
-    def __init__(self, store: Store, records: tuple[int, ...], frames: int, hop: int, mirror: FrameMirror) -> None:
-        """hop: frames of a step of codes. DataError if no motion is long enough."""
+    def __init__(
+        self, store: Store, mended: Store, records: tuple[int, ...], frames: int, hop: int, mirror: FrameMirror
+    ) -> None:
+        """mended: the same records as they are to be shown. hop: frames of a step of codes. DataError if no motion is
+        long enough."""
         self.store = store
+        self.mended = mended
         self.frames = frames
         self.hop = hop
         self.mirror = mirror
@@ -74,7 +80,8 @@ class SixdWindows:
         for start, stop in self.spans:
             first = (start + stop - self.frames) // 2
             frames = self.store.values(first, first + self.frames + 1)
-            yield window_of(frames[None], self.store.fps, book, self.hop)
+            shown = self.mended.values(first, first + self.frames + 1)
+            yield window_of(frames[None], shown[None], self.store.fps, book, self.hop)
 
     def favour(self, times: Array) -> None:
         """Multiply the chance of each span by its entry in ``times``."""
@@ -84,8 +91,10 @@ class SixdWindows:
         """A batch of windows; their moves are entries of a book (K, 3)."""
         spans = [self.spans[i] for i in rng.choice(len(self.chances), batch, p=self.chances)]
         starts = [int(rng.integers(start, stop - self.frames)) for start, stop in spans]
-        frames = _drawn(self.store, starts, self.frames + 1, self.mirror, rng)
-        return window_of(frames, self.store.fps, book, self.hop)
+        mirrored = rng.random(batch) < 0.5
+        frames = _frames(self.store, starts, self.frames + 1, self.mirror, mirrored)
+        shown = _frames(self.mended, starts, self.frames + 1, self.mirror, mirrored)
+        return window_of(frames, shown, self.store.fps, book, self.hop)
 
 
 def _root_durations(actions: Sequence[str | int], lengths: Array) -> Array:
@@ -94,20 +103,19 @@ def _root_durations(actions: Sequence[str | int], lengths: Array) -> Array:
     return np.sqrt(np.bincount(action, weights=lengths)[action])
 
 
-def _drawn(store: Store, starts: Sequence[int], count: int, mirror: FrameMirror, rng: np.random.Generator) -> Array:
-    """``count`` frames from each start (B, count, D), half of the rows mirrored."""
+def _frames(store: Store, starts: Sequence[int], count: int, mirror: FrameMirror, mirrored: Flags) -> Array:
+    """``count`` frames from each start (B, count, D), some of the rows (B,) mirrored."""
     rows = np.stack([store.values(start, start + count) for start in starts])
-    mirrored = rng.random(len(starts)) < 0.5
     rows[mirrored] = mirror(rows[mirrored])
     return rows
 
 
-def window_of(frames: Array, fps: float, book: Array, hop: int) -> Window:
-    """Windows of frames (B, T + 1, D); the last frame serves only to know where the root goes."""
+def window_of(frames: Array, shown: Array, fps: float, book: Array, hop: int) -> Window:
+    """Windows of frames (B, T + 1, D), and as they are to be shown; the last frame serves only to know where the root
+    goes."""
     poses = np.stack([poses_of(row, fps) for row in frames])
-    inputs = frames[:, :-1]
-    decoded, moves, along = with_way(inputs, poses, book, hop)
-    return Window(_float_tensor(decoded), _float_tensor(inputs), torch.from_numpy(moves), _float_tensor(along))
+    decoded, moves, along = with_way(shown[:, :-1], poses, book, hop)
+    return Window(_float_tensor(decoded), _float_tensor(frames[:, :-1]), torch.from_numpy(moves), _float_tensor(along))
 
 
 def _float_tensor(values: Array) -> Tensor:
@@ -166,7 +174,7 @@ class GapWindows:
         chances = np.maximum(self.lengths - frames + 1, 0) * self.weights
         span = rng.choice(len(chances), batch, p=chances / chances.sum())
         starts = self.starts[span] + rng.integers(self.lengths[span] - frames + 1)
-        rows = _drawn(self.store, starts.tolist(), frames, self.mirror, rng)
+        rows = _frames(self.store, starts.tolist(), frames, self.mirror, rng.random(batch) < 0.5)
         return gap_window(placed.placed_by_way(rows, self.store.fps), sizes[0], sizes[1])
 
 

@@ -59,18 +59,20 @@ RECIPES = {"default": DEFAULT, "decoder": DECODER, "sharp": SHARP, "wider": WIDE
 def train_codec(store: Store, job: Job, data: str, by: str, start: Run | None = None) -> Run:
     """Train on a store in ``root_sixd``, see :meth:`motet_train.recipes.recipe.Job.run`.
 
+    Motions are encoded as recorded, and decoded with level heads and even collar bones.
+
     start: a codec to train further; if its codes are settled, only the decoder is trained.
     """
     store.needs_sixd("a codec is trained on")
-    store = without_habits(store)
+    mended = without_habits(store)
     visits = job.recipe.visits
     parts = split(store.records, 0, by)
-    contract = store.contract(parts.train)
+    contract = mended.contract(parts.train)
     started = None if start is None else _started(start, visits.settled)
     config = started.config if started else job.recipe.sized(channels=len(contract.channels), tree=tree_of(contract))
     mirror = frame_mirror(contract)
-    train = SixdWindows(store, parts.train, visits.frames, config.hop, mirror)
-    validation = SixdWindows(store, parts.validation, visits.frames, config.hop, mirror)
+    train = SixdWindows(store, mended, parts.train, visits.frames, config.hop, mirror)
+    validation = SixdWindows(store, mended, parts.validation, visits.frames, config.hop, mirror)
 
     # a new codec, or one that is trained further
     torch.manual_seed(job.about.seed)

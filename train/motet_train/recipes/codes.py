@@ -18,7 +18,6 @@ from motet.representation.root_block import poses_of
 from motet_train.data.acts import acts
 from motet_train.data.batches import frame_mirror
 from motet_train.data.errors import DataError
-from motet_train.data.habits import without_habits
 from motet_train.data.sentences import Actions
 from motet_train.data.sixd_windows import CodeBatch, CodedMotion, Codes, CodeWindows, memory_of, with_way
 from motet_train.data.store import Store
@@ -70,8 +69,10 @@ RECIPES = {"default": DEFAULT}
 
 def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions: Run) -> Run:
     """Train a writer on a store, for the runs of a codec and of a net of actions that were trained on the same store
-    and split, or of another writer that has them. DataError if they were not."""
-    store = without_habits(store)
+    and split, or of another writer that has them. DataError if they were not.
+
+    A writer that has the net of actions is trained further.
+    """
     corpus = divided(store, mirror=True, by=by)
     shown = spoken(store, corpus.parts.train)
     sentences = {"vocabulary": list(corpus.vocabulary.words), "actions": described(shown)}
@@ -82,9 +83,10 @@ def train_codes(store: Store, job: Job, data: str, by: str, codec: Run, actions:
     motions = coded(store, corpus.parts.train, codec_net.eval(), shown, frame_mirror(corpus.contract))
     net = _untrained(job.recipe.sized(actions=len(shown)), codec_net, action_net, memory_of(motions))
 
-    learner = _learner(net, job, motions)
     about = manifest(job, corpus, asdict(net.config), data, by)
     _add_parts(about, codec, actions)
+    _take_up(net, actions)
+    learner = _learner(net, job, motions)
     return job.run(net, learner, about, tuned=lambda run: (memory_settings(net.tables(), len(shown)),))
 
 
@@ -94,6 +96,8 @@ def _add_parts(about: dict[str, Any], codec: Run, actions: Run) -> None:
     for part, run in (("codec", codec), ("actions", actions)):
         training = run.manifest["training"]
         about["training"][part] = training[part] if isinstance(run.model, MotionCodes) else origin(training)
+    if isinstance(actions.model, MotionCodes):
+        about["training"]["start"] = origin(actions.manifest["training"])
 
 
 def _untrained(config: CodeModelConfig, codec: MotionCodec, actions: ActionNet, memory: Tensor) -> MotionCodes:
@@ -102,6 +106,15 @@ def _untrained(config: CodeModelConfig, codec: MotionCodec, actions: ActionNet, 
     net.take(codec, actions)
     net.memory.copy_(memory)
     return net
+
+
+def _take_up(net: MotionCodes, run: Run) -> None:
+    """Begin with the writer of a run, if it has one; DataError if its sizes differ."""
+    if not isinstance(run.model, MotionCodes):
+        return
+    if run.model.config.writer != net.config.writer:
+        raise DataError(f"{run.manifest['name']} is a writer of other sizes, which cannot be trained further")
+    net.writer.load_state_dict(run.model.writer.state_dict())
 
 
 def _learner(net: MotionCodes, job: Job, motions: list[CodedMotion]) -> GradientLearner[MotionCodes]:
