@@ -16,7 +16,7 @@ from motet.models.load import load, load_as
 from motet.search.model import SearchModel
 from motet_train.cli.prepare import store_beside
 from motet_train.cli.suites import Inputs, Results, Suite, suite_of
-from motet_train.cli.train_options import options_of, unit_in
+from motet_train.cli.train_options import unit_in, with_options
 from motet_train.data.errors import DataError
 from motet_train.data.store import INDEX, part
 from motet_train.evaluate.figures import make_folder, save
@@ -24,14 +24,51 @@ from motet_train.recipes.recipe import SETTINGS
 from motet_train.runs import RUN_MANIFEST, Run
 from motet_train.settings import read_settings
 
+measurements = with_options(
+    click.option(
+        "--data",
+        type=Path,
+        help="Control: the clips. Predict: text files of the protocol, or the store. Others: the store. [default: the "
+        "run's training data] With --says: a store, or a folder or zip of motion files with a table of sentences, for "
+        "the columns of real trials and of the look-up.",
+    ),
+    click.option(
+        "--says", is_flag=True, help="Generate: try everyday prompts, and count the motions that follow them."
+    ),
+    click.option(
+        "--search",
+        default="search",
+        show_default=True,
+        help="With --says: name or path of the search bundle whose space is used to compare motions and prompts.",
+    ),
+    click.option(
+        "--actions",
+        metavar="PATTERNS",
+        help="Describe: whether the action is right, and the sure ones, of clips of --data by their names, such as "
+        "'ACCAD_*,CC0_*', whatever the model was trained on; or of its own 'test' part.",
+    ),
+    click.option("--composed", is_flag=True, help="Generate: how well compositions meet places, poses and times."),
+    click.option(
+        "--rival",
+        is_flag=True,
+        help="Predict, motion files: also train a plain MLP on positions of joints with the same data (five minutes), "
+        "and measure it.",
+    ),
+)
+
+outputs = with_options(
+    click.option("--json", "as_json", is_flag=True, help="Print one nested object with stable keys."),
+    click.option("--plots", type=Path, help="Folder for the figures of the papers."),
+)
+
 
 @click.command()
 @click.argument("models", nargs=-1, required=True)
-@options_of("measurements")
-@options_of("outputs")
+@measurements
+@outputs
 @unit_in
 @session_options
-@options_of("save")
+@click.option("--save", "keep", is_flag=True, help="Save the figures in each run, for export.")
 def evaluate(
     models: tuple[str, ...],
     data: Path | None,

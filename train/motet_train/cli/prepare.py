@@ -9,7 +9,7 @@ import click
 from motet.jobs import Shard
 from motet.representation.contract import named
 from motet_train import distributed
-from motet_train.cli.train_options import options_of, unit_in, with_options
+from motet_train.cli.train_options import unit_in, with_options
 from motet_train.data.corpus import Corpus, Record, read_corpus
 from motet_train.data.errors import DataError
 from motet_train.data.merging import merge_stores
@@ -21,7 +21,13 @@ from motet_train.progress import preparing
 from motet_train.recipes.recipe import Job
 from motet_train.trainer import CHECKPOINT
 
-source_options = with_options(options_of("source"), unit_in)
+source_options = with_options(
+    click.option("--sentences", type=Path, help="Table of sentences. [default: the only .tsv in or next to the data]"),
+    click.option("--people", type=Path, help="Table of performers by clip. [default: from the clips' names]"),
+    click.option("--gaits", type=Path, help="Table of gaits (TOML) for steering. [default: the column gait]"),
+    unit_in,
+)
+
 corpus_options = with_options(
     source_options,
     click.option(
@@ -48,8 +54,17 @@ def corpus_of(
 
 @click.command()
 @click.argument("data", type=Path, nargs=-1, required=True)
-@options_of("out_of_store")
-@options_of("preparation")
+@click.option("-o", "--out", type=Path, required=True, help="Folder of the store to write; must not exist.")
+@click.option(
+    "--for",
+    "verb",
+    type=click.Choice(["describe", "generate", "codes", "predict", "all"]),
+    default="describe",
+    show_default=True,
+    help="Models to train on it: describe, search; codes, fill, matching; predict; or all.",
+)
+@click.option("--fps", type=click.FloatRange(1, 240), help="Frames per second. [default: 10; for codes, predict 30]")
+@click.option("--shard", metavar="I/N", help="A store of one of N parts of the corpus, such as 3/16.")
 @corpus_options
 def prepare(
     data: tuple[Path, ...],

@@ -10,7 +10,7 @@ import click
 from motet.bundle.fields import Json
 from motet_train import distributed
 from motet_train.cli.prepare import corpus_of, corpus_options, prepared, source_options
-from motet_train.cli.train_options import Option, begun, options_of, split, train_command, unit_in, with_options
+from motet_train.cli.train_options import Option, begun, split, train_command, unit_in, where, with_options
 from motet_train.data.errors import DataError
 from motet_train.data.predict_data import Material, store_material
 from motet_train.data.store import is_store
@@ -35,11 +35,21 @@ def train() -> None:
     """Train models on your own recordings: all shipped kinds, or one. Evaluate and export take the runs."""
 
 
-steps = options_of("steps")
-epochs = options_of("epochs")
-word_vectors = options_of("word_vectors")
+steps = click.option("--steps", type=click.IntRange(1), help="[default: the preset's]")
+epochs = click.option("--epochs", type=click.IntRange(1), help="[default: the preset's]")
+word_vectors = with_options(
+    click.option(
+        "--word-vectors", type=Path, help="Vectors of words, common ones first: a word and its numbers per line."
+    ),
+    click.option("--vectors-from", help="Source and licence of the vectors, for the manifest."),
+)
 of_plan = with_options(
-    options_of("out_of_plan"), source_options, split, word_vectors, options_of("config_of_plan"), options_of("where")
+    click.option("-o", "--out", type=Path, required=True, help="Folder of the runs; the same command resumes there."),
+    source_options,
+    split,
+    word_vectors,
+    click.option("--config", type=Path, help="TOML file of settings: [describe.training] is for describe."),
+    where,
 )
 
 
@@ -57,7 +67,7 @@ def everything(verbs: tuple[str, ...], **options: Any) -> None:
 
 
 @train.command(short_help="Train the shipped kind of generate, in five stages.")
-@options_of("data_of_plan")
+@click.option("--data", type=Path, multiple=True, required=True, help="A store, or a corpus: folder or zip.")
 @of_plan
 def generate(**options: Any) -> None:
     """Train sentence to motion, the shipped kind: codec, decoder (twice), actions, and the writer of codes.
@@ -83,8 +93,31 @@ def _train_plan(verbs: tuple[str, ...], data: tuple[Path, ...], out: Path, **opt
         click.echo(f"      motet evaluate {out / verb}")
 
 
-augmentation = options_of("augmentation")
-predictor_data = with_options(options_of("motions"), corpus_options, options_of("motions_held_out"))
+augmentation = with_options(
+    click.option("--warp", type=click.FloatRange(0), help="Play windows up to exp(this) times faster or slower."),
+    click.option("--reverse", type=click.FloatRange(0, 1), help="Share of windows played backwards."),
+    click.option("--mirror", type=click.FloatRange(0, 1), help="Share of windows mirrored."),
+    click.option(
+        "--average", type=click.FloatRange(0, 1, max_open=True), help="Decay of a running mean of weights; 0: none."
+    ),
+)
+
+
+predictor_data = with_options(
+    click.option(
+        "--data",
+        type=Path,
+        required=True,
+        help="Exponential-map text files, a store prepared for predict, or motion files: folder or zip.",
+    ),
+    corpus_options,
+    click.option(
+        "--split",
+        "by",
+        type=click.Choice(["trial", "subject"]),
+        help="How to hold out motion files: at random, or by person. [default: subject]",
+    ),
+)
 
 
 @train.add_command
@@ -121,12 +154,23 @@ def read_expmap_files(data: Path) -> ExpmapCorpus:
     return corpus
 
 
-clips_data = with_options(options_of("clips"), unit_in, options_of("labels"))
+clips_data = with_options(
+    click.option(
+        "--data",
+        type=Path,
+        help="Folder of clips LABEL.bvh and LABEL/*.bvh (or .amc .npz .csv). "
+        "[default: three CMU trials, in a checkout]",
+    ),
+    unit_in,
+)
+
+
+labels = click.option("--labels", help='Labels to train on, such as "walk,run". [default: all]')
 
 
 # with --preset pure, seed 6 is that of the bundle tdbn
 @train.add_command
-@train_command("tdbn", tdbn.RECIPES, clips_data, defaults={"seed": 6, "out": "runs/tdbn", "name": "tdbn"})
+@train_command("tdbn", tdbn.RECIPES, clips_data, labels, defaults={"seed": 6, "out": "runs/tdbn", "name": "tdbn"})
 def train_tdbn(job: Job, data: Path | None, unit_in: str | None, labels: str | None) -> Run:
     """Train a temporal deep belief net for live control, on short labelled clips."""
     return tdbn.train_control(labelled_clips(data, job.recipe.config.root_rotation, unit_in, labels), job)
@@ -143,7 +187,9 @@ def labelled_clips(data: Path | None, root_rotation: bool, unit_in: str | None, 
     "crbm",
     tdbn.BASELINES,
     clips_data,
-    options_of("crbm"),
+    labels,
+    click.option("--past-rate", type=float, help="Rate from past to angles. [default: the preset's]"),
+    click.option("--control-units", type=click.IntRange(1), help="Units per label. [default: the preset's]"),
     epochs,
     defaults={"out": "runs/crbm", "name": "crbm"},
 )
@@ -187,12 +233,13 @@ def _on_store(name: str, recipes: Mapping[str, Recipe], train_net: Callable[...,
         return train_net(prepared(data, job, **corpus), job, data.name, **options)
 
     run.__doc__ = f"Train {NETS[name]}"
-    train.add_command(train_command(name, recipes, options_of("store"), corpus_options, *options)(run))
+    store = click.option("--data", type=Path, required=True, help="A prepared store, or a corpus: folder or zip.")
+    train.add_command(train_command(name, recipes, store, corpus_options, *options)(run))
 
 
 by_epochs = with_options(
     epochs,
-    options_of("motions_of_batch"),
+    click.option("--batch", type=click.IntRange(1), help="Motions per batch. [default: the preset's]"),
     split,
     click.option("--mirror/--no-mirror", default=None, help="Mirror left and right at random. [default: the preset's]"),
 )
@@ -203,13 +250,29 @@ loss = click.option(
 attention = click.option(
     "--attention/--no-attention", default=None, help="Let words attend to the encoder's states. [default: the preset's]"
 )
+start = click.option("--start", type=Path, help="Run of a codec: train its decoder alone (--preset decoder, sharp).")
+parts = with_options(
+    click.option(
+        "--codec", type=Path, required=True, help="Run of a codec, trained on the same data and split, or of codes."
+    ),
+    click.option(
+        "--actions",
+        type=Path,
+        required=True,
+        help="Run of an action net, trained on the same data and split, or of codes to train further.",
+    ),
+)
+known_parts = with_options(
+    click.option("--writer", type=Path, required=True, help="Run of describe, which writes sentences (--draws)."),
+    split,
+)
 _on_store("describe", language.RECIPES, language.train_language, by_epochs, attention)
-_on_store("known", known.RECIPES, known.train_known, options_of("writer"), split)
+_on_store("known", known.RECIPES, known.train_known, known_parts)
 _on_store("search", search.RECIPES, search.train_search, by_epochs)
 _on_store("mixture", plappert2017.RECIPES, language.train_language, by_epochs, loss)
-_on_store("codec", codec.RECIPES, codec.train_codec, by_steps, options_of("start"))
+_on_store("codec", codec.RECIPES, codec.train_codec, by_steps, start)
 _on_store("actions", actions.RECIPES, actions.train_actions, by_steps, word_vectors)
-_on_store("codes", codes.RECIPES, codes.train_codes, by_steps, options_of("parts"))
+_on_store("codes", codes.RECIPES, codes.train_codes, by_steps, parts)
 _on_store("fill", fill.RECIPES, fill.train_fill, by_steps)
 _on_store("matching", matching.RECIPES, matching.train_matching, steps)
 _on_store("steered-tdbn", steered.RECIPES, steered.train_steered)
@@ -224,10 +287,29 @@ def _system(name: str, title: str) -> None:
         return li2018.train_system(_material(data, job, by, all_files, corpus), job)
 
     run.__doc__ = f"Train {title}, a baseline of `motet train predict`."
-    switches = (options_of("ablations"),) if name == "convseq2seq" else ()
+    switches = (ablations,) if name == "convseq2seq" else ()
     train.add_command(train_command(name, li2018.RECIPES[name], of_system, *switches)(run))
 
 
-of_system = with_options(predictor_data, steps, options_of("system"), augmentation, options_of("all_files"))
+of_system = with_options(
+    predictor_data,
+    steps,
+    click.option("--batch", type=click.IntRange(1), help="Windows per batch. [default: the preset's]"),
+    click.option("--learning-rate", type=click.FloatRange(0, min_open=True), help="[default: the preset's]"),
+    augmentation,
+    click.option("--all-files", is_flag=True, help="Hold out no training files; validate on windows of all of them."),
+)
+ablations = with_options(
+    click.option("--long-term", type=click.Choice(["convolutional", "recurrent", "none"]), help="Long-term encoder."),
+    click.option("--kernel", type=click.IntRange(1), nargs=2, help="Frames and channels of the convolutions' kernels."),
+    click.option("--padding", type=click.Choice(["valid", "same"]), help="Other kernels or windows need 'same'."),
+    click.option("--window", type=click.IntRange(1), help="Frames seen by the short-term encoder, C."),
+    click.option(
+        "--predicted-share", type=click.FloatRange(0, 1), help="Share of predicted frames among those fed back."
+    ),
+    click.option("--loss", type=click.Choice(["square", "distance"]), help="Mean squared distance, or mean distance."),
+    click.option("--l2", type=click.FloatRange(0), help="Weight of the squared weights in the loss."),
+    click.option("--adversary", type=click.FloatRange(0), help="Weight of the discriminator in the loss; 0: none."),
+)
 for name, (*_, title) in SYSTEMS.items():
     _system(name, title)

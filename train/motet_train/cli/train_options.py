@@ -14,7 +14,6 @@ from motet.bundle.fields import Json
 from motet.motion.skeleton import METRES
 from motet_train import distributed
 from motet_train.data.store import SPLITS
-from motet_train.data.table import read_toml
 from motet_train.progress import log
 from motet_train.recipes.recipe import Job, Recipe
 from motet_train.run_folder import trained
@@ -36,33 +35,6 @@ def with_options(*options: Option) -> Option:
     return decorate
 
 
-TYPES: Mapping[str, Any] = {
-    "text": None,
-    "path": Path,
-    "number": float,
-    "natural": click.IntRange(0),
-    "count": click.IntRange(1),
-    "number from 0": click.FloatRange(0),
-    "number above 0": click.FloatRange(0, min_open=True),
-    "share": click.FloatRange(0, 1),
-    "share below 1": click.FloatRange(0, 1, max_open=True),
-    "frames per second": click.FloatRange(1, 240),
-}
-"""Types of options in options.toml."""
-
-OPTION_GROUPS = read_toml(__file__, "options.toml")
-
-
-def options_of(group: str) -> Option:
-    """The options of a group in options.toml, in their order in the help."""
-    group_options = []
-    for flags, settings in OPTION_GROUPS[group].items():
-        kind = settings.get("type", "text")
-        kind = click.Choice(kind) if isinstance(kind, list) else TYPES[kind]
-        group_options.append(click.option(*flags.split(), **{**settings, "type": kind}))
-    return with_options(*group_options)
-
-
 def _configure(context: click.Context, option: click.Parameter, path: Path | None) -> None:
     """Make the file's settings the options' defaults; the command line wins."""
     if path is None:
@@ -80,11 +52,30 @@ def _long(option: click.Parameter) -> str:
     return max(option.opts, key=len).lstrip("-")
 
 
-where = options_of("where")
-config = click.option(
-    "--config", type=Path, is_eager=True, expose_value=False, callback=_configure, help="TOML file of settings."
+where = with_options(
+    click.option("--seed", type=click.IntRange(0), default=0, show_default=True),
+    click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True),
+    click.option("--threads", type=click.IntRange(1), default=1, show_default=True),
+    click.option("--licence", help="Licence of the weights. [default: not stated]"),
+    click.option("--data-licence", help="Licence of the data. [default: the data's own, or not stated]"),
 )
-every_training = with_options(config, options_of("out"), where, options_of("training"))
+
+every_training = with_options(
+    click.option(
+        "--config", type=Path, is_eager=True, expose_value=False, callback=_configure, help="TOML file of settings."
+    ),
+    click.option("-o", "--out", type=Path, required=True, help="Folder to write; must not exist."),
+    where,
+    click.option(
+        "--precision",
+        type=click.Choice(["float32", "bfloat16"]),
+        help="Precision of matrix products; float32 if the device lacks bfloat16.",
+    ),
+    click.option("--resume", is_flag=True, help="Resume the run in --out with the same command."),
+    click.option("--tensorboard", is_flag=True, help="Also write a TensorBoard log."),
+    click.option("--name", help="Bundle name. [default: the run's folder]"),
+)
+
 split = click.option(
     "--split",
     "by",
@@ -158,7 +149,7 @@ def _changed(context: click.Context, recipe: Recipe, values: Json) -> Recipe:
 
 def _fields(recipe: Recipe, names: Collection[str]) -> set[str]:
     """Those of some options that are fields of the recipe; fields computed from the data cannot be set."""
-    parts = (recipe.training, recipe.config, recipe.visits)
+    parts = [part for part in (recipe.training, recipe.config, recipe.visits) if part is not None]
     fields = set()
     for name in names:
         if name not in recipe.derived and any(hasattr(part, name) for part in parts):
