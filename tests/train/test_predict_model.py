@@ -25,7 +25,7 @@ from motet_train.models.figure_predictor import (
 )
 from motet_train.models.kinematics import VectorFigure, VectorPoints
 from motet_train.models.predictor import Predictor, PredictorConfig
-from motet_train.papers.li2018.expmap import CMU_ACTIONS, expmap_material, read_expmap
+from motet_train.papers.li2018.expmap import CMU_LAYOUT, expmap_material, read_expmap
 from motet_train.papers.li2018.report import FEW, MEAN, complete, protocol_results
 from motet_train.recipes.predict import DEFAULT, train_predict
 from motet_train.recipes.recipe import Job
@@ -168,12 +168,12 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
 
 
 def test_the_mean_is_that_of_complete_actions(tmp_path: Path) -> None:
-    data = write_files(tmp_path, 160, CMU_ACTIONS[:2])
-    for action in CMU_ACTIONS[:2]:
+    data = write_files(tmp_path, 160, CMU_LAYOUT.actions[:2])
+    for action in CMU_LAYOUT.actions[:2]:
         for n in (3, 4, 5):
             source = data / "train" / action / f"{action}_1.txt"
             (source.parent / f"{action}_{n}.txt").write_bytes(source.read_bytes())
-    (data / "train" / CMU_ACTIONS[1] / f"{CMU_ACTIONS[1]}_4.txt").unlink()
+    (data / "train" / CMU_LAYOUT.actions[1] / f"{CMU_LAYOUT.actions[1]}_4.txt").unlink()
     corpus = read_expmap(data)
     assert complete(corpus) == ["basketball"]
     errors = protocol_results({}, corpus).errors[ZERO]
