@@ -4,6 +4,7 @@ import logging
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -43,26 +44,20 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     rng = np.random.default_rng(0)
     # a batch of 2: torch would take an axis of size 1 for a constant
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
-    # of the many warnings of torch's exporter none
-    before = logging.root.manager.disable
-    logging.disable(logging.WARNING)
-    try:
-        # gradients off: torch does not export a scan over weights that ask for them
-        with warnings.catch_warnings(action="ignore"), torch.no_grad():
-            program = torch.onnx.export(
-                module.eval(),
-                (),
-                kwargs=example,
-                input_names=[tensor.name for tensor in spec.inputs],
-                output_names=[tensor.name for tensor in spec.outputs],
-                dynamic_shapes=_dynamic_axes(spec),
-                dynamo=True,
-                external_data=False,
-                opset_version=18,
-                verbose=False,
-            )
-    finally:
-        logging.disable(before)
+    # gradients off: torch does not export a scan over weights that ask for them
+    with warnings.catch_warnings(action="ignore"), _log_silenced(), torch.no_grad():
+        program = torch.onnx.export(
+            module.eval(),
+            (),
+            kwargs=example,
+            input_names=[tensor.name for tensor in spec.inputs],
+            output_names=[tensor.name for tensor in spec.outputs],
+            dynamic_shapes=_dynamic_axes(spec),
+            dynamo=True,
+            external_data=False,
+            opset_version=18,
+            verbose=False,
+        )
     if program is None:
         raise ExportError("torch gave no ONNX program")
     return self_contained(program.model_proto, metadata)
@@ -76,6 +71,20 @@ def _dynamic_axes(spec: GraphSpec) -> dict[str, Any]:
         names = {axis: name for axis, name in enumerate(tensor.shape) if isinstance(name, str)}
         shapes[tensor.name] = {axis: dims.setdefault(name, torch.export.Dim(name)) for axis, name in names.items()}
     return shapes
+
+
+@contextmanager
+def _log_silenced() -> Iterator[None]:
+    """Silence the exporter's log but for errors."""
+    loggers = [logging.getLogger(name) for name in ("torch.onnx", "onnxscript", "onnx_ir")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:

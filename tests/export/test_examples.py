@@ -12,7 +12,7 @@ from motet.bundle.manifest import Manifest, read_contract
 from motet.models.load import KINDS
 from motet_export.decoded import golden_run, runs_of
 from motet_export.exporter import ExportError
-from motet_export.parity import check_carried, check_far, examples, walks
+from motet_export.parity import Once, check_carried, check_far, examples, walks
 
 MOTION = {
     "representation": "angles",
@@ -105,6 +105,23 @@ class Inverse:
     def __call__(self, feeds: Arrays) -> dict[str, np.ndarray]:
         state = 1 / (feeds["state"] - np.float32(0.7)) + self.slip
         return {"frame": state, "next_state": state}
+
+
+def test_equal_calls_are_computed_once_and_others_again() -> None:
+    calls = []
+
+    class Counted(Inverse):
+        def __call__(self, feeds: Arrays) -> dict[str, np.ndarray]:
+            calls.append(feeds)
+            return super().__call__(feeds)
+
+    once = Once(Counted())
+    state = np.ones((3, 2), np.float32)
+    first = once({"state": state})
+    np.testing.assert_array_equal(once({"state": state.copy()})["frame"], first["frame"])
+    assert (once.spec, len(calls)) == (STEP, 1)
+    np.testing.assert_array_equal(once({"state": state + 1})["frame"], Inverse()({"state": state + 1})["frame"])
+    assert len(calls) == 2
 
 
 def test_far_inputs_are_held_to_the_rounding_of_torch() -> None:

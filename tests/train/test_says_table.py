@@ -36,6 +36,7 @@ from motet_train.evaluate.text_adherence.prompts import (
 )
 from motet_train.evaluate.text_adherence.table import (
     depth,
+    head_pitch,
     poses,
     said_to_be_outside,
     says_drawings,
@@ -197,6 +198,14 @@ def test_jerk_of_a_cubic_and_of_a_tremble() -> None:
 def test_depth_is_under_the_ground() -> None:
     assert depth(Track(shifted(standing(), "", y=-0.02))) == pytest.approx(0.02)
     assert depth(Track(shifted(standing(), "", y=0.02))) == 0
+
+
+def test_a_head_is_pitched_by_where_its_top_is_from_the_facing() -> None:
+    neck_to_top = HUMANOID.offsets[HUMANOID.index("head_end")][1]
+    assert head_pitch(Track(standing())) == pytest.approx(0, abs=1e-9)
+    bowed = shifted(standing(), "head_end", z=neck_to_top)
+    assert head_pitch(Track(bowed)) == pytest.approx(45)
+    assert head_pitch(Track(led(bowed, 1.0, turn=90))) == pytest.approx(45, abs=1)
 
 
 def test_poses_differ_by_what_a_figure_does_alone() -> None:

@@ -5,6 +5,7 @@ those who are never seen walking nobody knows how they hold their heads; they ar
 """
 
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import replace
 from tempfile import TemporaryFile
 
@@ -88,17 +89,20 @@ def _collars(store: Store) -> dict[str, dict[str, Array]]:
     """For each person and side the rotation matrix (3, 3) that evens the collar bone; none where no arm ever hangs."""
     directions = defaultdict[str, dict[str, Array]](lambda: {side: np.zeros(3) for side in COLLARS})
     for index, record in enumerate(store.records):
+        local = joint_rotations(store.motion(index))
         for side in COLLARS:
-            directions[record.subject][side] += _hanging_collar(store.motion(index), side)
+            directions[record.subject][side] += _hanging_collar(local, side)
     collars = {}
     for person, sides in directions.items():
         collars[person] = {side: sloping(side, direction) for side, direction in sides.items() if direction.any()}
     return collars
 
 
-def _hanging_collar(features: Motion, side: str) -> Array:
-    """The sum (3,) of the directions of a collar bone, seen from the chest, in frames in which the arm hangs."""
-    local = joint_rotations(features)
+def _hanging_collar(local: Mapping[str, Array], side: str) -> Array:
+    """The sum (3,) of the directions of a collar bone, seen from the chest, in frames in which the arm hangs.
+
+    local: bone -> rotation matrices (T, 3, 3) in the parent's frame.
+    """
     shoulder = local[f"{side}Shoulder"]
     outwards = np.array([np.sign(COLLARS[side][0]), 0.0, 0.0])
     arm = rotated(product(shoulder, local[f"{side}UpperArm"]), outwards)

@@ -98,7 +98,7 @@ def _untrained(config: CodecConfig, contract: MotionContract, windows: SixdWindo
 def _learner(
     net: MotionCodec, job: Job, contract: MotionContract, train: SixdWindows, validation: SixdWindows
 ) -> GradientLearner[MotionCodec]:
-    """Learns to decode windows to the frames that they were encoded from."""
+    """Learns to decode windows to their frames as they are to be shown."""
     visits = job.recipe.visits
     book = net.book.numpy().astype(np.float64)
     weights = joint_weights(contract, ("Foot", "Toes", "LowerArm", "Hand", "head"), visits.ends).to(job.device)
