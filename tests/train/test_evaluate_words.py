@@ -169,3 +169,8 @@ def test_a_model_of_other_data_is_refused() -> None:
     other.training["split"]["test"][0] = "elsewhere"
     with pytest.raises(DataError, match="was not trained on this data"):
         split_as(other, store)
+    # a motion that is both for validation and for testing is another division
+    other = told(store, "describe")
+    other.training["split"]["test"].append(other.training["split"]["validation"][0])
+    with pytest.raises(DataError, match="was not trained on this data"):
+        split_as(other, store)

@@ -115,7 +115,8 @@ def split_as(manifest: Manifest, store: Store) -> SplitStore:
     held_out = validation_names | test_names
     train = matching(names, lambda name: name not in held_out)
     # the store has these motions, and no others
-    if not held_out <= set(names) or len(train) != train_count:
+    complete = len(names) == train_count + len(validation_names) + len(test_names)
+    if not held_out <= set(names) or not complete or len(train) != train_count:
         raise DataError(
             f"{manifest.name} was not trained on this data: its {train_count} training, {len(validation_names)} "
             f"validation and {len(test_names)} test motions are not the {len(store.records)} that are here"
