@@ -2,9 +2,11 @@
 
 import tomllib
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run
 
 import motet
 import motet.keyed
@@ -275,6 +277,13 @@ def test_an_act_of_the_hands_is_done_over_one_of_the_legs(model: motet.CodesMode
     assert (np.ptp(feet, axis=0) > 0.15).all()
     hands = places[:, HUMANOID.index("leftHand_end")] - places[:, HUMANOID.index("rightHand_end")]
     assert np.linalg.norm(hands, axis=1).min() < 0.2
+
+
+@pytest.mark.parametrize("text", ["yawn", "a woman sneezes", "yawn and curtsy", "walk and yawn"])
+def test_words_that_only_acts_have_are_known_to_the_command(text: str, tmp_path: Path) -> None:
+    result = run("generate", text, "-o", tmp_path / "out.bvh")
+    assert result.exit_code == 0
+    assert result.stderr == ""
 
 
 @pytest.mark.parametrize("sentence", ["robot, " * 3000 + "walk", "wave " + "for 3 seconds " * 2000])

@@ -198,7 +198,8 @@ def backwards(model: DescribeModel) -> dict[str, Any]:
 def parted(model: CodesModel) -> dict[str, list[str]]:
     """What texts ask for one after another."""
     texts = [
-        "Walk to the table, drink, turn around and walk away.",
+        "Walk to the table, drink, turn around and walk back.",
+        "sidestep right, then left, then right again",
         "First the man slowly sits down, and then he bows; finally he jumps up and down!",
         "a person is walking, then stops",
         "she carries a box and punches, kicks and dances next to the wall",

@@ -75,6 +75,11 @@ class SentenceModel(GenerateModel):
         self._context = lru_cache(maxsize=256)(self._context_of)
         self._read_actions(source.list_of_fields("actions"))
 
+    def unknown(self, sentence: str) -> list[str]:
+        """See :meth:`motet.models.language.LanguageModel.unknown`; none where an act by key poses is named, whose words
+        the vocabulary need not have."""
+        return [] if self._keyed(sentence) else super().unknown(sentence)
+
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """See :meth:`motet.models.language.LanguageModel.contexts`; one by one, since padding changes the rounding."""
         alone = [super(SentenceModel, self).contexts([sequence], role) for sequence in sequences]
@@ -258,8 +263,11 @@ class SentenceModel(GenerateModel):
             return act
         lacking = self.lacking(text)
         missing = stems_of(word for word in words if self.vocabulary.meant(word) in ("", *lacking))
+        # a word near to a word of the order is not that word: to turn is not to twist
+        order = stems_of(act.sentence.split())
+        missing |= order - self._stems(int(self._context(text).argmax()))
         limit = len(missing) + (not self._understood(text, self._context(text)).confident)
-        limit += not missing.isdisjoint(stems_of(act.sentence.split()))
+        limit += not missing.isdisjoint(order)
         return act if len(act.lacking) < limit else None
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
@@ -310,7 +318,7 @@ class SentenceModel(GenerateModel):
         """Whether the likeliest action of a sentence shows all its parts, none of which has numbers of its own or
         is done again; or an act by key poses shows all, and no two parts name different ones."""
         shown = self.likeliest(sentence)
-        if shown.lacking or not self.understood(sentence).confident:
+        if shown.lacking or (shown.confidence or 0.0) < self._familiar.confident:
             return False
         if whole := self._keyed(sentence):
             acts = [act.act for act in map(self._keyed, parts) if act]

@@ -174,7 +174,9 @@ def _in_full(parts: Iterable[str]) -> list[str]:
 def _after(before: str, part: str) -> str:
     """A part in full, by the one before it."""
     directions = list(DIRECTION.finditer(before))
-    if directions and DIRECTION.fullmatch(TIMES.sub("", part)):
+    once = re.sub(r" (?:again|once more)$", "", part)
+    if directions and DIRECTION.fullmatch(TIMES.sub("", once)):
+        part = once
         # as often as it says itself, or as the part before
         following = before[directions[-1].end() :]
         own_times = TIMES.search(part)

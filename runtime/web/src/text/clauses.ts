@@ -77,11 +77,12 @@ function inFull(parts: string[]): string[] {
 
 function after(before: string, part: string): string {
   const direction = [...before.matchAll(DIRECTION)].at(-1);
-  const direct = part.replace(TIMES, "");
+  const once = part.replace(/ (?:again|once more)$/u, "");
+  const direct = once.replace(TIMES, "");
   if (direction && direct.match(DIRECTION)?.[0] === direct) {
     const following = before.slice(direction.index + direction[0].length);
     return (
-      before.slice(0, direction.index) + part + (direct === part ? following : following.replace(TIMES, ""))
+      before.slice(0, direction.index) + once + (direct === once ? following : following.replace(TIMES, ""))
     );
   }
   const side = SIDE_ALONE.exec(part);
