@@ -56,6 +56,13 @@ def commands(*entries: dict[str, object]) -> Commands:
     return Commands.of([Fields(entry) for entry in entries], NEW_MODEL_RULES, 2)
 
 
+@pytest.mark.parametrize("before", ["walk", "stumble", "yawn"])
+def test_a_command_is_done_to_its_end_after_others(model: CodesModel, before: str) -> None:
+    for seed in range(2):
+        lies = hips(shown(model, f"{before}, then lie down", seed))
+        assert lies[-1, 1] < 0.35
+
+
 @pytest.mark.parametrize(
     ("text", "least", "most"), [("walk", 0.6, 1.6), ("run", 1.4, 4.5), ("walk backwards", 0.5, 1.4)]
 )
