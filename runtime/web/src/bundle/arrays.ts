@@ -110,6 +110,11 @@ export function stacked(vectors: ArrayLike<number>[], ...shape: number[]): Numbe
   return { data, shape: shape.length ? shape : [vectors.length, width] };
 }
 
+/** Frames (T, D) as a batch (1, T, D). */
+export function batched(frames: ArrayLike<number>[]): NumberArray<Float32Array> {
+  return stacked(frames, 1, frames.length, frames[0]!.length);
+}
+
 /** Whole numbers as int64. */
 export function integers(values: Iterable<number>, ...shape: number[]): NumberArray<BigInt64Array> {
   const data = BigInt64Array.from(Array.from(values, BigInt));

@@ -3,7 +3,7 @@ import { type NumberArray, DTYPES, readNpy, readNpz } from "./arrays.js";
 import { BundleError } from "../errors.js";
 import { type GraphSpec, Graph, type SessionSettings } from "./graph.js";
 import { checkManifest, isObject } from "./manifest.js";
-import { openZip, type Archive } from "./members.js";
+import { type Archive, hexOf, joined, openZip } from "./members.js";
 
 /** manifest.json, as docs/reference/bundle.md describes it. */
 export interface Manifest {
@@ -75,9 +75,8 @@ export class Bundle {
     if (!(entry.size <= MEMBERS.MAX_SIZE))
       throw new BundleError(`${name} has ${entry.size} bytes; at most ${MEMBERS.MAX_SIZE} are read`);
     const bytes = await this.zip.read(name, entry.size);
-    const hash = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes as BufferSource));
-    const hex = Array.from(hash, (byte) => byte.toString(16).padStart(2, "0")).join("");
-    if (bytes.length !== entry.size || hex !== entry.sha256)
+    const hash = await crypto.subtle.digest("SHA-256", bytes as BufferSource);
+    if (bytes.length !== entry.size || hexOf(new Uint8Array(hash)) !== entry.sha256)
       throw new BundleError(`the file ${name} was altered`);
     return bytes;
   }
@@ -89,8 +88,7 @@ export class Bundle {
     // behind a graph come the weights that it shares with others: protocol buffers merge
     const files = spec.weights === undefined ? [spec.file] : [spec.file, spec.weights];
     const parts = await Promise.all(files.map((file) => this.read(file)));
-    const model = new Uint8Array(await new Blob(parts as BlobPart[]).arrayBuffer());
-    return Graph.load(role, model, spec, settings);
+    return Graph.load(role, joined(parts), spec, settings);
   }
 
   /** A plain array. */

@@ -24,6 +24,7 @@ export interface GraphSpec {
 export type SessionSettings = InferenceSession.SessionOptions;
 
 export type Arrays = Record<string, NumberArray>;
+export type Tensors = Record<string, NumberArray<Float32Array>>;
 
 /** A function from named arrays to named arrays, computed by ONNX Runtime. */
 export class Graph {
@@ -64,7 +65,7 @@ export class Graph {
   }
 
   /** The outputs for inputs, which must have the contract's names, types and shapes. */
-  async run(inputs: Arrays): Promise<Record<string, NumberArray<Float32Array>>> {
+  async run(inputs: Arrays): Promise<Tensors> {
     const feeds: Record<string, TypedTensor<"float32"> | TypedTensor<"int64">> = {};
     for (const { name, dtype, shape } of this.spec.inputs) {
       const input = inputs[name];
@@ -87,7 +88,7 @@ export class Graph {
         `graph ${this.role}: ONNX Runtime cannot compute it: ${String(error).slice(0, 200)}`,
       );
     });
-    const results: Record<string, NumberArray<Float32Array>> = {};
+    const results: Tensors = {};
     for (const [name, tensor] of Object.entries(outputs)) {
       const data = tensor.data as Float32Array | BigInt64Array;
       results[name] = { data: singles(data), shape: [...tensor.dims] }; // codes are int64, and small
@@ -105,8 +106,8 @@ export class Graph {
   }
 
   /** The states of so many rows before the first step: zeros. */
-  zeroState(rows: number): Record<string, NumberArray<Float32Array>> {
-    const zeros: Record<string, NumberArray<Float32Array>> = {};
+  zeroState(rows: number): Tensors {
+    const zeros: Tensors = {};
     for (const name of Object.keys(this.spec.feedback)) {
       const tensor = this.spec.inputs.find((input) => input.name === name);
       const sizes = this.spec.start?.[name] ?? tensor?.shape.slice(1).map(Number) ?? [];
@@ -119,7 +120,7 @@ export class Graph {
   /** One step: its outputs, and the states for the next one. */
   async step(inputs: Arrays, states: Arrays) {
     const outputs = await this.run({ ...states, ...inputs });
-    const next: Record<string, NumberArray<Float32Array>> = {};
+    const next: Tensors = {};
     for (const [name, source] of Object.entries(this.spec.feedback)) next[name] = outputs[source]!;
     return { outputs, states: next };
   }

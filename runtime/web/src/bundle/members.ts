@@ -75,13 +75,24 @@ async function inflate(name: string, packed: Uint8Array, limit: number): Promise
 }
 
 function bounded(name: string, chunks: Uint8Array[], limit: number): Uint8Array {
-  const size = chunks.reduce((sum, chunk) => sum + chunk.length, 0);
-  if (size > limit) throw new BundleError(`the file ${JSON.stringify(name)} has more than ${limit} bytes`);
-  const whole = new Uint8Array(size);
+  const whole = joined(chunks);
+  if (whole.length > limit)
+    throw new BundleError(`the file ${JSON.stringify(name)} has more than ${limit} bytes`);
+  return whole;
+}
+
+/** Bytes one after the other. */
+export function joined(chunks: Uint8Array[]): Uint8Array {
+  const whole = new Uint8Array(chunks.reduce((sum, chunk) => sum + chunk.length, 0));
   let at = 0;
   for (const chunk of chunks) {
     whole.set(chunk, at);
     at += chunk.length;
   }
   return whole;
+}
+
+/** Bytes as hexadecimal digits. */
+export function hexOf(bytes: Uint8Array): string {
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
 }

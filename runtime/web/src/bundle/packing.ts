@@ -16,22 +16,22 @@ export interface Packed {
   bytes: string;
 }
 
+/** The bytes of base64. */
+export function bytesOf(text: string): Uint8Array<ArrayBuffer> {
+  const letters = atob(text);
+  const bytes = new Uint8Array(letters.length);
+  for (let at = 0; at < bytes.length; at++) bytes[at] = letters.charCodeAt(at);
+  return bytes;
+}
+
 /** The tables, row by row; halves as Float32Array. */
 export async function unpacked({ tables, bytes: text }: Packed): Promise<Record<string, ArrayLike<number>>> {
-  const letters = atob(text);
-  const pressed = new Uint8Array(letters.length);
-  for (let at = 0; at < pressed.length; at++) pressed[at] = letters.charCodeAt(at);
-  const stream = new Blob([pressed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   const arrays: Record<string, ArrayLike<number>> = {};
   let at = 0;
-  for (const [
-    name,
-    {
-      kind,
-      shape: [rows, width],
-    },
-  ] of Object.entries(tables)) {
+  for (const [name, { kind, shape }] of Object.entries(tables)) {
+    const [rows, width] = shape;
     const size = KINDS[kind].BYTES_PER_ELEMENT;
     const target = new Uint8Array(rows * width * size);
     for (let column = 0; column < width; column++) {

@@ -1,5 +1,6 @@
 import { integers, rows } from "../bundle/arrays.js";
 import { type Arrays, type Graph, taken } from "../bundle/graph.js";
+import { ranked } from "../motion/numbers.js";
 
 /** A finished sequence of ids, without its end, and the sum of its log-probabilities, with it. score: its rank. */
 export interface Hypothesis {
@@ -52,7 +53,7 @@ export async function beamSearch(
         grown.push({ ids, score: hypothesis.score + gains[id]!, ended: id === end, parent });
       }
     }
-    const order = grown.map((_, at) => at).sort((a, b) => grown[b]!.score - grown[a]!.score || a - b);
+    const order = ranked(grown.map(({ score }) => score));
     const winners = order.slice(0, beams).map((at) => grown[at]!);
     const parents = winners.filter((winner) => !winner.ended).map((winner) => winner.parent);
     states = taken(following.states, parents);
@@ -70,10 +71,8 @@ export async function nextWords(
   states: Arrays,
 ) {
   const word = integers(open.map(({ ids }) => ids.at(-1) ?? start));
-  const repeated = taken(
-    contexts,
-    open.map(() => 0),
-  );
+  const first = open.map(() => 0);
+  const repeated = taken(contexts, first);
   const next = await step.step({ word, ...repeated }, states);
   return { gains: rows(next.outputs.log_probabilities!), states: next.states };
 }
@@ -97,6 +96,6 @@ export async function scoreWords(
 
 /** The ids of the highest values, highest first. */
 function best(values: Float32Array, count: number, banned: number[]): number[] {
-  const ids = Array.from(values.keys()).filter((id) => !banned.includes(id));
-  return ids.sort((a, b) => values[b]! - values[a]! || a - b).slice(0, count);
+  const ids = ranked(values).filter((id) => !banned.includes(id));
+  return ids.slice(0, count);
 }

@@ -1,6 +1,7 @@
 /* The sentence that agrees best with many drawn ones: docs/reference/bundle.md, the loop `consensus`. */
 import { type Hypothesis, type Limits, nextWords } from "./beam.js";
 import { type Arrays, type Graph, taken } from "../bundle/graph.js";
+import { counted, most, sumOf } from "../motion/numbers.js";
 import type { Noise } from "./random.js";
 
 /** A drawn sequence of ids, the model's log-probability of it, and how often it came. */
@@ -49,9 +50,7 @@ async function drawSequences(
   noise: Noise,
 ): Promise<Drawn[]> {
   const uniform = Array.from({ length: limits.longest + 1 }, () => noise.uniform(draws));
-  let open: Beginning[] = [
-    { ids: [], score: 0, draws: Array.from({ length: draws }, (_, at) => at), ended: false },
-  ];
+  let open: Beginning[] = [{ ids: [], score: 0, draws: [...Array(draws).keys()], ended: false }];
   let states = step.zeroState(1);
   const ended: Beginning[] = [];
   for (let length = 0; open.length; length++) {
@@ -64,18 +63,12 @@ async function drawSequences(
     );
     ended.push(...grown.filter((beginning) => beginning.ended));
     const going = grown.filter((beginning) => !beginning.ended);
-    states = taken(
-      next,
-      going.map((beginning) => beginning.row),
-    );
+    const parents = going.map((beginning) => beginning.row);
+    states = taken(next, parents);
     open = going;
   }
   ended.sort((a, b) => a.draws[0]! - b.draws[0]!);
-  return ended.map(({ ids, score, draws: members }) => ({
-    ids,
-    logProbability: score,
-    times: members.length,
-  }));
+  return ended.map(({ ids, score, draws: { length } }) => ({ ids, logProbability: score, times: length }));
 }
 
 /** What the draws of a beginning go on with: each word as often as its share of them, rounded up or down. */
@@ -91,9 +84,9 @@ function spread(
   const left = Float64Array.from(gains, (gain, id) =>
     banned.includes(id) || (length === longest && id !== end) ? -Infinity : gain,
   );
-  const most = left.reduce((a, b) => Math.max(a, b));
+  const highest = most(left);
   let sum = 0;
-  const shares = left.map((value) => (sum += Math.exp((value - most) / temperature)));
+  const shares = left.map((value) => (sum += Math.exp((value - highest) / temperature)));
   const beginnings: Beginning[] = [];
   let id = 0;
   let last = -1;
@@ -111,27 +104,23 @@ function spread(
 /** What each sequence has in common with all, each as often as it came: the mean F1 of words and of their pairs. */
 function agreement(drawn: Drawn[]): number[] {
   const all = drawn.reduce((sum, { times }) => sum + times, 0);
-  const orders = [1, 2].map((order) => drawn.map(({ ids }) => counted(ids, order)));
+  const orders = [1, 2].map((order) => drawn.map(({ ids }) => counted(grams(ids, order))));
   return drawn.map((_, at) => {
-    const shared = orders.map((grams) =>
-      drawn.reduce((sum, { times }, other) => sum + times * f1(grams[at]!, grams[other]!), 0),
+    const shared = orders.map((counts) =>
+      drawn.reduce((sum, { times }, other) => sum + times * f1(counts[at]!, counts[other]!), 0),
     );
     return (shared[0]! + shared[1]!) / (2 * all);
   });
 }
 
-/** How often each run of `order` words comes. */
-function counted(ids: number[], order: number): Map<string, number> {
-  const counts = new Map<string, number>();
-  for (let at = 0; at + order <= ids.length; at++) {
-    const gram = `${ids.slice(at, at + order)}`;
-    counts.set(gram, (counts.get(gram) ?? 0) + 1);
-  }
-  return counts;
+/** Each run of `order` words. */
+function grams(ids: number[], order: number): string[] {
+  const starts = ids.slice(order - 1);
+  return starts.map((_, at) => `${ids.slice(at, at + order)}`);
 }
 
 function f1(first: Map<string, number>, other: Map<string, number>): number {
-  const size = (grams: Map<string, number>) => [...grams.values()].reduce((a, b) => a + b, 0);
+  const size = (counts: Map<string, number>) => sumOf([...counts.values()]);
   let both = 0;
   for (const [gram, times] of first) both += Math.min(times, other.get(gram) ?? 0);
   return (2 * both) / Math.max(size(first) + size(other), 1);

@@ -59,9 +59,10 @@ export function stateOf(seed: number, count: number, spawned?: number): number[]
     words.push(spawned);
   }
   let constant = 0x43b0d7e5;
+  let multiplier = 0x931e8875;
   const hash = (value: number): number => {
     value = (value ^ constant) >>> 0;
-    constant = Math.imul(constant, 0x931e8875) >>> 0;
+    constant = Math.imul(constant, multiplier) >>> 0;
     value = Math.imul(value, constant) >>> 0;
     return (value ^ (value >>> 16)) >>> 0;
   };
@@ -75,12 +76,8 @@ export function stateOf(seed: number, count: number, spawned?: number): number[]
   }
   for (const word of words.slice(4)) for (let to = 0; to < 4; to++) pool[to] = mix(pool[to]!, hash(word));
   constant = 0x8b51f9dd;
-  return Array.from({ length: count }, (_, at) => {
-    let value = (pool[at % 4]! ^ constant) >>> 0;
-    constant = Math.imul(constant, 0x58f38ded) >>> 0;
-    value = Math.imul(value, constant) >>> 0;
-    return (value ^ (value >>> 16)) >>> 0;
-  });
+  multiplier = 0x58f38ded;
+  return Array.from({ length: count }, (_, at) => hash(pool[at % 4]!));
 }
 
 /** Noise that is given, block after block, such as that of golden vectors. */

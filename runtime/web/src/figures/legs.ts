@@ -1,5 +1,5 @@
 /* The inverse kinematics of the humanoid's legs: an ankle brought to a place. */
-import { BONES, HUMANOID, LEG, SIDES } from "./humanoid/bones.js";
+import { BONES, LEG, OFFSETS, SIDES } from "./humanoid/bones.js";
 import {
   inverse,
   plus,
@@ -14,11 +14,9 @@ import {
 import { TwoBones } from "./twoBones.js";
 
 /** Of the left and the right leg the bones among the humanoid's. */
-export const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
+const LEGS = SIDES.map((side) => LEG.map((part) => BONES.indexOf(side + part)));
 /** Where the joints of a leg begin in their parents' frames. */
-export const OFFSETS = LEGS.map((bones) =>
-  bones.map((bone) => HUMANOID.joints[HUMANOID.index(BONES[bone]!)]!.offset),
-);
+export const LEG_OFFSETS = LEGS.map((bones) => bones.map((bone) => OFFSETS[bone]!));
 
 /** Of hip, knee, ankle and toes. */
 export interface Limb {
@@ -29,7 +27,7 @@ export interface Limb {
 /** Rotations and places in the world of the joints of a leg. */
 export function legOf(rotations: Float64Array, side: number, hips: Quaternion, root: Vector): Limb {
   const bones = LEGS[side]!;
-  const offsets = OFFSETS[side]!;
+  const offsets = LEG_OFFSETS[side]!;
   const hip = plus(root, rotated(hips, offsets[0]!));
   const thigh = product(hips, turnAt(rotations, bones[0]!));
   const knee = plus(hip, rotated(thigh, offsets[1]!));

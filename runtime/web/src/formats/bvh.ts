@@ -3,10 +3,9 @@ import { SKELETON, TEXT } from "../generated.js";
 import { FormatError, MotionError } from "../errors.js";
 import { eulersOf, fromEuler } from "../motion/euler.js";
 import { checked, type Motion } from "../motion/motion.js";
-import type { Quaternion, Vector } from "../motion/rotations.js";
+import { type Quaternion, RADIANS, type Vector } from "../motion/rotations.js";
 import { type Joint, Skeleton, unique } from "../motion/skeleton.js";
 
-const RADIANS = Math.PI / 180;
 const LONGEST = 2 ** 28;
 
 interface Node {
@@ -220,20 +219,15 @@ export function toBVH(motion: Motion): string {
   const { lines, order } = tree(skeleton, moving, (at) =>
     at && still[at] ? translations[0]![at]! : skeleton.joints[at]!.offset,
   );
-  const angles = new Map(
-    order.map((at) => [
-      at,
-      eulersOf(
-        rotations.map((turns) => turns[at]!),
-        "zyx",
-      ),
-    ]),
-  );
+  const angles = skeleton.joints.map((_, at) => {
+    const turns = rotations.map((row) => row[at]!);
+    return eulersOf(turns, "zyx");
+  });
   const rows = rotations.map((_, frame) =>
     order
       .flatMap((at) => [
         ...(moving(at) ? translations[frame]![at]! : []),
-        ...angles.get(at)![frame]!.map((angle) => angle / RADIANS),
+        ...angles[at]![frame]!.map((angle) => angle / RADIANS),
       ])
       .map(number)
       .join(" "),

@@ -1,10 +1,11 @@
 /* Writing GLB files whose nodes are the humanoid in a T-pose: VRM Animation, docs/reference/formats.md, and motions with a body. */
+import { joined } from "../bundle/members.js";
 import { SKELETON } from "../generated.js";
 import { MotionError } from "../errors.js";
 import { relaxed } from "../figures/humanoid/fingers.js";
 import { BONES, FINGERED, groundUnder, HUMANOID, solePoints } from "../figures/humanoid/bones.js";
 import { checked, type Motion, worldOf } from "../motion/motion.js";
-import { minus, plus, type Quaternion, STILL, type Vector } from "../motion/rotations.js";
+import { minus, plus, type Quaternion, STILL } from "../motion/rotations.js";
 import type { Skeleton } from "../motion/skeleton.js";
 import { onHumanoid } from "../figures/humanoid/retarget.js";
 
@@ -21,7 +22,7 @@ export interface Surface {
 
 class Buffer {
   private readonly parts: Numbers[] = [];
-  private length = 0;
+  length = 0;
   readonly bufferViews: object[] = [];
   readonly accessors: object[] = [];
 
@@ -52,22 +53,8 @@ class Buffer {
     return this.accessors.length - 1;
   }
 
-  document(): object {
-    return {
-      bufferViews: this.bufferViews,
-      accessors: this.accessors,
-      buffers: [{ byteLength: this.length }],
-    };
-  }
-
   bytes(): Uint8Array {
-    const bytes = new Uint8Array(this.length);
-    let at = 0;
-    for (const { buffer, byteLength } of this.parts) {
-      bytes.set(new Uint8Array(buffer), at);
-      at += byteLength;
-    }
-    return bytes;
+    return joined(this.parts.map(({ buffer }) => new Uint8Array(buffer)));
   }
 }
 
@@ -129,7 +116,9 @@ function fileOf(motion: Motion, buffer: Buffer, more: object, bodies: object[] =
     scenes: [{ nodes: [0, ...bodies.map((_, at) => joints.length + at)] }],
     nodes: [...joints, ...bodies],
     animations: [animation(buffer, grounded(onHumanoid(checked(motion))))],
-    ...buffer.document(),
+    bufferViews: buffer.bufferViews,
+    accessors: buffer.accessors,
+    buffers: [{ byteLength: buffer.length }],
   };
   return container(document, buffer.bytes());
 }
@@ -153,10 +142,8 @@ function nodesOf({ joints, children }: Skeleton): object[] {
 }
 
 function animation(buffer: Buffer, { fps, rotations, translations }: Motion): object {
-  const times = buffer.add(
-    rotations.map((_, at) => [at / fps]),
-    true,
-  );
+  const frames = rotations.map((_, at) => [at / fps]);
+  const times = buffer.add(frames, true);
   const start = buffer.add([[0]], true);
   const channels: object[] = [];
   const samplers: object[] = [];
@@ -172,16 +159,10 @@ function animation(buffer: Buffer, { fps, rotations, translations }: Motion): ob
     if (!name.endsWith(SKELETON.END_SUFFIX))
       track(at, "rotation", nearby(rotations.map((turns) => turns[at]!)));
   });
-  track(
-    0,
-    "translation",
-    translations.map((moves): Vector => moves[0]!),
-  );
-  const hands = relaxed(
-    FINGERED,
-    FINGERED.joints.map(() => STILL),
-    Object.fromEntries(FINGERED.names.map((name, at) => [name, at])),
-  );
+  const path = translations.map((moves) => moves[0]!);
+  track(0, "translation", path);
+  const still = FINGERED.joints.map(() => STILL);
+  const hands = relaxed(FINGERED, still, Object.fromEntries(FINGERED.names.map((name, at) => [name, at])));
   for (let at = HUMANOID.names.length; at < hands.length; at++) track(at, "rotation", [hands[at]!]);
   return { name: "motion", channels, samplers };
 }

@@ -5,7 +5,8 @@ import { type Animation, Gltf, type Local, type Placed } from "./gltfData.js";
 import { BONES } from "../figures/humanoid/bones.js";
 import { mapOf } from "../figures/humanoid/jointMap.js";
 import { checked, type Motion, motionFrom } from "../motion/motion.js";
-import { hermite, median, rounded } from "../motion/numbers.js";
+import { hermite, median, rounded, sumOf } from "../motion/numbers.js";
+import { clamp } from "../motion/springs.js";
 import {
   cross,
   dot,
@@ -302,11 +303,8 @@ function skeletonOf(gltf: Gltf, joints: number[], rest: Map<number, Placed>): Sk
     const offset = parent < 0 ? place : minus(place, rest.get(joints[parent]!)!.place);
     return { name: bones.get(node) ?? unique(name, reserved), parent, offset, order: "zyx" };
   });
-  return new Skeleton(
-    chain,
-    1,
-    joints.map((node) => restNode(gltf, node, rest)),
-  );
+  const nodes = joints.map((node) => restNode(gltf, node, rest));
+  return new Skeleton(chain, 1, nodes);
 }
 
 function restNode(gltf: Gltf, node: number, rest: Map<number, Placed>): RestNode {
@@ -392,7 +390,7 @@ export function rateOf(tracks: number[][]): number {
     let step = median(gaps);
     if (step > 0) {
       const whole = gaps.map((gap) => rounded(gap / step));
-      const total = whole.reduce((sum, count) => sum + count, 0);
+      const total = sumOf(whole);
       if (total > 0 && gaps.every((gap, at) => Math.abs(gap - whole[at]! * step) < 0.01 * step))
         step = (times.at(-1)! - times[0]!) / total;
     }
@@ -422,7 +420,7 @@ function sampled({ times: at, values, kind, path }: Keys, time: number): number[
   }
   const next = Math.min(before + 1, at.length - 1);
   const span = Math.max(at[next]! - at[before]!, 1e-9);
-  const t = Math.max(0, Math.min(1, (time - at[before]!) / span));
+  const t = clamp((time - at[before]!) / span, 0, 1);
   if (kind === "CUBICSPLINE") {
     const p = values[3 * before + 1]!;
     const out = values[3 * before + 2]!;

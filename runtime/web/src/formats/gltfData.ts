@@ -1,7 +1,9 @@
 /* The parts of a glTF 2.0 file (.glb, .vrm, .vrma, .gltf): its JSON object, its nodes as trees, its arrays of numbers. */
+import { bytesOf } from "../bundle/packing.js";
 import { GLTF_DATA } from "../generated.js";
 import { FormatError } from "../errors.js";
 import {
+  AXES,
   normalised,
   plus,
   product,
@@ -33,7 +35,7 @@ export interface MeshPart {
   extensions?: object;
 }
 
-export interface Material {
+interface Material {
   pbrMetallicRoughness?: { baseColorFactor?: number[]; baseColorTexture?: { index: number } };
   alphaMode?: string;
   alphaCutoff?: number;
@@ -211,9 +213,7 @@ export class Gltf {
     for (const node of this.order.filter((at) => wanted.has(at))) {
       const { translation, rotation, scale } = { ...this.local(node), ...moved?.get(node) };
       const turn = normalised(rotation);
-      const axes = [0, 1, 2].map((axis) =>
-        times(rotated(turn, [+(axis === 0), +(axis === 1), +(axis === 2)]), scale[axis]!),
-      ) as Placed["linear"];
+      const axes = AXES.map((axis, at) => times(rotated(turn, axis), scale[at]!)) as Placed["linear"];
       const above = placed.get(this.parents[node]!);
       placed.set(
         node,
@@ -330,7 +330,7 @@ export function mapped(linear: Placed["linear"], [x, y, z]: Vector): Vector {
 
 /** The bytes of a data: URI. */
 export function inlined(uri: string): Uint8Array {
-  return Uint8Array.from(atob(uri.slice(uri.indexOf(",") + 1)), (letter) => letter.charCodeAt(0));
+  return bytesOf(uri.slice(uri.indexOf(",") + 1));
 }
 
 /** The JSON text and the binary part of a GLB file. */

@@ -1,4 +1,5 @@
 /* Motions for three.js, which is no dependency: plain objects that THREE.AnimationClip.parse takes. */
+import { hexOf } from "../bundle/members.js";
 import { SKELETON } from "../generated.js";
 import { MotionError } from "../errors.js";
 import { grounded, nearby } from "./glb.js";
@@ -60,8 +61,7 @@ function uuid(): string {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   bytes[6] = (bytes[6]! & 0x0f) | 0x40;
   bytes[8] = (bytes[8]! & 0x3f) | 0x80;
-  const hex = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
-  return hex.replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
+  return hexOf(bytes).replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
 function jointTracks(motion: Motion): Track[] {

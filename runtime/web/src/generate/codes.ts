@@ -1,19 +1,21 @@
 /* Motions drawn code by code: docs/reference/bundle.md, the loop `codes`. */
 import { CODES } from "../generated.js";
 import { integers, rows as rowsOf, stacked, type NumberArray } from "../bundle/arrays.js";
-import { type Graph, taken } from "../bundle/graph.js";
+import { type Graph, taken, type Tensors } from "../bundle/graph.js";
 import { type Memory } from "./memory.js";
+import { most, ranked } from "../motion/numbers.js";
 import type { Noise } from "../decode/random.js";
 
 /** How codes are drawn. */
-export interface Drawing {
-  temperature: number;
-  first_temperature: number;
-  top_p: number;
-  guidance: number;
-  memory: number;
-  certainty: number;
-}
+export const DRAWING = [
+  "temperature",
+  "first_temperature",
+  "top_p",
+  "guidance",
+  "memory",
+  "certainty",
+] as const;
+export type Drawing = Record<(typeof DRAWING)[number], number>;
 
 /** What codes are drawn from. end: the move that ends a motion; nullAction: the action that says nothing. */
 export interface Source {
@@ -35,15 +37,9 @@ export function drawnAction(
   certainty: number,
 ): number {
   const uniform = noise.uniform(source.parts + 2)[0]!;
-  return nucleus(
-    Array.from(context, (value) => certainty * value),
-    uniform,
-    1,
-    1,
-  );
+  const certain = Array.from(context, (value) => certainty * value);
+  return nucleus(certain, uniform, 1, 1);
 }
-
-type States = Record<string, NumberArray<Float32Array>>;
 
 /** The last codes of all rows, the actions that their next steps show, and steps since these began. */
 interface Step {
@@ -59,7 +55,7 @@ interface Known {
   done: number[];
   last: number[][];
   /** What the net knows of each row, twice: told the actions, and not told. */
-  states: States[];
+  states: Tensors[];
   steps: Step[];
   /** How many of the last steps of each row the net has yet to read. */
   unread: number[];
@@ -202,10 +198,8 @@ export class Writer {
     const counts = rows.map((row) => this.now.unread[row]!);
     for (const count of new Set(counts)) {
       const group = rows.flatMap((_, at) => (counts[at] === count ? [at] : []));
-      const read = await this.read(
-        group.map((at) => rows[at]!),
-        count,
-      );
+      const members = group.map((at) => rows[at]!);
+      const read = await this.read(members, count);
       group.forEach((at, place) => {
         known[at] = read[2 * place]!;
         known[rows.length + at] = read[2 * place + 1]!;
@@ -228,7 +222,7 @@ export class Writer {
       action: of(({ actions }, row, at) => (at % 2 ? nullAction : written[actions[row]!]!)),
       age: of(({ ages }, row) => ages[row]!),
     };
-    const window: States = {};
+    const window: Tensors = {};
     for (const name of Object.keys(step.spec.feedback)) {
       const kept = rows.map((row) => lately(this.now.states[row]![name]!, CODES.WINDOW - count));
       const data = kept.map((state) => state.data);
@@ -254,10 +248,12 @@ export class Writer {
     whole: boolean,
     uniform: number[],
   ): number | undefined {
-    const { memory } = this.source;
+    const { memory, written } = this.source;
     const { age, done, recent } = this.now;
     const share = this.drawing.memory;
-    if (!(uniform[0]! < share || (steps && share > 0)) || !memory.knows(action)) return undefined;
+    const isCommand = written[action] !== action;
+    const continues = uniform[0]! < share || ((isCommand || steps > 0) && share > 0);
+    if (!continues || !memory.knows(action)) return undefined;
     if (steps) return memory.busiest(action, recent[row]!, steps, uniform[1]!);
     return memory.next(action, recent[row]!, age[row]!, ends, uniform[1]!, done[row]!, whole);
   }
@@ -306,12 +302,9 @@ export class Writer {
     part: number,
   ): Promise<number[][]> {
     const { part: graph, parts } = this.source;
-    const actions = integers(
-      [...rows, ...rows].flatMap((row) => codes[row]!),
-      2 * rows.length,
-      parts,
-    );
-    const { data, shape } = (await graph.run({ known, codes: actions })).log_probabilities!;
+    const drawn = [...rows, ...rows].flatMap((row) => codes[row]!);
+    const inputs = { known, codes: integers(drawn, 2 * rows.length, parts) };
+    const { data, shape } = (await graph.run(inputs)).log_probabilities!;
     const of = (at: number) =>
       data.subarray((at * parts + part) * shape[2]!, (at * parts + part + 1) * shape[2]!);
     return rows.map((_, at) => {
@@ -364,9 +357,9 @@ export async function drawCodes(
 
 /** One of the likeliest things that make up `topP` together, by a uniform number. */
 function nucleus(logWeights: number[], uniform: number, temperature: number, topP: number): number {
-  const most = logWeights.reduce((a, b) => Math.max(a, b));
-  const weights = logWeights.map((value) => Math.exp((value - most) / temperature));
-  const order = weights.map((_, id) => id).sort((a, b) => weights[b]! - weights[a]! || a - b);
+  const highest = most(logWeights);
+  const weights = logWeights.map((value) => Math.exp((value - highest) / temperature));
+  const order = ranked(weights);
   const all = order.reduce((sum, id) => sum + weights[id]!, 0);
   const inside = new Set<number>();
   for (let sum = 0, at = 0; at < order.length && sum < topP * all; at++) {

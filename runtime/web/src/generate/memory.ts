@@ -1,6 +1,7 @@
 import { MEMORY, type memorySettings } from "../generated.js";
 import type { NumberArray } from "../bundle/arrays.js";
 import { BundleError } from "../errors.js";
+import { least, most } from "../motion/numbers.js";
 import type { Settings } from "../settings.js";
 
 /** Of each row of an action its age, and the share of the action that is over before it. */
@@ -52,11 +53,7 @@ export class Memory {
       if (rows && !this.rows.has(action)) this.rows.set(action, rows);
     }
     for (const [action, rows] of this.rows) {
-      const steps = rows.map((row) => this.ages[this.lasts[row]!]!);
-      this.shortest.set(
-        action,
-        steps.reduce((least, count) => Math.min(least, count)),
-      );
+      this.shortest.set(action, least(rows.map((row) => this.ages[this.lasts[row]!]!)));
     }
     const changes = this.changes(moves.shape[1]!, moves.shape[0]!);
     this.parts = this.over(changes.map((change) => this.settings.rest_weight + change));
@@ -179,8 +176,8 @@ export class Memory {
     const all = this.rows.get(action)!;
     const { ages, over } = this.course(action, whole);
     if (!recent.length) {
-      const least = ages.reduce((a, b) => Math.min(a, b));
-      const starts = all.filter((_, at) => ages[at] === least);
+      const youngest = least(ages);
+      const starts = all.filter((_, at) => ages[at] === youngest);
       return starts[Math.floor(uniform * starts.length)]!;
     }
     const places = [...all.keys()];
@@ -189,14 +186,9 @@ export class Memory {
         (age ? ages[at]! > 0 : over[at]! < this.settings.entry) && over[at]! <= done + this.settings.skip,
     );
     const used = fitting.length ? fitting : places;
-    return this.near(
-      used.map((at) => all[at]!),
-      used.map((at) => ages[at]!),
-      recent,
-      age,
-      ends,
-      uniform,
-    );
+    const rows = used.map((at) => all[at]!);
+    const rowAges = used.map((at) => ages[at]!);
+    return this.near(rows, rowAges, recent, age, ends, uniform);
   }
 
   /** The ages of an action's rows and the shares that are over; unless all is shown those of its acts, which end at 1. */
@@ -248,8 +240,7 @@ export class Memory {
   /** From which to which place the rows of a recording are an act: what shows most of it, is short, and begins and ends as it. */
   private act(take: number[]): [number, number] {
     const end = take.length - 1;
-    let best: [number, number] = [0, end];
-    if (end <= this.settings.act_steps) return best;
+    if (end <= this.settings.act_steps) return [0, end];
     // distances of all steps of the recording, each with those before it
     const past = take.map((row) =>
       Array.from({ length: this.settings.past_steps }, (_, back) => this.past(row, back)),
@@ -259,7 +250,6 @@ export class Memory {
     const edge = (to: number, at: number) => Math.min(apart[to]![at]! / this.settings.alike_distance, 1);
     const shown = take.map(() => end + 1); // where each step is first shown, from a place on
     // for each first step, from the last back, the earliest last step by which enough is shown
-    let least = Infinity;
     const spans: [number, number, number][] = [];
     for (let first = end; first >= 0; first--) {
       take.forEach(
@@ -280,13 +270,9 @@ export class Memory {
       }
     }
     // the cheapest span; of several the first
-    for (const [cost, first, last] of spans.sort((a, b) => a[1] - b[1] || a[2] - b[2])) {
-      if (cost < least) {
-        least = cost;
-        best = [first, last];
-      }
-    }
-    return best;
+    spans.sort((a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2]);
+    const [, first, last] = spans[0] ?? [0, 0, end];
+    return [first, last];
   }
 
   /** The row at which an action is taken up to show the most of it in a number of steps. recent: as for `next`. */
@@ -298,20 +284,14 @@ export class Memory {
       const last = this.lasts[all[at]!]!;
       const starts = Array.from({ length: Math.max(1, last + 1 - start - steps) }, (_, i) => start + i);
       const shown = starts.map((row) => this.acts[Math.min(row + steps, last)]! - this.acts[row]!);
-      const most = shown.reduce((a, b) => Math.max(a, b));
-      const good = starts.filter((_, at) => shown[at]! >= this.settings.good_start * most);
+      const enough = this.settings.good_start * most(shown);
+      const good = starts.filter((_, at) => shown[at]! >= enough);
       entries.push(good[Math.floor(good.length / 2)]!);
       while (at < all.length && all[at]! <= last) at++;
     }
     if (!recent.length) return entries[Math.floor(uniform * entries.length)]!;
-    return this.near(
-      entries,
-      entries.map((row) => this.ages[row]!),
-      recent,
-      0,
-      false,
-      uniform,
-    );
+    const ages = entries.map((row) => this.ages[row]!);
+    return this.near(entries, ages, recent, 0, false, uniform);
   }
 
   /** A row whose past resembles the present. */
@@ -329,9 +309,9 @@ export class Memory {
       off[at] =
         this.distance(rows[at]!, recent) + (ends ? later : Math.min(later, this.settings.age_cost_limit));
     }
-    const least = off.reduce((a, b) => Math.min(a, b));
+    const nearest = least(off);
     let sum = 0;
-    const shares = off.map((value) => (sum += Math.exp((least - value) / this.settings.distance_scale)));
+    const shares = off.map((value) => (sum += Math.exp((nearest - value) / this.settings.distance_scale)));
     return rows[shares.findIndex((share) => share > uniform * sum)] ?? rows.at(-1)!;
   }
 

@@ -9,12 +9,13 @@ import type { Bundle, Manifest } from "../bundle/bundle.js";
 import { type Codec, codesOf, type Context, StreamingDecoder } from "./codec.js";
 import { ADDRESSEE, FUNCTION_WORDS, partsOf, sentencesOf, stem, SUBJECT, verbsOf } from "../text/clauses.js";
 import { Commands } from "./commands.js";
-import { drawCodes, drawnAction, drawnSteps, type Drawing, type Source, Writer } from "./codes.js";
+import { drawCodes, drawnAction, drawnSteps, DRAWING, type Drawing, type Source, Writer } from "./codes.js";
 import { BundleError, DecodingError, TextError } from "../errors.js";
 import type { Graph } from "../bundle/graph.js";
 import { Memory } from "./memory.js";
 import { type Frames, LanguageModel } from "../models/base.js";
 import { type Noise, Pcg64, stateOf } from "../decode/random.js";
+import { counted, ranked, sumOf } from "../motion/numbers.js";
 import { settingsOf } from "../settings.js";
 
 /** How motions are drawn: by default as the bundle says. */
@@ -288,15 +289,13 @@ export class GenerateModel extends LanguageModel {
 
   private known(text: string, context: Float32Array): Understood {
     const actions = this.manifest.actions!;
-    const counts = new Map<string, number>();
-    for (const { words } of actions)
-      for (const word of new Set(words)) counts.set(word, (counts.get(word) ?? 0) + 1);
+    const counts = counted(actions.flatMap(({ words }) => [...new Set(words)]));
     const rare = (word: string) => Math.log((1 + actions.length) / counts.get(word)!);
     const unheard = Math.log(1 + actions.length);
     const textWords = [...new Set(this.vocabulary.split(text))];
     const heard = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : 0), 0);
     const all = textWords.reduce((sum, word) => sum + (counts.has(word) ? rare(word) : unheard), 0);
-    const order = Array.from(context.keys()).sort((a, b) => context[b]! - context[a]! || a - b);
+    const order = ranked(context);
     const { confident, doubt } = this.familiarity;
     const likeliest = order[0]!;
     const isCommand = likeliest >= this.commands.first && !this.lacking(text, likeliest).length;
@@ -335,14 +334,7 @@ export class GenerateModel extends LanguageModel {
   }
 
   private drawing(settings: Partial<Drawing>): Drawing {
-    return {
-      temperature: this.setting("temperature", settings.temperature),
-      first_temperature: this.setting("first_temperature", settings.first_temperature),
-      top_p: this.setting("top_p", settings.top_p),
-      guidance: this.setting("guidance", settings.guidance),
-      memory: this.setting("memory", settings.memory),
-      certainty: this.setting("certainty", settings.certainty),
-    };
+    return Object.fromEntries(DRAWING.map((name) => [name, this.setting(name, settings[name])])) as Drawing;
   }
 
   /** How many steps cover a time. */
@@ -413,12 +405,8 @@ export class GenerateModel extends LanguageModel {
       const length = seconds[sentence]!;
       end += length;
       limit = length ? Math.max(1, Math.round(end * this.fps)) : Infinity;
-      for await (const { codes } of drawnSteps(
-        writer,
-        [action],
-        length ? this.steps(end) - done : longest,
-        length > 0,
-      )) {
+      const most = length ? this.steps(end) - done : longest;
+      for await (const { codes } of drawnSteps(writer, [action], most, length > 0)) {
         done++;
         const frames = (await decoder.push(codes)).slice(0, limit - shown);
         shown += frames.length;
@@ -480,7 +468,7 @@ export async function generateModel(bundle: Bundle, graphs: Record<string, Graph
     tokens: tokens!,
     moves: end,
     back: ahead.reduce((sum, steps) => sum + 2 - steps, 0) + Math.ceil(4 / hop),
-    ahead: ahead.reduce((sum, steps) => sum + steps, 0),
+    ahead: sumOf(ahead),
     hop,
     fps: manifest.motion.fps,
     halfLife: settingsOf("continuation", continuationSettings, manifest.settings.continuation).half_life,

@@ -5,28 +5,25 @@ import { restOf } from "../formats/gltf.js";
 import { LEG_LENGTH } from "../figures/humanoid/bones.js";
 import { worldOf } from "../motion/motion.js";
 import { type Figure as Measured, figureOf, fromHumanoid } from "../figures/humanoid/retarget.js";
-import { minus, plus, rotated, times, type Vector, X, Y, Z } from "../motion/rotations.js";
+import { AXES, minus, plus, rotated, times, type Vector } from "../motion/rotations.js";
 import { motionOf, type Shown } from "./figure.js";
 import type { Mesh, Primitive } from "./stage.js";
 
 const VERTICES = 400_000;
 const TRIANGLES = 4;
-const AXES = [X, Y, Z];
 
 /** What of a file is drawn, and how its joints follow a pose. */
 export class Avatar {
   /** Metres of the humanoid for one of the avatar's: its legs get the humanoid's length, so its feet stay where they stand. */
   readonly scale: number;
-  private readonly measured: Measured;
 
   private constructor(
     readonly mesh: Mesh,
     private readonly rest: Vector[],
     /** Of each slot of the mesh the joint that moves it. */
     private readonly movers: number[],
-    measured: Measured,
+    private readonly measured: Measured,
   ) {
-    this.measured = measured;
     this.scale = LEG_LENGTH / measured.fitted.leg;
   }
 
@@ -53,14 +50,9 @@ export class Avatar {
     const matrices = new Float32Array(16 * this.movers.length);
     this.movers.forEach((joint, slot) => {
       const turn = turns[0]![joint]!;
+      const axes = AXES.map((axis) => rotated(turn, axis));
       const move = minus(places[0]![joint]!, rotated(turn, this.rest[joint]!));
-      matrices.set(
-        columns(
-          AXES.map((axis) => rotated(turn, axis)),
-          move,
-        ),
-        16 * slot,
-      );
+      matrices.set(columns(axes, move), 16 * slot);
     });
     return { matrices, places: shown.places.map((place) => times(place, 1 / this.scale)) };
   }
@@ -106,12 +98,8 @@ class Slots {
     const { linear, place } = this.rest.get(node)!;
     const column = (at: number) =>
       bind ? (bind.slice(at, at + 3) as Vector) : (AXES[at / 4] ?? ([0, 0, 0] as Vector));
-    this.binds.push(
-      columns(
-        [0, 4, 8].map((at) => mapped(linear, column(at))),
-        plus(place, mapped(linear, column(12))),
-      ),
-    );
+    const axes = [0, 4, 8].map((at) => mapped(linear, column(at)));
+    this.binds.push(columns(axes, plus(place, mapped(linear, column(12)))));
     let above = node;
     while (above >= 0 && !this.joints.includes(above)) above = this.gltf.parents[above]!;
     this.movers.push(Math.max(0, this.joints.indexOf(above)));
@@ -119,10 +107,12 @@ class Slots {
   }
 }
 
+type Images = Map<number, Promise<ImageBitmap | null>>;
+
 async function primitivesOf(gltf: Gltf, slots: Slots): Promise<Primitive[]> {
   const rows = new Map<number, number[][]>(); // parts of a mesh share their vertices
   const array = (at: number) => rows.get(at) ?? rows.set(at, gltf.array(at)).get(at)!;
-  const images = new Map<number, Promise<ImageBitmap | null>>();
+  const images: Images = new Map();
   const primitives: Promise<Primitive>[] = [];
   gltf.nodes.forEach(({ mesh, skin }, node) => {
     if (mesh === undefined || !gltf.order.includes(node)) return;
@@ -135,8 +125,6 @@ async function primitivesOf(gltf: Gltf, slots: Slots): Promise<Primitive[]> {
   });
   return Promise.all(primitives);
 }
-
-type Images = Map<number, Promise<ImageBitmap | null>>;
 
 async function primitiveOf(
   gltf: Gltf,

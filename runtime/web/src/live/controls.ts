@@ -12,7 +12,7 @@ const STILL = 6;
 const SHORT = 400;
 
 /** What can be typed beside the names of acts. */
-export const ORDERS = [
+const ORDERS = [
   ...["walk", "run", "skip", "zombie", "stop", "come here", "turn left", "turn right", "turn around"],
   ...["walk slowly", "walk backwards", "walk in a circle", "step left", "step right", "faster", "slower"],
 ];
@@ -50,7 +50,7 @@ export function addControls(page: Page, most: number): void {
 }
 
 /** Say something where it is seen, and read out by screen readers. */
-export function reply(text: string): void {
+function reply(text: string): void {
   element("reply").textContent = text;
 }
 
@@ -131,10 +131,8 @@ function addText(page: Page): void {
 }
 
 function addKeys(page: Page): void {
-  const {
-    stage,
-    hands: { keys },
-  } = page;
+  const { stage } = page;
+  const { keys } = page.hands;
   const once: Record<string, () => void> = {
     Space: () => toggle(page, "pause"),
     KeyG: () => toggle(page, "strafe"),

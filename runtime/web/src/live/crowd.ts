@@ -1,6 +1,7 @@
 /* Figures that go by themselves: they follow the first one, wander about, or go to a point. Metres, seconds, radians. */
 import { type Asked, type Figure, inRange } from "./figure.js";
 import { keptApart, type Walker } from "../steering/avoidance.js";
+import { moved, type Pose as Ground } from "../motion/planar.js";
 import type { ControlModel } from "../steering/model.js";
 
 /** What figures keep between them, how far they go from the first one, and the room of one in the rows behind it. */
@@ -62,24 +63,20 @@ function newMood(net: Net, figure: Figure, random: () => number): Omit<Mood, "ra
   };
 }
 
-/** The place of figure n in the rows behind the first one: how far behind it and to its left. */
-export function placeBehind(n: number): [behind: number, left: number] {
+/** The place of figure n in the rows behind the first one, which faces as that does. */
+export function placeBehind(first: Ground, n: number): Ground {
   const row = Math.floor((n - 1) / ABREAST);
   const at = (n - 1) % ABREAST;
-  return [ROW * (row + 1), COLUMN * (Math.floor(at / 2) + 0.5) * (at % 2 ? 1 : -1)];
+  const left = COLUMN * (Math.floor(at / 2) + 0.5) * (at % 2 ? 1 : -1);
+  return moved(first, [-ROW * (row + 1), left, 0]);
 }
 
 function followed(net: Net, figures: Figure[], n: number): Asked {
-  const [x, z, facing] = figures[0]!.root;
-  const [behind, left] = placeBehind(n);
-  const point: [number, number] = [
-    x - behind * Math.sin(facing) + left * Math.cos(facing),
-    z - behind * Math.cos(facing) - left * Math.sin(facing),
-  ];
+  const [x, z] = placeBehind(figures[0]!.root, n);
   const figure = figures[n]!;
-  const away = Math.hypot(point[0] - figure.root[0], point[1] - figure.root[1]);
+  const away = Math.hypot(x - figure.root[0], z - figure.root[1]);
   const stays = away < (Math.hypot(...figure.velocity) < 0.1 ? 0.8 : 0.3);
-  return towards(net, figures, n, point, stays ? 0 : Math.max(0.7, 1.3 * away));
+  return towards(net, figures, n, [x, z], stays ? 0 : Math.max(0.7, 1.3 * away));
 }
 
 /** A figure that goes on as it is asked. */

@@ -4,14 +4,14 @@ import { FormatError, MotionError } from "../errors.js";
 import { Gltf } from "../formats/gltfData.js";
 import { clipsOf, readGLB } from "../formats/gltf.js";
 import { isHumanoid } from "../figures/humanoid/bones.js";
-import { type Motion, resampled } from "../motion/motion.js";
+import { cut, type Motion, resampled } from "../motion/motion.js";
 import { toHumanoid } from "../figures/humanoid/retarget.js";
+import { RADIANS } from "../motion/rotations.js";
 import { wrapped } from "../motion/springs.js";
 import { Avatar } from "./avatar.js";
 
 const LARGEST = 200e6;
 const MOST_SECONDS = 60;
-const RADIANS = Math.PI / 180;
 
 /** What is in a file; told: a sentence about it. The motion is of the humanoid, at the page's rate. */
 export interface Dropped {
@@ -56,23 +56,17 @@ async function opened(name: string, content: Uint8Array, fps: number): Promise<D
 }
 
 function played(name: string, source: Motion, fps: number): Dropped {
-  const {
-    rotations: { length },
-    fps: rate,
-  } = source;
+  const { length } = source.rotations;
+  const rate = source.fps;
   if (length < 3) throw new MotionError("it has a figure but no motion");
   const humanoid = isHumanoid(source.skeleton);
-  const cut = {
-    ...source,
-    rotations: source.rotations.slice(0, MOST_SECONDS * rate),
-    translations: source.translations.slice(0, MOST_SECONDS * rate),
-  };
+  const first = cut(source, 0, MOST_SECONDS * rate);
   const result = humanoid
-    ? { motion: cut, convention: "motet's humanoid", notes: [] }
-    : toHumanoid(cut.fps > fps ? resampled(cut, fps) : cut);
+    ? { motion: first, convention: "motet's humanoid", notes: [] }
+    : toHumanoid(rate > fps ? resampled(first, fps) : first);
   const motion = resampled(result.motion, fps);
   const figure = `${source.skeleton.joints.length} joints${humanoid || result.convention ? `, ${result.convention}` : ""}`;
-  const shown = length > cut.rotations.length ? `, of which the first ${MOST_SECONDS} s are shown` : "";
+  const shown = length > first.rotations.length ? `, of which the first ${MOST_SECONDS} s are shown` : "";
   const text = `${name}: a figure of ${figure}; ${(length / rate).toFixed(1)} s at ${Math.round(rate)} frames a second${shown}. ${way(motion)}`;
   return { motion, text };
 }

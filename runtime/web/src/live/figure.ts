@@ -114,10 +114,8 @@ export class Figure {
 
   /** Where it is asked to be so many seconds from now: what its springs lead to. */
   later(seconds: number): Ground {
-    const {
-      playback: { root, spring, springRate },
-      target,
-    } = this.steered;
+    const { playback, target } = this.steered;
+    const { root, spring, springRate } = playback;
     const { velocity, facing } = this.model.steerer.matcher.settings;
     const slow = dampingOf(velocity);
     const [x, z] = [0, 1].map(

@@ -13,6 +13,8 @@ import { stick } from "./stick.js";
 import { type Act, actOf, numbersOf } from "../steering/acts.js";
 import type { Going } from "../steering/paths.js";
 import { type GivenActs, Repertoire } from "../steering/repertoire.js";
+import type { Pose as Ground } from "../motion/planar.js";
+import { RADIANS } from "../motion/rotations.js";
 import { captionOf, Words } from "../steering/spoken.js";
 
 /** What motet/live/page.py writes into a page. bytes: base64. */
@@ -24,7 +26,6 @@ export interface Given {
   most: number;
 }
 
-const RADIANS = Math.PI / 180;
 /** Seconds that a frame counts for, at most, and for which a page is drawn after something was done. */
 const LATEST = 0.1;
 const AWAKE = 1;
@@ -78,14 +79,9 @@ export class Page {
     const { figures, net } = this;
     figures.length = Math.min(figures.length, count);
     for (let n = figures.length; n < count; n++) {
-      const [x, z, facing] = figures[0]?.root ?? [0, 0, 0];
-      const [behind, left] = n ? placeBehind(n) : [0, 0];
-      const sin = Math.sin(facing);
-      const cos = Math.cos(facing);
       const phase = n ? n % net.model.steerer.matcher.settings.search_every : undefined;
-      figures.push(
-        new Figure(net.model, [x - behind * sin + left * cos, z - behind * cos - left * sin, facing], phase),
-      );
+      const place: Ground = n ? placeBehind(figures[0]!.root, n) : [0, 0, 0];
+      figures.push(new Figure(net.model, place, phase));
     }
   }
 

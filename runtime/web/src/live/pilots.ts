@@ -1,6 +1,7 @@
 /* Who steers the first figure while no hand does: a figure of eight, a point to go to, or an order. */
 import { type Going, sent } from "../steering/paths.js";
 import { type Asked, type Figure, inRange } from "./figure.js";
+import { moved } from "../motion/planar.js";
 import { fastest, type Net, towards, usual } from "./crowd.js";
 
 /** Asks a figure each tick, or leads it along a path; null when it is done. goal: where it goes, x and z in metres. */
@@ -25,11 +26,8 @@ export function eight({ root: [x, z, facing] }: Figure): Pilot {
   const turned = facing - Math.PI / 4; // it starts at an angle of 45 degrees to its length
   const point = (): [number, number] => {
     const ahead = HALF * Math.sin(along);
-    const aside = HALF * Math.sin(along) * Math.cos(along);
-    return [
-      x + ahead * Math.sin(turned) + aside * Math.cos(turned),
-      z + ahead * Math.cos(turned) - aside * Math.sin(turned),
-    ];
+    const [toX, toZ] = moved([x, z, turned], [ahead, ahead * Math.cos(along), 0]);
+    return [toX, toZ];
   };
   const away = ({ root }: Figure) => Math.hypot(point()[0] - root[0], point()[1] - root[1]);
   return {

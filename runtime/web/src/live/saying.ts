@@ -2,10 +2,9 @@
 import { fastest, usual } from "./crowd.js";
 import type { Page } from "./page.js";
 import { goTo, Order } from "./pilots.js";
+import { RADIANS } from "../motion/rotations.js";
 import { SAYING } from "../generated.js";
 import type { Reading, Step } from "../steering/spoken.js";
-
-const RADIANS = Math.PI / 180;
 
 export class Saying {
   private readonly all: boolean;

@@ -8,7 +8,7 @@ import {
   freeRunSettings,
   nearestSettings,
 } from "../generated.js";
-import { integers, stacked } from "../bundle/arrays.js";
+import { batched, integers } from "../bundle/arrays.js";
 import type { Manifest } from "../bundle/bundle.js";
 import type { Graph } from "../bundle/graph.js";
 import { BundleError, DecodingError } from "../errors.js";
@@ -88,9 +88,6 @@ export abstract class LanguageModel extends Model {
       throw new DecodingError(
         `the motion has ${checked.length} frames, but the model takes at most ${most}: cut it`,
       );
-    return {
-      frames: stacked(checked, 1, checked.length, checked[0]!.length),
-      lengths: integers([checked.length]),
-    };
+    return { frames: batched(checked), lengths: integers([checked.length]) };
   }
 }

@@ -3,6 +3,8 @@ import { NEAREST_NEIGHBOUR, answerSettings } from "../generated.js";
 import type { Bundle, Manifest } from "../bundle/bundle.js";
 import { BundleError } from "../errors.js";
 import type { Frames } from "./base.js";
+import { sumOf } from "../motion/numbers.js";
+import { clamp } from "../motion/springs.js";
 import { type Settings, settingsOf } from "../settings.js";
 
 /** What a sentence says that somebody goes backwards by. */
@@ -116,7 +118,7 @@ export class Known {
     const weights = alike.map((similarity) =>
       similarity >= least ? Math.exp((similarity - order[0]!) / temperature) : 0,
     );
-    const total = weights.reduce((sum, weight) => sum + weight, 0);
+    const total = sumOf(weights);
     const counted = new Array<number>(this.tables.shown.length / this.kinds).fill(0);
     weights.forEach((weight, motion) => {
       counted[this.tables.actions[motion]!]! += weight / total;
@@ -141,7 +143,7 @@ export class Known {
   }
 
   private probability(share: number): number {
-    const kept = Math.min(Math.max(share, 0.02), 0.98);
+    const kept = clamp(share, 0.02, 0.98);
     return 1 / (1 + Math.exp(-(this.settings.bias + this.settings.share * Math.log(kept / (1 - kept)))));
   }
 

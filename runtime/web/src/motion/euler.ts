@@ -1,9 +1,9 @@
 /* Euler angles in radians: an order such as "zyx" is the product Rz Ry Rx, and angles are listed as the order is. */
 import { ROTATIONS } from "../generated.js";
-import { about, product, type Quaternion, rotated, type Vector, X, Y, Z } from "./rotations.js";
+import { about, AXES, product, type Quaternion, rotated, type Vector } from "./rotations.js";
 
 export function fromEuler(angles: Vector, order: string): Quaternion {
-  const [a, b, c] = angles.map((angle, at) => about([X, Y, Z]["xyz".indexOf(order[at]!)]!, angle)) as [
+  const [a, b, c] = angles.map((angle, at) => about(AXES["xyz".indexOf(order[at]!)]!, angle)) as [
     Quaternion,
     Quaternion,
     Quaternion,
@@ -55,9 +55,9 @@ function apart(a: Vector, b: Vector): number {
 }
 
 /** The middle angle is within a quarter turn; the last is 0 at a gimbal lock. */
-export function toEuler(turn: Quaternion, order: string): Vector {
+function toEuler(turn: Quaternion, order: string): Vector {
   const [i, j, k] = Array.from(order, (axis) => "xyz".indexOf(axis)) as Vector;
-  const columns = [X, Y, Z].map((axis) => rotated(turn, axis));
+  const columns = AXES.map((axis) => rotated(turn, axis));
   const entry = (row: number, column: number) => columns[column]![row]!;
   const sign = handedness(order);
   const cosine = Math.hypot(entry(i, i), entry(i, j));

@@ -52,11 +52,8 @@ export function atRest(skeleton: Skeleton): Motion {
 }
 
 /** Forward kinematics. */
-export function worldOf({
-  skeleton,
-  rotations,
-  translations,
-}: Pick<Motion, "skeleton" | "rotations" | "translations">): World {
+export function worldOf(motion: Pick<Motion, "skeleton" | "rotations" | "translations">): World {
+  const { skeleton, rotations, translations } = motion;
   const turns: Quaternion[][] = [];
   const places: Vector[][] = [];
   rotations.forEach((local, frame) => {
@@ -130,21 +127,14 @@ export function resampled(motion: Motion, fps: number, toEnd = false): Motion {
     toEnd ? frames - 1 - (count - 1 - at) * ratio : at * ratio,
   );
   const between = ratio < 1 ? onSplines : onLines;
-  const turned = joints.map(({ order }, at) =>
-    between(
-      eulersOf(
-        motion.rotations.map((row) => row[at]!),
-        order,
-      ),
-      times,
-    ).map((angles) => fromEuler(angles, order)),
-  );
-  const moved = joints.map((_, at) =>
-    between(
-      motion.translations.map((row) => row[at]!),
-      times,
-    ),
-  );
+  const turned = joints.map(({ order }, at) => {
+    const turns = motion.rotations.map((row) => row[at]!);
+    return between(eulersOf(turns, order), times).map((angles) => fromEuler(angles, order));
+  });
+  const moved = joints.map((_, at) => {
+    const moves = motion.translations.map((row) => row[at]!);
+    return between(moves, times);
+  });
   const byFrame = <T>(byJoint: T[][]) => times.map((_, frame) => byJoint.map((rows) => rows[frame]!));
   return { ...motion, fps, rotations: byFrame(turned), translations: byFrame(moved) };
 }
@@ -172,12 +162,8 @@ function onSplines(values: Vector[], times: number[]): Vector[] {
   return times.map((time) => {
     const [start, s] = place(values, time);
     return [0, 1, 2].map((axis) => {
-      const [a, b, c, d] = padded.slice(start, start + 4).map((value) => value[axis]!) as [
-        number,
-        number,
-        number,
-        number,
-      ];
+      const value = (step: number) => padded[start + step]![axis]!;
+      const [a, b, c, d] = [value(0), value(1), value(2), value(3)];
       return b + 0.5 * s * (c - a + s * (2 * a - 5 * b + 4 * c - d + s * (3 * (b - c) + d - a)));
     }) as Vector;
   });

@@ -1,3 +1,31 @@
+import { clamp } from "./springs.js";
+
+/** Their sum, from the first on. */
+export function sumOf(values: number[]): number {
+  return values.reduce((sum, value) => sum + value, 0);
+}
+
+/** The largest, also of more numbers than a function takes. */
+export function most(values: number[] | Float64Array): number {
+  return (values as number[]).reduce((a, b) => Math.max(a, b));
+}
+
+export function least(values: number[] | Float64Array): number {
+  return (values as number[]).reduce((a, b) => Math.min(a, b));
+}
+
+/** The places of values, that of the largest first; of equal ones in their order. */
+export function ranked(values: ArrayLike<number>): number[] {
+  return Array.from(values, (_, at) => at).sort((a, b) => values[b]! - values[a]! || a - b);
+}
+
+/** How often each value comes. */
+export function counted(values: Iterable<string>): Map<string, number> {
+  const counts = new Map<string, number>();
+  for (const value of values) counts.set(value, (counts.get(value) ?? 0) + 1);
+  return counts;
+}
+
 /** The difference of the largest and the least number. */
 export function spread(values: number[]): number {
   let least = Infinity;
@@ -7,6 +35,12 @@ export function spread(values: number[]): number {
     most = Math.max(most, value);
   }
   return most - least;
+}
+
+/** That of places along x, y and z. */
+export function extents(places: number[][]): [x: number, y: number, z: number] {
+  const along = (axis: number) => spread(places.map((place) => place[axis]!));
+  return [along(0), along(1), along(2)];
 }
 
 /** The value that a share (0 to 1) of the values lies below, between two of them on a line. */
@@ -29,7 +63,7 @@ export function rounded(value: number): number {
 
 /** Smoothly from 0 at `start` to 1 at `end` (Perlin's "smootherstep", 2002). */
 export function rise(value: number, start: number, end: number): number {
-  const part = Math.max(0, Math.min(1, (value - start) / Math.max(end - start, 1e-12)));
+  const part = clamp((value - start) / Math.max(end - start, 1e-12), 0, 1);
   return part ** 3 * (10 - 15 * part + 6 * part ** 2);
 }
 
@@ -52,7 +86,7 @@ export function smoothed(rows: number[][], deviation: number): number[][] {
   const window = Array.from({ length: 2 * reach + 1 }, (_, at) =>
     Math.exp(-0.5 * ((at - reach) / deviation) ** 2),
   );
-  const total = window.reduce((sum, weight) => sum + weight);
+  const total = sumOf(window);
   const value = (row: number, column: number): number =>
     row < 0
       ? 2 * rows[0]![column]! - value(-row, column)
@@ -69,6 +103,6 @@ export function smoothed(rows: number[][], deviation: number): number[][] {
 
 /** Each value's window of `reach` values before and as many after; those at the ends go on. */
 export function windows(values: number[], reach: number): number[][] {
-  const value = (at: number) => values[Math.max(0, Math.min(values.length - 1, at))]!;
+  const value = (at: number) => values[clamp(at, 0, values.length - 1)]!;
   return values.map((_, at) => Array.from({ length: 2 * reach + 1 }, (_, step) => value(at + step - reach)));
 }

@@ -1,4 +1,7 @@
 export type Vector = [number, number, number];
+/** Of a degree. */
+export const RADIANS = Math.PI / 180;
+
 /** Columns x, y and z. */
 export type Rotation = [Vector, Vector, Vector];
 /** x, y, z, w. */
@@ -104,11 +107,12 @@ export function mean(vectors: Vector[]): Vector {
 /** No turn. */
 export const STILL: Quaternion = [0, 0, 0, 1];
 
-export const [X, Y, Z]: Rotation = [
+export const AXES: Rotation = [
   [1, 0, 0],
   [0, 1, 0],
   [0, 0, 1],
 ];
+export const [X, Y, Z] = AXES;
 
 export function normalised(q: Quaternion): Quaternion {
   const length = Math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -116,7 +120,7 @@ export function normalised(q: Quaternion): Quaternion {
 }
 
 /** The same rotation, w not negative. */
-export function positive(q: Quaternion): Quaternion {
+function positive(q: Quaternion): Quaternion {
   return q[3] < 0 ? [-q[0], -q[1], -q[2], -q[3]] : [q[0], q[1], q[2], q[3]];
 }
 
@@ -173,7 +177,7 @@ export function swing(from: Vector, to: Vector): Quaternion {
   const cosine = dot(start, end);
   if (cosine >= -1 + 1e-6) return normalised([...cross(start, end), 1 + cosine]);
   const least = start.map(Math.abs).indexOf(Math.min(...start.map(Math.abs)));
-  return [...unit(cross(start, [X, Y, Z][least]!)), 0];
+  return [...unit(cross(start, AXES[least]!)), 0];
 }
 
 /** The part of a turn that is about an axis. */

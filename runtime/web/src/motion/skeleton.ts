@@ -1,5 +1,5 @@
 import { MotionError } from "../errors.js";
-import { spread } from "./numbers.js";
+import { extents } from "./numbers.js";
 import { plus, type Quaternion, type Vector } from "./rotations.js";
 
 /** A joint and the offset from its parent at rest; the order of Euler angles is that of its file. */
@@ -49,7 +49,7 @@ export class Skeleton {
 
   /** The largest extent of the rest pose along an axis. */
   get height(): number {
-    return Math.max(...[0, 1, 2].map((axis) => spread(this.rest.map((place) => place[axis]!))));
+    return Math.max(...extents(this.rest));
   }
 
   /** The same tree with other offsets and another unit. */

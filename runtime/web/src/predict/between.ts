@@ -1,6 +1,6 @@
 /* Filling gaps of placed frames: docs/reference/bundle.md, the loop `between`. Three numbers of place, then two axes a bone. */
 import { PLACED } from "../generated.js";
-import { stacked } from "../bundle/arrays.js";
+import { batched } from "../bundle/arrays.js";
 import type { Graph } from "../bundle/graph.js";
 import { hermite } from "../motion/numbers.js";
 import { quaternionOf, rotated, rotationOf, towards, type Vector, X, Y } from "../motion/rotations.js";
@@ -18,10 +18,8 @@ export async function between(
   const pose = poseOf(past.at(-1)!);
   const [before, behind] = [past, after].map((part) => part.map((frame) => seenFrom(frame, pose)));
   const plain = bridge(before!, behind!, frames);
-  const batch = (part: ArrayLike<number>[]) => stacked(part, 1, part.length, part[0]!.length);
-  const { data, shape } = (
-    await filler.run({ past: batch(before!), plain: batch(plain), after: batch(behind!) })
-  ).filled!;
+  const inputs = { past: batched(before!), plain: batched(plain), after: batched(behind!) };
+  const { data, shape } = (await filler.run(inputs)).filled!;
   const width = shape[2]!;
   return Array.from({ length: frames }, (_, at) => putAt(data.subarray(at * width, (at + 1) * width), pose));
 }

@@ -4,7 +4,7 @@ import { DecodingError, MotionError } from "../errors.js";
 import { RETARGETING, ROOT_SIXD } from "../generated.js";
 import { eulersOf, fromEuler } from "../motion/euler.js";
 import { holdFeet } from "../figures/feet/hold.js";
-import { BONES, HUMANOID, isHumanoid } from "../figures/humanoid/bones.js";
+import { BONES, HUMANOID, humanoidMotion, isHumanoid, jointOf } from "../figures/humanoid/bones.js";
 import { unitOf } from "../figures/humanoid/measure.js";
 import { Body } from "../figures/humanoid/body.js";
 import { mapOf } from "../figures/humanoid/jointMap.js";
@@ -21,6 +21,7 @@ import {
   ofVector,
   product,
   type Quaternion,
+  RADIANS,
   rotated,
   size,
   times,
@@ -33,7 +34,6 @@ import { toHumanoid } from "../figures/humanoid/retarget.js";
 import { Skeleton } from "../motion/skeleton.js";
 import { travelling } from "../figures/feet/treadmill.js";
 
-const RADIANS = Math.PI / 180;
 const KINDS: Record<string, string> = { root_angles: "r", root_vectors: "e", root_sixd: "x" };
 
 /**
@@ -57,11 +57,8 @@ export function framesFor(motion: Motion, manifest: Manifest): number[][] {
   const joints = bones.map((bone) =>
     representation === "root_angles" ? degrees(turns(bone), bone) : vectors(turns(bone)),
   );
-  const rates = velocities(
-    places,
-    block.map(([heading]) => heading),
-    fps,
-  );
+  const headings = block.map(([heading]) => heading);
+  const rates = velocities(places, headings, fps);
   return rates.map(([forward, left, turn], at) => {
     const [, pitch, roll] = block[at]!;
     return [
@@ -131,7 +128,7 @@ function hasBones(skeleton: Skeleton): boolean {
 }
 
 function degrees(turns: Quaternion[], bone: string): number[][] {
-  const { order } = HUMANOID.joints[HUMANOID.index(bone)]!;
+  const { order } = jointOf(bone);
   return eulersOf(turns, order).map((angles) =>
     Array.from("xyz", (axis) => angles[order.indexOf(axis)]! / RADIANS),
   );
@@ -202,33 +199,23 @@ export function motionOf(
   const unit = representation === "root_angles" ? RADIANS : 1;
   let ground: Ground = [0, 0, 0];
   const rows = frames.map((frame, at) => {
-    const [forward, left, turn, height, pitch, roll] = Array.from({ length: 6 }, (_, i) => frame[i]!) as [
-      number,
-      number,
-      number,
-      number,
-      number,
-      number,
-    ];
+    const [forward, left, turn] = [frame[0]!, frame[1]!, frame[2]!];
+    const [height, pitch, roll] = [frame[3]!, frame[4]!, frame[5]!];
     if (at) ground = moved(ground, [forward / fps, left / fps, (turn * unit) / fps]);
     const rotations: Record<string, Quaternion> = {
       hips: fromEuler([ground[2], pitch * unit, roll * unit], "yxz"),
     };
-    bones.forEach(
-      (bone, i) =>
-        (rotations[bone] = turnOf(
-          [0, 1, 2].map((axis) => frame[6 + 3 * i + axis]! * unit) as Vector,
-          bone,
-          unit === 1,
-        )),
-    );
+    bones.forEach((bone, i) => {
+      const values = [0, 1, 2].map((axis) => frame[6 + 3 * i + axis]! * unit) as Vector;
+      rotations[bone] = turnOf(values, bone, unit === 1);
+    });
     return { hips: [ground[0], height, ground[1]] as Vector, rotations };
   });
   return posed(rows, fps);
 }
 
 function turnOf(values: Vector, bone: string, isVector: boolean): Quaternion {
-  const { order } = HUMANOID.joints[HUMANOID.index(bone)]!;
+  const { order } = jointOf(bone);
   return isVector
     ? ofVector(values)
     : fromEuler(Array.from(order, (axis) => values["xyz".indexOf(axis)]!) as Vector, order);
@@ -248,8 +235,6 @@ function posed(poses: { hips: Vector; rotations: Record<string, Quaternion> }[],
   const rotations = poses.map((pose) =>
     HUMANOID.names.map((name): Quaternion => pose.rotations[name] ?? [0, 0, 0, 1]),
   );
-  const translations = poses.map((pose) =>
-    HUMANOID.joints.map(({ offset }, at) => (at ? offset : pose.hips)),
-  );
-  return checked({ skeleton: HUMANOID, fps, rotations, translations, travels: true });
+  const hips = poses.map((pose) => pose.hips);
+  return checked(humanoidMotion(rotations, hips, fps));
 }

@@ -3,6 +3,7 @@ import { ACTION_LAYER, MATCHING, actSettings } from "../generated.js";
 import { type Act, stepOf } from "./acts.js";
 import { BONES, LEG, SIDES } from "../figures/humanoid/bones.js";
 import type { Playback, Target } from "./matching.js";
+import type { ControlModel } from "./model.js";
 import type { Pose as Ground } from "../motion/planar.js";
 import {
   inverse,
@@ -59,13 +60,6 @@ export interface Acting {
   drift: Ground;
 }
 
-/** What acts are laid over steps with. */
-export interface ActingModel {
-  readonly steerer: Steerer;
-  readonly acts: Settings<typeof actSettings>;
-  readonly fps: number;
-}
-
 /** Of a figure that does nothing but stand or go. */
 export function noAct(steerer: Steerer, playback: Playback): Acting {
   const body = () => {
@@ -101,7 +95,7 @@ export function doing({ playing, request }: Acting, fps: number): Doing | null {
 
 /** Before a tick: go on by a frame, begin what is asked, end what is over. Whether something else is shown from now on. */
 export function begin(
-  model: ActingModel,
+  model: ControlModel,
   acting: Acting,
   playback: Playback,
   target: Target,
@@ -130,7 +124,7 @@ function next(now: Playing, goes: boolean): Playing | null {
 
 /** The act that is asked for, at the frame after the one that is most like the figure. */
 function entered(
-  { steerer: { matcher }, acts: settings, fps }: ActingModel,
+  { steerer: { matcher }, acts: settings, fps }: ControlModel,
   { playing }: Acting,
   act: Act,
   upper: boolean | undefined,
@@ -161,7 +155,7 @@ function entered(
 
 /** After a tick: lay the act over its pose, and put the figure where that leads. root: before the tick. */
 export function laid(
-  { acts: settings, steerer: { matcher } }: ActingModel,
+  { acts: settings, steerer: { matcher } }: ControlModel,
   acting: Acting,
   pose: Played,
   playback: Playback,

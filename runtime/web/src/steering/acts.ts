@@ -4,8 +4,16 @@ import type { Manifest } from "../bundle/bundle.js";
 import { ControlError } from "../errors.js";
 import { framesFor } from "../representation/frames.js";
 import { contacts } from "../figures/feet/contacts.js";
-import { BONES, groundUnder, HUMANOID, SIDES, solePoints } from "../figures/humanoid/bones.js";
+import {
+  BONES,
+  groundUnder,
+  HUMANOID,
+  humanoidMotion,
+  SIDES,
+  solePoints,
+} from "../figures/humanoid/bones.js";
 import { type Motion, type World, worldOf } from "../motion/motion.js";
+import { spread } from "../motion/numbers.js";
 import { moved, type Pose as Ground } from "../motion/planar.js";
 import {
   about,
@@ -60,9 +68,7 @@ export function actOf({ fps, acts: settings }: ActModel, name: string, numbers: 
     );
   if (!values.every((value) => Math.abs(value) <= ACTS.LARGEST_COORDINATE))
     throw new ControlError(`an act must be finite numbers, no larger than ${ACTS.LARGEST_COORDINATE}`);
-  const rows = Array.from({ length: frames }, (_, at) =>
-    values.slice(at * ACTS.WIDTH, (at + 1) * ACTS.WIDTH),
-  );
+  const rows = chunks(values, ACTS.WIDTH);
   const poses = rows.map((row): Played => ({
     ground: [row[ACTS.WIDTH - 4]!, row[ACTS.WIDTH - 3]!, row[ACTS.WIDTH - 2]!],
     rotations: Float64Array.from(
@@ -83,25 +89,13 @@ export function actOf({ fps, acts: settings }: ActModel, name: string, numbers: 
   const within = <T>(all: T[]): T[] =>
     first >= 0 && last - first >= Math.round(settings.moves * fps) ? all.slice(first, last + 1) : all;
   const height = within(poses.map(({ height }) => height));
-  const ground = within(poses.map(({ ground }) => ground));
-  const features = within(
-    poseFeatures(
-      world,
-      poses.map(({ ground }) => ground),
-      fps,
-    ),
-  );
+  const path = poses.map(({ ground }) => ground);
+  const ground = within(path);
+  const features = within(poseFeatures(world, path, fps));
   const contacts = within(footContacts(world, fps));
   const legs = byLegs(height, ground, features, settings);
-  return {
-    name,
-    rotations: within(poses.map(({ rotations }) => rotations)),
-    height,
-    ground,
-    contacts,
-    legs,
-    features,
-  };
+  const rotations = within(poses.map(({ rotations }) => rotations));
+  return { name, rotations, height, ground, contacts, legs, features };
 }
 
 function byLegs(
@@ -110,13 +104,12 @@ function byLegs(
   features: number[][],
   settings: Settings<typeof actSettings>,
 ): boolean {
-  const range = (values: number[]) => Math.max(...values) - Math.min(...values);
   let facing = 0;
   const turned = ground.map(([, , to]) => (facing += wrapped(to - facing)));
   return (
-    range([ACTS.STANDING_HIPS, ...height]) > settings.bent ||
+    spread([ACTS.STANDING_HIPS, ...height]) > settings.bent ||
     Math.max(...features.map((feature) => Math.max(feature[1]!, feature[4]!))) > settings.raised ||
-    range(turned) > settings.turned
+    spread(turned) > settings.turned
   );
 }
 
@@ -155,10 +148,8 @@ export function motionOf(poses: Pick<Played, "ground" | "rotations" | "height">[
     turns[0] = product(about(Y, pose.ground[2]), turns[0]!);
     return turns;
   });
-  const translations = poses.map(({ ground: [x, z], height }) =>
-    HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [x, height, z])),
-  );
-  return { skeleton: HUMANOID, fps, rotations, translations, travels: true };
+  const hips = poses.map(({ ground: [x, z], height }): Vector => [x, height, z]);
+  return humanoidMotion(rotations, hips, fps);
 }
 
 /** How fast values change at a frame, a second: by those before and after it. */

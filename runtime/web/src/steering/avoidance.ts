@@ -1,5 +1,6 @@
 /* Figures that keep apart by reciprocal velocity obstacles, as motet/steering/avoidance.py says. */
 import type { avoidanceSettings } from "../generated.js";
+import { clamp } from "../motion/springs.js";
 import type { Settings } from "../settings.js";
 
 /** Where a figure would come to rest, its velocity and the one wanted, in m and m/s along x and z; and whether it goes. */
@@ -36,7 +37,7 @@ export function keptApart(
     if (other === figure || Math.abs(x) >= settings.sight || Math.abs(z) >= settings.sight) continue;
     const u = figure.velocity[0]! - other.velocity[0]!;
     const v = figure.velocity[1]! - other.velocity[1]!;
-    const soon = Math.min(Math.max((x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0), settings.soon);
+    const soon = clamp((x * u + z * v) / Math.max(u * u + v * v, 1e-6), 0, settings.soon);
     if (Math.hypot(x - soon * u, z - soon * v) >= 2 * room) continue;
     const [change, wayX, wayZ] = changed(x, z, u, v, room * (other.moves ? 1 : settings.standing), settings);
     const distance = Math.hypot(x, z);
@@ -59,7 +60,7 @@ function wish({ wanted, velocity }: Walker, settings: Avoidance): [x: number, z:
   const x = wanted[0]!;
   const z = wanted[1]!;
   const gone = (velocity[0]! * x + velocity[1]! * z) / Math.max(x * x + z * z, 1e-9);
-  const angle = settings.gives_way * Math.min(Math.max(1 - gone, 0), 1);
+  const angle = settings.gives_way * clamp(1 - gone, 0, 1);
   const sin = Math.sin(angle);
   const cos = Math.cos(angle);
   return [x * cos + z * sin, z * cos - x * sin];

@@ -1,7 +1,7 @@
 /* Figures that look at points: head, neck and upper spine share the turn, within what people can do, as motet/steering/look_layer.py says. */
 import { LOOK_LAYER, type lookSettings } from "../generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
-import { BONES, HUMANOID } from "../figures/humanoid/bones.js";
+import { BONES, OFFSETS } from "../figures/humanoid/bones.js";
 import {
   about,
   inverse,
@@ -20,14 +20,13 @@ import {
 } from "../motion/rotations.js";
 import type { Settings } from "../settings.js";
 import { clamp } from "../motion/springs.js";
-import type { Played } from "./step.js";
+import { type Played, seenBy } from "./step.js";
 
 /** Bones that turn, and the share of the turn that each and those below it make together. */
 const SHARES = Object.entries(LOOK_LAYER.SHARES).map(([name, share]): [bone: number, share: number] => [
   BONES.indexOf(name),
   share,
 ]);
-const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
 const SPINE = BONES.indexOf("spine");
 
 /** What a figure looks at, and the angles by which its head is turned to the left and up, more than is played. */
@@ -74,7 +73,7 @@ function wanted(
   settings: Settings<typeof lookSettings>,
 ): number[] {
   if (!point) return [0, 0];
-  const aim = minus(inSpine(pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
+  const aim = minus(seenBy([SPINE], pose, point), eyes(turned(seen, now[0], shownBy(turn)))); // as they were turned a tick ago
   if (!(size(aim) > settings.near)) return [0, 0];
   const [toSide, up] = angles(aim);
   let left = toSide;
@@ -90,13 +89,6 @@ function wanted(
 function bonesOf({ rotations }: Played): Quaternion[] {
   let above: Quaternion = STILL;
   return SHARES.map(([bone]) => (above = product(above, turnAt(rotations, bone))));
-}
-
-/** A point in the frame of the lower spine. */
-function inSpine({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
-  const hips = product(about(Y, facing), turnAt(rotations, 0));
-  const place = plus([x, height, z], rotated(hips, OFFSETS[SPINE]!));
-  return rotated(inverse(product(hips, turnAt(rotations, SPINE))), minus(point, place));
 }
 
 /** Where the eyes are in the frame of the lower spine. */

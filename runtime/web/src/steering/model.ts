@@ -18,21 +18,20 @@ import {
 } from "../generated.js";
 import { type Act, actOf, reachOf } from "./acts.js";
 import type { Bundle, Manifest } from "../bundle/bundle.js";
-import { ControlSession } from "./session.js";
+import { ControlSession, type Rows } from "./session.js";
 import { BundleError, ControlError } from "../errors.js";
 import { Gaits, type Speeds } from "./gaits.js";
 import { BONES } from "../figures/humanoid/bones.js";
 import { Matcher, type Tables } from "./matching.js";
 import { Model } from "../models/base.js";
 import { Steerer } from "./step.js";
-import { type Settings, settingsOf } from "../settings.js";
 
 export interface StartSettings {
   /** By default the first. */
   gait?: string;
   characters?: number;
   /** x and z in metres and facing in degrees, for all or for each; by default the origin, facing z. */
-  places?: readonly number[] | readonly (readonly number[])[];
+  places?: Rows;
   /** Keep planted feet in place, by turning hips and knees. */
   holdFeet?: boolean;
   /** Refuse a speed outside a gait's range, instead of clamping it. */
@@ -47,34 +46,24 @@ export class ControlModel extends Model {
   readonly gaits: readonly string[];
   readonly abilities: Gaits;
   readonly steerer: Steerer;
-  readonly lock: Settings<typeof footLockSettings>;
-  readonly steps: Settings<typeof stepSettings>;
-  readonly acts: Settings<typeof actSettings>;
-  readonly idle: Settings<typeof idleSettings>;
-  readonly look: Settings<typeof lookSettings>;
-  readonly reach: Settings<typeof reachSettings>;
-  readonly terrain: Settings<typeof terrainSettings>;
-  readonly turns: Settings<typeof turnSettings>;
-  readonly arrival: Settings<typeof arrivalSettings>;
-  readonly avoidance: Settings<typeof avoidanceSettings>;
+  readonly lock = this.tuned("foot_lock", footLockSettings);
+  readonly steps = this.tuned("stepping", stepSettings);
+  readonly acts = this.tuned("acting", actSettings);
+  readonly idle = this.tuned("idle", idleSettings);
+  readonly look = this.tuned("look", lookSettings);
+  readonly reach = this.tuned("reach", reachSettings);
+  readonly terrain = this.tuned("terrain", terrainSettings);
+  readonly turns = this.tuned("turns", turnSettings);
+  readonly arrival = this.tuned("arrival", arrivalSettings);
+  readonly avoidance = this.tuned("avoidance", avoidanceSettings);
   private taken?: ReadonlyMap<string, readonly Act[]>;
 
   constructor(manifest: Manifest, tables: Tables) {
     super(manifest);
-    const steering = settingsOf("steering", steeringSettings, manifest.settings.steering);
+    const steering = this.tuned("steering", steeringSettings);
     const { names, speeds, odd } = configOf(manifest, tables.codes.length / tables.left.length);
     this.abilities = new Gaits(names, speeds, steering);
     this.gaits = names;
-    this.lock = settingsOf("foot_lock", footLockSettings, manifest.settings.foot_lock);
-    this.steps = settingsOf("stepping", stepSettings, manifest.settings.stepping);
-    this.acts = settingsOf("acting", actSettings, manifest.settings.acting);
-    this.idle = settingsOf("idle", idleSettings, manifest.settings.idle);
-    this.look = settingsOf("look", lookSettings, manifest.settings.look);
-    this.reach = settingsOf("reach", reachSettings, manifest.settings.reach);
-    this.terrain = settingsOf("terrain", terrainSettings, manifest.settings.terrain);
-    this.turns = settingsOf("turns", turnSettings, manifest.settings.turns);
-    this.arrival = settingsOf("arrival", arrivalSettings, manifest.settings.arrival);
-    this.avoidance = settingsOf("avoidance", avoidanceSettings, manifest.settings.avoidance);
     const matcher = new Matcher(tables, odd, names.length, steering, this.fps);
     matcher.goals.forEach((goals, gait) => {
       if (!goals.rows.length)

@@ -4,10 +4,12 @@ import { keptApart, unit } from "./avoidance.js";
 import type { arrivalSettings } from "../generated.js";
 import type { Gaits } from "./gaits.js";
 import type { Playback, Target } from "./matching.js";
+import type { ControlModel } from "./model.js";
 import type { Settings } from "../settings.js";
-import { hasten, type Steered, type SteeringModel } from "./steered.js";
+import { hasten, type Steered } from "./steered.js";
 import { clamp, dampingOf, wrapped } from "../motion/springs.js";
 
+type Arrival = Settings<typeof arrivalSettings>;
 export type Point = readonly [x: number, z: number];
 
 /** A figure on its path. */
@@ -35,10 +37,10 @@ export function sent(points: Point[], order: Pick<Going, "gait" | "speed" | "fac
 
 /** A tick later: the velocity at which the figure is to go, [0, 0] for standing. The place where it would come to rest is led
  *  along the path; the figure follows it. straysFrom: metres from the path beyond which it goes straight on to the next corner. */
-export function onward(
+function onward(
   going: Going,
   playback: Playback,
-  settings: Settings<typeof arrivalSettings>,
+  settings: Arrival,
   halfLife: number,
   straysFrom: number,
   seconds: number,
@@ -82,7 +84,7 @@ function rejoin(going: Going, place: Point): void {
 
 /** The share of its speed at which a figure goes through the bend around where it is on its path: by how much shorter the
  *  straight line through it is. */
-function slowness(going: Going, settings: Settings<typeof arrivalSettings>): number {
+function slowness(going: Going, settings: Arrival): number {
   const around = settings.ahead + settings.ahead_moving * going.speed;
   const start = Math.max(going.gone - around, 0);
   const stop = Math.min(going.gone + around, going.along.at(-1)!);
@@ -93,13 +95,7 @@ function slowness(going: Going, settings: Settings<typeof arrivalSettings>): num
 
 /** Metres that the point of the path `here` goes on: `metres`, or less while the figure, which would come to rest at `rests`,
  *  is far from there; and as far as the figure is ahead already. */
-function step(
-  going: Going,
-  here: Point,
-  rests: Point,
-  metres: number,
-  settings: Settings<typeof arrivalSettings>,
-): number {
+function step(going: Going, here: Point, rests: Point, metres: number, settings: Arrival): number {
   const off = minus(rests, here);
   const waits = clamp(1 - Math.hypot(...off) / settings.strays, 0, 1);
   const way = unit(...minus(at(going, going.gone + 0.05), here));
@@ -107,12 +103,7 @@ function step(
 }
 
 /** Whether the figure's target is standing, and whether it has arrived. atEnd: whether it comes to rest at the end. */
-function arrive(
-  going: Going,
-  { root, spring }: Playback,
-  atEnd: boolean,
-  settings: Settings<typeof arrivalSettings>,
-): void {
+function arrive(going: Going, { root, spring }: Playback, atEnd: boolean, settings: Arrival): void {
   const far = distance(going.points.at(-1)!, at2(root));
   const stands = Math.hypot(...at2(spring)) < settings.stands;
   going.stops = (going.stops && !(stands && far > settings.glides_from)) || atEnd;
@@ -121,21 +112,21 @@ function arrive(
 }
 
 /** Where a figure faces that goes at a velocity: where it goes; near the end as it does, and at the end as it is to. */
-export function faces(
+function faces(
   { points, facing }: Going,
   { root, spring }: Playback,
   [x, z]: Point,
-  settings: Settings<typeof arrivalSettings>,
+  settings: Arrival,
 ): number {
   if (distance(points.at(-1)!, at2(root)) >= settings.sidestep) return Math.atan2(x, z);
   return facing ?? spring[2];
 }
 
 /** Move a figure that comes to rest to where it is to stand. */
-export function settle(
+function settle(
   { points, stops }: Going,
   playback: Playback,
-  settings: Settings<typeof arrivalSettings>,
+  settings: Arrival,
   halfLife: number,
   seconds: number,
 ): void {
@@ -180,7 +171,7 @@ const dot = (a: Point, b: Point): number => a[0] * b[0] + a[1] * b[1];
 const distance = (a: Point, b: Point): number => Math.hypot(a[0] - b[0], a[1] - b[1]);
 
 /** Let those that are on a way go on, and those that move keep `room` metres apart, if it is not 0. */
-export function lead(model: SteeringModel, figures: Steered[], room: number): void {
+export function lead(model: ControlModel, figures: Steered[], room: number): void {
   const { abilities } = model;
   const before = figures.map(({ target, command }) => ({ target, gait: command.gait }));
   for (const figure of figures) {
@@ -197,7 +188,7 @@ export function lead(model: SteeringModel, figures: Steered[], room: number): vo
 
 /** Command a figure to go on along its path, and move it as it comes to rest at the end. */
 function follow(
-  { abilities, steerer, arrival, fps }: SteeringModel,
+  { abilities, steerer, arrival, fps }: ControlModel,
   figure: Steered,
   straysFrom: number,
 ): void {
@@ -227,7 +218,7 @@ function slowed({ speeds }: Gaits, gait: number, speed: number): number {
 }
 
 function keepApart(
-  { abilities, avoidance, steerer }: SteeringModel,
+  { abilities, avoidance, steerer }: ControlModel,
   figures: Steered[],
   room: number,
   targetsBefore: Target[],

@@ -1,7 +1,7 @@
 /* Hands that reach for points: two-bone inverse kinematics of an arm, within what a shoulder can do, as motet/steering/reach_layer.py says. */
 import { REACH_LAYER, type reachSettings } from "../generated.js";
 import { type Follower, followed, followerAt, shownBy } from "./follower.js";
-import { ARM, BONES, HUMANOID, SIDES, SPINE } from "../figures/humanoid/bones.js";
+import { ARM, BONES, OFFSETS, SIDES, SPINE } from "../figures/humanoid/bones.js";
 import {
   about,
   dot,
@@ -11,6 +11,7 @@ import {
   plus,
   product,
   type Quaternion,
+  RADIANS,
   rotated,
   setTurn,
   size,
@@ -21,14 +22,12 @@ import {
   Y,
 } from "../motion/rotations.js";
 import type { Settings } from "../settings.js";
-import type { Played } from "./step.js";
+import { type Played, seenBy } from "./step.js";
 import { TwoBones } from "../figures/twoBones.js";
 
 /** Shoulder, upper arm, forearm and hand of both sides. */
 const ARMS = SIDES.map((side) => ARM.map((part) => BONES.indexOf(side + part)));
-const OFFSETS = BONES.map((name) => HUMANOID.joints[HUMANOID.index(name)]!.offset);
 const TRUNK = SPINE.map((name) => BONES.indexOf(name));
-const RADIANS = Math.PI / 180;
 
 /** What a hand of a figure reaches for. aim: where it goes for it, from the shoulder in the frame of the upper chest; weight: [0], the
  *  arm as it is played, to [1]; signs: of the quaternions between which upper arm and forearm are mixed, 1 or -1, 0 at rest; beyond:
@@ -61,7 +60,7 @@ export function reached(
   }
   // where the hand can be for its point, and whether that can be held
   const arm = armOf(pose, side);
-  const goal = hand.point && withinReach(arm, inChest(pose, hand.point), side, settings);
+  const goal = hand.point && withinReach(arm, seenBy(TRUNK, pose, hand.point), side, settings);
   const goes = goal?.holds ?? false;
   hand.beyond = !!goal && !(goal.holds && goal.gap <= settings.reached);
   // the aim goes there, or stays while the hand lets go; an arm that does not reach yet goes there by its weight alone
@@ -136,17 +135,6 @@ function turned(
 /** 1 for the left side, which is at positive x, -1 for the right. */
 function out(side: number): number {
   return 1 - 2 * side;
-}
-
-/** A point in the frame of the upper chest. */
-function inChest({ ground: [x, z, facing], height, rotations }: Played, point: Vector): Vector {
-  let place: Vector = [x, height, z];
-  let above: Quaternion = product(about(Y, facing), turnAt(rotations, 0));
-  for (const bone of TRUNK) {
-    place = plus(place, rotated(above, OFFSETS[bone]!));
-    above = product(above, turnAt(rotations, bone));
-  }
-  return rotated(inverse(above), minus(point, place));
 }
 
 /** The upper arm and the forearm that are forward and half bent, with the elbow down: bent by a right angle, then turned. */

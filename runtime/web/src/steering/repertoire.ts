@@ -3,6 +3,7 @@ import { ACTS, REPERTOIRE } from "../generated.js";
 import { type Packed, unpacked } from "../bundle/packing.js";
 import { BONES, SIDES } from "../figures/humanoid/bones.js";
 import { type Act, actOf, type ActModel } from "./acts.js";
+import { clamp } from "../motion/springs.js";
 import type { WordTable } from "./spoken.js";
 
 /** An act of the file: its name and what else is said for it; the rows that it has; with which hand or foot it is shown. */
@@ -69,11 +70,8 @@ export class Repertoire {
     const { frames } = await unpacked(file);
     const rows = Float64Array.from(frames!);
     for (let at = ACTS.WIDTH; at < rows.length; at++) rows[at]! += rows[at - ACTS.WIDTH]!;
-    return new Repertoire(
-      model,
-      file,
-      rows.map((value) => value / file.steps),
-    );
+    const numbers = rows.map((value) => value / file.steps);
+    return new Repertoire(model, file, numbers);
   }
 
   /** An act; with a hand or foot, or to a side, "left" or "right"; so many times as fast; so often in a row. */
@@ -101,7 +99,7 @@ export class Repertoire {
     const kept = Array.from({ length: frames }, (_, at) =>
       Array.from(this.rows.subarray((first + at) * ACTS.WIDTH, (first + at + 1) * ACTS.WIDTH)),
     );
-    const row = (at: number) => kept[Math.min(Math.max(at, 0), frames - 1)]!;
+    const row = (at: number) => kept[clamp(at, 0, frames - 1)]!;
     const numbers = kept.flatMap((now, at) => {
       if (at + 1 === frames) return [now];
       const [before, next, after] = [row(at - 1), row(at + 1), row(at + 2)];
@@ -123,7 +121,7 @@ const OTHER_SIDE = BONES.map((bone) => {
 });
 
 /** Frames with left and right exchanged. */
-export function mirrored(numbers: Frames): Frames {
+function mirrored(numbers: Frames): Frames {
   return numbers.map((frame) => {
     const [x, z, facing, height] = frame.slice(-4) as [number, number, number, number];
     const quaternions = OTHER_SIDE.flatMap((bone) => {
@@ -135,7 +133,7 @@ export function mirrored(numbers: Frames): Frames {
 }
 
 /** Frames played faster or slower. */
-export function atTempo(numbers: Frames, tempo: number): Frames {
+function atTempo(numbers: Frames, tempo: number): Frames {
   const last = numbers.length - 1;
   const count = Math.trunc(last / tempo + 0.5) + 1;
   return Array.from({ length: count }, (_, at) => {
@@ -147,7 +145,7 @@ export function atTempo(numbers: Frames, tempo: number): Frames {
 }
 
 /** Frames of performances in a row: each begins where the one before ends, over into it in some frames. */
-export function joined(parts: Frames[], seam: number = REPERTOIRE.SEAM): Frames {
+function joined(parts: Frames[], seam: number = REPERTOIRE.SEAM): Frames {
   let whole = parts[0]!;
   for (const part of parts.slice(1)) {
     const length = Math.min(seam, whole.length >> 1, part.length >> 1);

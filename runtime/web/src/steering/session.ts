@@ -12,13 +12,11 @@ import { lead, type Point, restingPlace, sent } from "./paths.js";
 import type { Target } from "./matching.js";
 import type { Motion } from "../motion/motion.js";
 import type { Pose } from "../representation/poses.js";
-import { about, product, type Quaternion, turnAt, type Vector, Y } from "../motion/rotations.js";
+import { about, product, type Quaternion, RADIANS, turnAt, type Vector, Y } from "../motion/rotations.js";
 import { wrapped } from "../motion/springs.js";
 import { hasten, standing, type Steered, tell, tick } from "./steered.js";
 import { between, copyPose, newPose, type Played } from "./step.js";
 import { checkedGround, type GroundHeight, newTerrain } from "./terrain.js";
-
-const RADIANS = Math.PI / 180;
 
 /** A pose as `posesOf` gives it, and where its figure is. */
 export interface SteeredPose extends Pose {
@@ -36,6 +34,9 @@ export type Doable = Motion | Act | string | null;
 /** A value for all figures, or one for each. */
 export type ForAll<T> = T | readonly T[];
 
+/** Numbers for all figures, or a row for each. */
+export type Rows = readonly number[] | readonly (readonly number[])[];
+
 /** Where figures go from now on; what is not given stays. Angles are in degrees. */
 export interface Told {
   /** One of `model.gaits`. */
@@ -47,7 +48,7 @@ export interface Told {
   /** If only the direction is given, they face it. */
   facing?: ForAll<number>;
   /** Along x and z in m/s, such as from a gamepad's stick, in place of speed and direction; [0, 0] stops. */
-  velocity?: readonly number[] | readonly (readonly number[])[];
+  velocity?: Rows;
 }
 
 /** How figures go to points. Angles are in degrees. */
@@ -187,17 +188,14 @@ export class ControlSession {
    * they are. They slow down to the end, and `arrived` tells when they are there; `control` ends it. ControlError for what
    * does not fit, and for a gait that goes nowhere; nothing changes then.
    */
-  goTo(points: readonly number[] | readonly (readonly number[])[] | null, way: Way = {}): void {
+  goTo(points: Rows | null, way: Way = {}): void {
     const figures = this.chosen(way.ids);
     const ends =
       points === null
         ? figures.map((at) => this.restingPlace(at))
         : this.rows("points", points, ["x", "z"], figures.length);
-    this.send(
-      figures,
-      ends.map((end) => [end]),
-      way,
-    );
+    const paths = ends.map((end) => [end]);
+    this.send(figures, paths, way);
   }
 
   /** The same along a path, from where they are to its first point, and so on to its last: of 1 to 10,000 points, for all. */
@@ -206,11 +204,8 @@ export class ControlSession {
       throw new ControlError(`a path needs 1 to ${TARGETS.LONGEST_PATH} points of x and z`);
     const points = path.map((point) => this.rows("points", point, ["x", "z"], 1)[0]!);
     const figures = this.chosen(way.ids);
-    this.send(
-      figures,
-      figures.map(() => points),
-      way,
-    );
+    const paths = figures.map(() => points);
+    this.send(figures, paths, way);
   }
 
   private send(
@@ -265,10 +260,7 @@ export class ControlSession {
    * are recorded. Head, neck and upper spine share the turn, up to 85 degrees aside and 50 up or down; what is nearer to the eyes
    * than 20 cm is not looked at. ControlError for what does not fit; nothing changes then.
    */
-  lookAt(
-    points: readonly number[] | readonly (readonly number[])[] | null,
-    { ids }: { ids?: readonly number[] } = {},
-  ): void {
+  lookAt(points: Rows | null, { ids }: { ids?: readonly number[] } = {}): void {
     this.pointed(points, ids).forEach(([at, point]) => (this.state.figures[at]!.look.point = point));
   }
 
@@ -277,11 +269,7 @@ export class ControlSession {
    * moves. A hand goes as near as it can to a point that is too far, and lets go of one behind the back or at the shoulder;
    * `outOfReach` tells. Otherwise like `lookAt`.
    */
-  reach(
-    hand: "left" | "right",
-    points: readonly number[] | readonly (readonly number[])[] | null,
-    { ids }: { ids?: readonly number[] } = {},
-  ): void {
+  reach(hand: "left" | "right", points: Rows | null, { ids }: { ids?: readonly number[] } = {}): void {
     const side = SIDES.indexOf(hand);
     if (side < 0) throw new ControlError(`unknown hand ${JSON.stringify(hand)}; expected left or right`);
     this.pointed(points, ids).forEach(([at, point]) => (this.state.figures[at]!.hands[side]!.point = point));
@@ -293,10 +281,7 @@ export class ControlSession {
   }
 
   /** Numbers of figures, and a point in the world for each; null for none. */
-  private pointed(
-    points: readonly number[] | readonly (readonly number[])[] | null,
-    numbers?: readonly number[],
-  ): [number, Vector | null][] {
+  private pointed(points: Rows | null, numbers?: readonly number[]): [number, Vector | null][] {
     const figures = this.chosen(numbers);
     const rows = points && this.rows("points", points, ["x", "y", "z"], figures.length);
     return figures.map((at, i) => [at, rows && ([...rows[i]!] as Vector)]);
@@ -328,18 +313,11 @@ export class ControlSession {
   }
 
   private happened(figure: Steered, pose: Played): FigureEvent[] {
-    const {
-      gaits,
-      steerer: { matcher },
-    } = this.model;
-    const {
-      happenings: before,
-      command: { gait },
-      playback: { row },
-      going,
-      acting: { playing },
-    } = figure;
-    const shows = matcher.tables.shows[row * gaits.length + gait]! > 0;
+    const { gaits, steerer } = this.model;
+    const { happenings: before, going } = figure;
+    const { gait } = figure.command;
+    const { playing } = figure.acting;
+    const shows = steerer.matcher.shows(figure.playback.row, gait);
     const act = playing && { name: playing.act.name, age: playing.age };
     const now = after(before, pose.contacts, gait, shows, going?.arrived ?? false, act);
     figure.happenings = now;
@@ -387,7 +365,7 @@ export class ControlSession {
   }
 
   /** Push the figures by a velocity along x and z, m/s, from which they recover. */
-  push(velocity: readonly number[] | readonly (readonly number[])[]): void {
+  push(velocity: Rows): void {
     const rows = this.rows("a velocity", velocity, ["x", "z"]);
     this.state.figures.forEach(({ playback }, at) => {
       const [x, z, facing] = playback.spring;
@@ -397,7 +375,7 @@ export class ControlSession {
   }
 
   /** Place the figures elsewhere: x and z in metres, facing in degrees. */
-  put(places: readonly number[] | readonly (readonly number[])[]): void {
+  put(places: Rows): void {
     this.rows("places", places, ["x", "z", "facing"]).forEach(([x, z, degrees], at) => {
       const figure = this.state.figures[at]!;
       const { playback, command } = figure;
@@ -421,10 +399,7 @@ export class ControlSession {
    * those that there are. Each moves as in a session of its own that starts now. gait, phases: as those of `start`. ControlError
    * for what is out of range; nothing has changed then.
    */
-  add(
-    places: readonly number[] | readonly (readonly number[])[],
-    { gait, phases }: Pick<StartSettings, "gait" | "phases"> = {},
-  ): number[] {
+  add(places: Rows, { gait, phases }: Pick<StartSettings, "gait" | "phases"> = {}): number[] {
     if (!Array.isArray(places) || !places.length)
       throw new ControlError("places needs x, z, facing, for each of the characters that are added");
     const { state, characters, model, holdFeet } = this;
@@ -504,19 +479,14 @@ export class ControlSession {
   /** A number for each figure; none if none is given. */
   private each(name: string, numbers?: ForAll<number>, count = this.characters): number[] | undefined {
     if (numbers === undefined) return undefined;
-    const values = (Array.isArray(numbers) ? numbers : [numbers]) as number[];
-    return this.rows(
-      name,
-      values.map((value) => [value]),
-      [name],
-      count,
-    ).map(([value]) => value!);
+    const values = [numbers].flat().map((value) => [value]);
+    return this.rows(name, values, [name], count).map(([value]) => value!);
   }
 
   /** A row of numbers for each figure, of one for all or one for each. */
   private rows(
     what: string,
-    values: readonly number[] | readonly (readonly number[])[],
+    values: Rows,
     columns: string[],
     count = this.characters,
   ): readonly (readonly number[])[] {

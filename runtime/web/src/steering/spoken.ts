@@ -1,21 +1,11 @@
 /* What a typed sentence asks a figure for: motet/steering/spoken.py, which says what each part is. */
 import { SPOKEN } from "../generated.js";
+import { clamp } from "../motion/springs.js";
 import { stem } from "../text/clauses.js";
 import { corrected } from "../text/spelling.js";
 import type { Entry } from "./repertoire.js";
 
-type List =
-  "idle" | "everyone" | "plural" | "stop" | "never" | "slow" | "fast" | "loud" | "then" | "both" | "times";
-
-/** The words of the file of the repertoire. */
-export type WordTable = Record<List | "still", string[]> & {
-  counts: Record<string, number>;
-  sides: Record<string, string[]>;
-  orders: Record<string, string[]>;
-  phrases: Record<string, string[]>;
-};
-
-const LISTS: readonly List[] = [
+const LISTS = [
   "idle",
   "everyone",
   "plural",
@@ -27,7 +17,15 @@ const LISTS: readonly List[] = [
   "then",
   "both",
   "times",
-];
+] as const;
+
+/** The words of the file of the repertoire. */
+export type WordTable = Record<(typeof LISTS)[number] | "still", string[]> & {
+  counts: Record<string, number>;
+  sides: Record<string, string[]>;
+  orders: Record<string, string[]>;
+  phrases: Record<string, string[]>;
+};
 
 /** A part of what is said. Angles are degrees to the left. */
 export interface Step {
@@ -286,7 +284,7 @@ export class Words {
       const name = this.named(tried, side, isSided);
       if (name === null) continue;
       const tempo = tried === words ? 1 : this.tempo(words);
-      return stepOf("act", { name, side, tempo, count: Math.max(1, Math.min(times, SPOKEN.MOST_TIMES)) });
+      return stepOf("act", { name, side, tempo, count: clamp(times, 1, SPOKEN.MOST_TIMES) });
     }
     return null;
   }
@@ -396,14 +394,10 @@ export class Words {
     const stems = new Set(words.map(stem));
     const pairs = pairsOf(words.join(" "));
     const scores = [...this.acts.values()].map(({ name, phrases }, at) => {
-      const best = phrases.reduce((most, phrase) => {
-        const others = meant(phrase);
-        return Math.max(
-          most,
-          2 * share(stems, new Set(others.map(stem))) + share(pairs, pairsOf(others.join(" "))),
-        );
-      }, 0);
-      return { name, at, best };
+      const likeness = phrases.map(meant).map((others) => {
+        return 2 * share(stems, new Set(others.map(stem))) + share(pairs, pairsOf(others.join(" ")));
+      });
+      return { name, at, best: Math.max(0, ...likeness) };
     });
     scores.sort((a, b) => b.best - a.best || a.at - b.at);
     return scores.slice(0, SPOKEN.OFFERED).map(({ name }) => name);
@@ -422,7 +416,7 @@ function wayOf(kinds: readonly string[], side: string, degrees: number): [way: n
 const MARKS = [",", ".", ";", "!", "?"];
 
 /** The words, numbers and stops of a text, in lower case, apostrophes left out. */
-export function wordsOf(text: string): string[] {
+function wordsOf(text: string): string[] {
   const plain = text.toLowerCase().replace(/['’`]/gu, "").replaceAll("after that", "then");
   return plain.match(/\p{L}+|[0-9]+|[,.;!?]/gu) ?? [];
 }

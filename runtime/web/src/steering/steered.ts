@@ -1,44 +1,19 @@
 /* One steered figure: what it plays, what it is told, how its feet are held. Sessions and the page of `motet live` have some. */
-import type {
-  arrivalSettings,
-  avoidanceSettings,
-  footLockSettings,
-  idleSettings,
-  lookSettings,
-  reachSettings,
-  stepSettings,
-  terrainSettings,
-  turnSettings,
-} from "../generated.js";
-import { type Acting, type ActingModel, begin, laid, noAct } from "./actionLayer.js";
+import { type Acting, begin, laid, noAct } from "./actionLayer.js";
 import type { Going } from "./paths.js";
 import type { Happenings } from "./events.js";
 import { held, type Lock, newLock } from "./footLock.js";
-import type { Command, Gaits } from "./gaits.js";
+import type { Command } from "./gaits.js";
 import { ahead, type Look, looked } from "./lookLayer.js";
 import type { Playback, Target } from "./matching.js";
+import type { ControlModel } from "./model.js";
 import type { Pose as Ground } from "../motion/planar.js";
 import { idle, type Reach, reached } from "./reachLayer.js";
 import { breathed, kept, notYet, type Standing } from "./idle.js";
-import type { Settings } from "../settings.js";
 import { newPose, type Played, type Steerer } from "./step.js";
 import { planOf } from "./stepping.js";
 import { grounded, type GroundHeight, newTerrain, slowed, type Terrain } from "./terrain.js";
 import { type Joints, limited, newJoints } from "./turnLimit.js";
-
-/** What figures are steered with. */
-export interface SteeringModel extends ActingModel {
-  readonly abilities: Gaits;
-  readonly lock: Settings<typeof footLockSettings>;
-  readonly steps: Settings<typeof stepSettings>;
-  readonly idle: Settings<typeof idleSettings>;
-  readonly look: Settings<typeof lookSettings>;
-  readonly reach: Settings<typeof reachSettings>;
-  readonly terrain: Settings<typeof terrainSettings>;
-  readonly turns: Settings<typeof turnSettings>;
-  readonly arrival: Settings<typeof arrivalSettings>;
-  readonly avoidance: Settings<typeof avoidanceSettings>;
-}
 
 export interface Steered {
   playback: Playback;
@@ -104,7 +79,7 @@ export function hasten(playback: Playback): void {
  * The next pose, 1 / fps seconds later, which is the figure's. ground: where it is not flat. raw: a target in place of the figure's own, gone for as it is.
  */
 export function tick(
-  model: SteeringModel,
+  model: ControlModel,
   figure: Steered,
   holdFeet: boolean,
   ground: GroundHeight | null = null,

@@ -1,9 +1,22 @@
 /* The step of a steered figure: docs/reference/bundle.md, the loop `matching`. Metres, seconds and radians. */
 import { MATCHING } from "../generated.js";
-import { BONES } from "../figures/humanoid/bones.js";
+import { BONES, OFFSETS } from "../figures/humanoid/bones.js";
 import { type Matcher, type Playback, type Target } from "./matching.js";
 import { lengthOf, moved, type Pose as Ground } from "../motion/planar.js";
-import { normalised, type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
+import {
+  about,
+  inverse,
+  minus,
+  normalised,
+  plus,
+  product,
+  type Quaternion,
+  rotated,
+  setTurn,
+  turnAt,
+  type Vector,
+  Y,
+} from "../motion/rotations.js";
 import { clamp, damp, damped, dampingOf, wrapped } from "../motion/springs.js";
 import { strided, warped } from "./warping.js";
 
@@ -212,6 +225,21 @@ function byBone(basis: Float32Array, codes: number, values: number): Float64Arra
 /** Put a pose where its figure is. */
 export function place(pose: Played, { root }: Playback): void {
   for (let i = 0; i < 3; i++) pose.ground[i] = root[i]!;
+}
+
+/** A point of the world in the frame of the last of some bones, of which each hangs on the one before and the first on the hips. */
+export function seenBy(
+  bones: readonly number[],
+  { ground: [x, z, facing], height, rotations }: Played,
+  point: Vector,
+): Vector {
+  let place: Vector = [x, height, z];
+  let above = product(about(Y, facing), turnAt(rotations, 0));
+  for (const bone of bones) {
+    place = plus(place, rotated(above, OFFSETS[bone]!));
+    above = product(above, turnAt(rotations, bone));
+  }
+  return rotated(inverse(above), minus(point, place));
 }
 
 /** The springs of velocity and facing, a tick later. */

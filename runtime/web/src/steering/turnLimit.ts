@@ -1,7 +1,7 @@
 /* Joints that turn no faster than people's, as motet/steering/turn_limit.py says. */
 import { TURN_LIMIT, turnSettings } from "../generated.js";
 import { BONES } from "../figures/humanoid/bones.js";
-import { type Quaternion, setTurn, turnAt } from "../motion/rotations.js";
+import { type Quaternion, RADIANS, setTurn, turnAt } from "../motion/rotations.js";
 import type { Settings } from "../settings.js";
 import type { Played } from "./step.js";
 
@@ -34,7 +34,7 @@ export function limited(
   const before = joints.rotations;
   for (let i = 0; i < LIMITED.length && !joints.isNew; i++) {
     const [kind, bones] = LIMITED[i]!;
-    const half = (settings[kind] * (Math.PI / 180) * seconds) / 2;
+    const half = (settings[kind] * RADIANS * seconds) / 2;
     const least = Math.cos(half);
     for (let j = 0; j < bones.length; j++) {
       const bone = bones[j]!;

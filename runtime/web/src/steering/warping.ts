@@ -1,7 +1,7 @@
 /* Legs go another way, hips turned with them and the spine back, and with other strides: docs/reference/bundle.md, the loop `matching`. */
 import { WARPING } from "../generated.js";
 import { BONES, HUMANOID, SIDES, SOLES, SPINE } from "../figures/humanoid/bones.js";
-import { legOf, OFFSETS, reach } from "../figures/legs.js";
+import { LEG_OFFSETS, legOf, reach } from "../figures/legs.js";
 import { about, inverse, plus, product, rotated, setTurn, turnAt, Y } from "../motion/rotations.js";
 
 /** Which bones turn back, each by the same share. */
@@ -36,7 +36,7 @@ export function strided(rotations: Float64Array, stride: number): void {
     const leg = legOf(rotations, side, hips, [0, 0, 0]);
     const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
     const led: [number, number, number] = [
-      (x - OFFSETS[side]![0]![0]) * (stride - 1),
+      (x - LEG_OFFSETS[side]![0]![0]) * (stride - 1),
       0,
       (z - UNDER) * (stride - 1),
     ];

@@ -11,10 +11,10 @@ const UNK = 3;
 
 /** From a sentence to the words that a model knows, and back: docs/reference/bundle.md, "Text". */
 export class Vocabulary {
-  static readonly SOS = SOS!;
-  static readonly EOS = EOS!;
+  static readonly SOS = SOS;
+  static readonly EOS = EOS;
   /** Words that are never chosen. */
-  static readonly BANNED = [PAD!, SOS!, UNK!];
+  static readonly BANNED = [PAD, SOS, UNK];
   private readonly ids: Map<string, number>;
   private readonly stems: Map<string, string>;
   private readonly misspelt: RegExp;
@@ -29,12 +29,8 @@ export class Vocabulary {
       throw new BundleError("its vocabulary is damaged");
     const every = [...words, ...Object.keys(common)];
     this.ids = new Map(every.map((word, id) => [word, id]));
-    this.stems = new Map(
-      every
-        .slice(UNK! + 1)
-        .reverse()
-        .map((word) => [stem(word), word]),
-    );
+    const latestFirst = every.slice(UNK + 1).reverse();
+    this.stems = new Map(latestFirst.map((word) => [stem(word), word]));
     const wrong = Object.keys(rules.spelling).sort((a, b) => b.length - a.length);
     this.misspelt = new RegExp(`(?<![\\p{L}\\p{N}_])(${wrong.join("|") || "(?!)"})(?![\\p{L}\\p{N}_])`, "gu");
   }
@@ -56,7 +52,7 @@ export class Vocabulary {
     const unknown = words.filter((word) => !this.meant(word));
     if (unknown.length === words.length)
       throw new TextError(`the model knows no word of ${JSON.stringify(sentence)}`);
-    return { ids: words.map((word) => this.ids.get(this.meant(word)) ?? UNK!), unknown };
+    return { ids: words.map((word) => this.ids.get(this.meant(word)) ?? UNK), unknown };
   }
 
   /** The known word that a word is, or the first of its stem, or of which it is a misspelling; "" where there is none. */
@@ -64,7 +60,7 @@ export class Vocabulary {
     if (this.ids.has(word) || [...word].length < 4) return this.ids.has(word) ? word : "";
     const common = Object.keys(this.common); // without them "torches" were read as "touches"
     return (
-      this.stems.get(stem(word)) ?? (common.length ? corrected(word, this.words.slice(UNK! + 1), common) : "")
+      this.stems.get(stem(word)) ?? (common.length ? corrected(word, this.words.slice(UNK + 1), common) : "")
     );
   }
 
@@ -87,7 +83,7 @@ export class Vocabulary {
         .filter(([, value]) => value <= spelled)
         .map(([word, value]) => [`${value}`, word]),
     );
-    return Array.from(ids, (id) => (id > UNK! ? this.words[id]! : ""))
+    return Array.from(ids, (id) => (id > UNK ? this.words[id]! : ""))
       .join(" ")
       .replace(/(?<=\d) (?=\d)/g, "")
       .replaceAll(new RegExp(`(?<=\\d) ${point} (?=\\d)`, "g"), ".")

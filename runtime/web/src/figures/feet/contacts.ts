@@ -8,31 +8,22 @@ export type Plane = [x: number, z: number][];
 
 /** Contact of each point from each frame to the next, 0 to 1: low and slow. */
 export function contacts(points: Vector[][], fps: number): number[][] {
-  const calm = smoothed(
-    points.map((frame) => frame.flatMap(([x, , z]) => [x, z])),
-    CONTACTS.SOLES.calm * fps,
-  );
+  const rows = points.map((frame) => frame.flatMap(([x, , z]) => [x, z]));
+  const calm = smoothed(rows, CONTACTS.SOLES.calm * fps);
   return points.slice(1).map((frame, at) =>
     frame.map((point, k) => {
-      const speed =
-        Math.hypot(
-          calm[at + 1]![2 * k]! - calm[at]![2 * k]!,
-          calm[at + 1]![2 * k + 1]! - calm[at]![2 * k + 1]!,
-        ) * fps;
-      return (
-        (1 - rise((point[1] + points[at]![k]![1]) / 2, ...CONTACTS.SOLES.heights)) *
-        (1 - rise(speed, ...CONTACTS.SOLES.speeds))
-      );
+      const [x, z] = [2 * k, 2 * k + 1].map((column) => calm[at + 1]![column]! - calm[at]![column]!);
+      const speed = Math.hypot(x!, z!) * fps;
+      const height = (point[1] + points[at]![k]![1]) / 2;
+      return (1 - rise(height, ...CONTACTS.SOLES.heights)) * (1 - rise(speed, ...CONTACTS.SOLES.speeds));
     }),
   );
 }
 
 /** Velocities over the ground, in m/s from each frame to the next, that keep points (T, K) from sliding; heights: of them over the ground. */
 export function velocityByFeet(points: Plane[], heights: number[][], fps: number): Plane {
-  const calm = smoothed(
-    points.map((row) => row.flat()),
-    treadmillSettings.calm * fps,
-  );
+  const rows = points.map((row) => row.flat());
+  const calm = smoothed(rows, treadmillSettings.calm * fps);
   const steps = calm.slice(1).map((row, at) => row.map((value, i) => (calm[at]![i]! - value) * fps));
   const votes = steps.map((row) =>
     heights[0]!.map((_, k): [number, number] => [row[2 * k]!, row[2 * k + 1]!]),
@@ -88,10 +79,8 @@ export function heightsByFeet(standing: number[], fps: number): number[][] {
   // a jump up forward in time is a fall backward: only frames on which both agree are flight
   const up = flown(standing, fps);
   const down = flown([...standing].reverse(), fps).reverse();
-  return smoothed(
-    up.map((value, at) => [Math.min(value, down[at]!)]),
-    treadmillSettings.calm * fps,
-  );
+  const both = up.map((value, at) => [Math.min(value, down[at]!)]);
+  return smoothed(both, treadmillSettings.calm * fps);
 }
 
 function flown(standing: number[], fps: number): number[] {

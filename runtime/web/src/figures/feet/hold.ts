@@ -4,7 +4,7 @@ import { contacts } from "./contacts.js";
 import { groundUnder, HUMANOID, isHumanoid, LEG, SIDES, solePoints } from "../humanoid/bones.js";
 import { TwoBones } from "../twoBones.js";
 import { type Motion, motionFrom, worldOf } from "../../motion/motion.js";
-import { median, rise, rounded, smoothed, windows } from "../../motion/numbers.js";
+import { median, rise, rounded, smoothed, sumOf, windows } from "../../motion/numbers.js";
 import { MotionError } from "../../errors.js";
 import { product, rotated, type Vector, X } from "../../motion/rotations.js";
 
@@ -58,7 +58,7 @@ function targets(legs: TwoBones[], points: Vector[][], fps: number): Vector[] {
     { length: 2 * reach + 1 },
     (_, at) => 0.5 - 0.5 * Math.cos((2 * Math.PI * (at + 1)) / (2 * reach + 2)),
   );
-  const total = bell.reduce((sum, weight) => sum + weight);
+  const total = sumOf(bell);
   return windows(deepest, reach).map((window, at) => {
     const lift = window.reduce((sum, value, i) => sum + value * bell[i]!, 0) / total;
     return [eased[at]![0], eased[at]![1] + Math.min(lift, holdSettings.farthest), eased[at]![2]];
@@ -70,10 +70,7 @@ function shiftsOf(points: Vector[][], fps: number): [number, number][] {
   const touch = contacts(points, fps);
   const strongest = touch.map((row) => Math.max(...row));
   const undone = touch.map((row, at) => {
-    const total = Math.max(
-      row.reduce((sum, value) => sum + value),
-      1e-9,
-    );
+    const total = Math.max(sumOf(row), 1e-9);
     const step = (axis: 0 | 2) =>
       row.reduce(
         (sum, value, k) => sum + (value / total) * (points[at + 1]![k]![axis] - points[at]![k]![axis]),

@@ -3,7 +3,7 @@ import { CONTACTS, treadmillSettings } from "../../generated.js";
 import { MotionError } from "../../errors.js";
 import { groundUnder, HUMANOID, isHumanoid, LEG_LENGTH, SIDES, solePoints } from "../humanoid/bones.js";
 import { checked, type Motion, resampled, worldOf } from "../../motion/motion.js";
-import { rounded, spread } from "../../motion/numbers.js";
+import { extents, rounded, sumOf } from "../../motion/numbers.js";
 import { toHumanoid } from "../humanoid/retarget.js";
 import { heightsByFeet, type Plane, velocityByFeet } from "./contacts.js";
 import { inverse, mean, minus, plus, rotated, times, type Vector } from "../../motion/rotations.js";
@@ -63,9 +63,7 @@ function seen(motion: Motion): { motion: Motion; toFile: (path: Vector) => Vecto
 /** Whether, before the figure is measured, the first joint that moves goes too far: most recordings end here. */
 function goes({ skeleton, translations }: Motion): boolean {
   for (const joint of skeleton.joints.keys()) {
-    const [x, y, z] = [0, 1, 2].map((axis) =>
-      spread(translations.map((moves) => moves[joint]![axis]!)),
-    ) as Vector;
+    const [x, y, z] = extents(translations.map((moves) => moves[joint]!));
     if (x || y || z)
       return Math.hypot(x, z) > 1.5 * treadmillSettings.room * (skeleton.height / CONTACTS.ADULT_HEIGHT);
   }
@@ -76,8 +74,8 @@ function goes({ skeleton, translations }: Motion): boolean {
 function strides(motion: Motion): boolean {
   const { fps } = motion;
   const root = motion.translations.map((moves) => moves[0]!);
-  if (Math.hypot(...[0, 2].map((axis) => spread(root.map((place) => place[axis]!)))) > treadmillSettings.room)
-    return false;
+  const [x, , z] = extents(root);
+  if (Math.hypot(x, z) > treadmillSettings.room) return false;
   const soles = solePoints(worldOf(motion));
 
   // the feet are fast, and the root goes less far than they do
@@ -122,10 +120,8 @@ function aheadOf(soles: Vector[][], first: number, root: Vector[], velocity: Pla
 function pathOf(motion: Motion): Plane {
   const { fps } = motion;
   const points = worldOf(motion).places.map((pose) => FEET.map((joint) => minus(pose[joint]!, pose[0]!)));
-  const heights = heightsByFeet(
-    points.map((row) => -Math.min(...row.map((point) => point[1]))),
-    fps,
-  );
+  const standing = points.map((row) => -Math.min(...row.map((point) => point[1])));
+  const heights = heightsByFeet(standing, fps);
   const velocity = velocityByFeet(
     points.map(flat),
     points.map((row, at) => row.map((point) => point[1] + heights[at]![0]!)),
@@ -151,7 +147,7 @@ function averaged(velocity: Plane, frames: number): Plane {
 }
 
 function average(values: number[]): number {
-  return values.reduce((sum, value) => sum + value, 0) / values.length;
+  return sumOf(values) / values.length;
 }
 
 /** The covariance of two rows. */

@@ -6,6 +6,7 @@ import type { Body } from "./body.js";
 import { ARM, directionOf, LEG, limbOf, SIDES } from "./bones.js";
 import { carrierOf, LIMBS } from "./jointMap.js";
 import {
+  AXES,
   cross,
   dot,
   inverse,
@@ -15,6 +16,7 @@ import {
   product,
   type Quaternion,
   quaternionOf,
+  RADIANS,
   rotated,
   size,
   STILL,
@@ -29,8 +31,6 @@ import {
 } from "../../motion/rotations.js";
 import type { World } from "../../motion/motion.js";
 
-export const RADIANS = Math.PI / 180;
-
 /** The rotation whose y axis is up, with x as near to left as it can be; or, not upright, x left and y as near to up. */
 export function frame(left: Vector, up: Vector, upright = true): Quaternion {
   const [first, other] = upright ? [unit(up), left] : [unit(left), up];
@@ -39,9 +39,9 @@ export function frame(left: Vector, up: Vector, upright = true): Quaternion {
   return quaternionOf([x, y, cross(x, y)]);
 }
 
-const AXES: Vector[] = [X, Y, Z].flatMap((axis) => [axis, times(axis, -1)]);
-const AXES_TURNS = AXES.flatMap((x) =>
-  AXES.filter((y) => !dot(x, y)).map((y) => quaternionOf([x, y, cross(x, y)])),
+const WAYS = AXES.flatMap((axis) => [axis, times(axis, -1)]);
+const AXES_TURNS = WAYS.flatMap((x) =>
+  WAYS.filter((y) => !dot(x, y)).map((y) => quaternionOf([x, y, cross(x, y)])),
 );
 
 /** The nearest rotation that turns axes into axes where it is within some degrees, else the rotation itself. */
@@ -150,19 +150,17 @@ export function axesAgree(body: Body, { turns, places }: World): boolean {
   const { map } = body;
   const seen = Object.keys(body.aims)
     .filter((bone) => body.aimed(bone))
-    .map((bone) => {
-      return [map.joints[bone]!, directionOf(bone), places.map((pose) => body.along(pose, bone))] as const;
-    });
+    .map(
+      (bone) => [map.joints[bone]!, directionOf(bone), places.map((pose) => body.along(pose, bone))] as const,
+    );
   const left = (part: string) => places.map((pose) => body.toLeft(pose, part));
   seen.push([map.joints.hips!, X, left("UpperLeg")], [map.spine.at(-1)!, X, left("UpperArm")]);
   const known = seen.filter(([joint]) => map.axes[joint]);
   return (
     known.length > 0 &&
     known.every(([joint, direction, along]) => {
-      const pointing = meanDirection(
-        turns.map((turned) => turned[joint]!),
-        along,
-      );
+      const jointTurns = turns.map((turned) => turned[joint]!);
+      const pointing = meanDirection(jointTurns, along);
       return dot(pointing, rotated(knownAxes(map.axes[joint]!), direction)) > 0.7;
     })
   );
@@ -179,6 +177,6 @@ export function meanDirection(turns: Quaternion[], along: Vector[]): Vector {
 export function knownAxes(axes: string): Quaternion {
   const columns = axes
     .split(" ")
-    .map((word) => times([X, Y, Z]["xyz".indexOf(word.at(-1)!)]!, word[0] === "-" ? -1 : 1));
+    .map((word) => times(AXES["xyz".indexOf(word.at(-1)!)]!, word[0] === "-" ? -1 : 1));
   return quaternionOf(columns as [Vector, Vector, Vector]);
 }

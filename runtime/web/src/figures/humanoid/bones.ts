@@ -1,9 +1,9 @@
 /* The humanoid: the figure of the bundles, with the bones of VRM 1.0 (docs/humanoid.md). */
 import { SKELETON } from "../../generated.js";
 import tables from "../../../../motet/figures/humanoid/humanoid.json";
-import type { World } from "../../motion/motion.js";
+import type { Motion, World } from "../../motion/motion.js";
 import { quantile } from "../../motion/numbers.js";
-import { minus, plus, rotated, size, unit, type Vector } from "../../motion/rotations.js";
+import { minus, plus, type Quaternion, rotated, size, unit, type Vector } from "../../motion/rotations.js";
 import { type Joint, Skeleton } from "../../motion/skeleton.js";
 
 type Places = Record<string, [parent: string, offset: Vector, order: string]>;
@@ -51,6 +51,14 @@ export const FINGERED = new Skeleton(added([...HUMANOID.joints], fingers), 1);
 
 export const BONES = HUMANOID.names.filter((name) => !name.endsWith(SKELETON.END_SUFFIX));
 
+/** A bone's joint. */
+export function jointOf(bone: string): Joint {
+  return HUMANOID.joints[HUMANOID.index(bone)]!;
+}
+
+/** Where each bone begins in its parent's frame. */
+export const OFFSETS = BONES.map((bone) => jointOf(bone).offset);
+
 /** Where a bone of the humanoid points at rest. */
 export function directionOf(bone: string): Vector {
   return unit(HUMANOID.joints[HUMANOID.children[HUMANOID.index(bone)]![0]!]!.offset);
@@ -58,7 +66,7 @@ export function directionOf(bone: string): Vector {
 
 /** Metres of the humanoid's thigh and shin, the measure by which figures are scaled. */
 export const LEG_LENGTH = ["LowerLeg", "Foot"].reduce(
-  (sum, part) => sum + size(HUMANOID.joints[HUMANOID.index(`left${part}`)]!.offset),
+  (sum, part) => sum + size(jointOf(`left${part}`).offset),
   0,
 );
 
@@ -76,10 +84,14 @@ export function solePoints({ turns, places }: World): Vector[][] {
 
 /** The height of the ground: the lowest point of the soles is deeper in 5 % of the frames. */
 export function groundUnder(points: Vector[][]): number {
-  return quantile(
-    points.map((frame) => Math.min(...frame.map((point) => point[1]))),
-    0.05,
-  );
+  const lowest = points.map((frame) => Math.min(...frame.map((point) => point[1])));
+  return quantile(lowest, 0.05);
+}
+
+/** A motion of it, of local rotations and where the hips are in each frame. */
+export function humanoidMotion(rotations: Quaternion[][], hips: Vector[], fps: number): Motion {
+  const translations = hips.map((place) => HUMANOID.joints.map(({ offset }, at) => (at ? offset : place)));
+  return { skeleton: HUMANOID, fps, rotations, translations, travels: true };
 }
 
 /** The hips' joints of both legs. */

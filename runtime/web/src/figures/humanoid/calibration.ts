@@ -81,10 +81,8 @@ class Calibration {
 
   /** Hips and back: up towards the arms; the joint that carries the arms and those above: up towards the head. */
   trunk(): void {
-    const {
-      body,
-      world: { places },
-    } = this;
+    const { body } = this;
+    const { places } = this.world;
     const { joints, spine, neck } = body.map;
     const above = joints.head === undefined ? neck : [...neck, joints.head];
     const back = [joints.hips!, ...spine, ...above];
@@ -158,14 +156,8 @@ class Calibration {
     const forearm = this.turned(joints[lowerArm!]!);
     if (!body.aimed(hand!)) return this.settle(joints[hand!]!, forearm);
     const along = this.directions(hand!);
-    this.settleLimb(
-      hand!,
-      along,
-      level(
-        along,
-        forearm.map((turn) => rotated(turn, Y)),
-      ),
-    );
+    const ups = forearm.map((turn) => rotated(turn, Y));
+    this.settleLimb(hand!, along, level(along, ups));
   }
 }
 

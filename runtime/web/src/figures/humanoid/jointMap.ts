@@ -3,6 +3,7 @@ import { SKELETON } from "../../generated.js";
 import { MotionError } from "../../errors.js";
 import { ARM, LEG, SIDES } from "./bones.js";
 import type { Vector } from "../../motion/rotations.js";
+import { counted } from "../../motion/numbers.js";
 import type { Skeleton } from "../../motion/skeleton.js";
 import { type Table, TABLES } from "./tables.js";
 
@@ -235,12 +236,8 @@ function nearlyAll(count: number, names: string[]): boolean {
 
 /** The value that is there most often, and how often. */
 function commonest(values: string[]): [value: string, count: number] {
-  const counts = new Map<string, number>();
-  for (const value of values) counts.set(value, (counts.get(value) ?? 0) + 1);
-  return [...counts].reduce((best, other) => (other[1] > best[1] ? other : best), ["", 0] as [
-    string,
-    number,
-  ]);
+  const none: [string, number] = ["", 0];
+  return [...counted(values)].reduce((best, other) => (other[1] > best[1] ? other : best), none);
 }
 
 /** Names without the numbers that programs add at their ends. */

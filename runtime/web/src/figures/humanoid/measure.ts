@@ -1,14 +1,16 @@
 /* How a figure stands against the humanoid, measured once: docs/reference/retargeting.md. */
 import { MEASURE } from "../../generated.js";
-import { alignmentsOfPose, axesAgree, bodyFrame, RADIANS, restsInMotion } from "./alignment.js";
+import { alignmentsOfPose, axesAgree, bodyFrame, restsInMotion } from "./alignment.js";
 import { Body } from "./body.js";
 import { calibrated } from "./calibration.js";
 import { MotionError } from "../../errors.js";
 import { directionOf, LEG, LEG_LENGTH, partOf, SIDES, SOLES } from "./bones.js";
 import { carrierOf, type JointMap, LIMBS, MEASURED } from "./jointMap.js";
 import type { World } from "../../motion/motion.js";
-import { median, quantile, spread } from "../../motion/numbers.js";
+import { clamp } from "../../motion/springs.js";
+import { extents, median, quantile, spread } from "../../motion/numbers.js";
 import {
+  AXES,
   cross,
   dot,
   inverse,
@@ -16,6 +18,7 @@ import {
   plus,
   product,
   type Quaternion,
+  RADIANS,
   rotated,
   size,
   STILL,
@@ -25,7 +28,6 @@ import {
   type Vector,
   X,
   Y,
-  Z,
 } from "../../motion/rotations.js";
 import type { Skeleton } from "../../motion/skeleton.js";
 
@@ -54,7 +56,7 @@ export function fit(skeleton: Skeleton, map: JointMap, world: World): Fitted {
   const cosines = world.turns.map((turned, at) =>
     dot(rotated(turned[hips]!, axis), unit(measured.body.toLeft(world.places[at]!, "UpperLeg"))),
   );
-  const apart = Math.acos(Math.max(-1, Math.min(1, median(cosines)))) / RADIANS;
+  const apart = Math.acos(clamp(median(cosines), -1, 1)) / RADIANS;
   if (apart <= 30) return measured;
   const note = `the legs' joints lie ${Math.round(apart)} degrees off the turn of ${skeleton.names[hips]}: the pelvis is turned as they lie`;
   return { ...measured, pelvis: false, notes: [...measured.notes, note] };
@@ -94,12 +96,8 @@ function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
   const known =
     map.rest !== undefined && agreement(body, skeleton.rest, stands, points) > Math.cos(4 * RADIANS);
   const plain = known || !map.rest ? body : new Body(skeleton, { ...map, rest: undefined });
-  const aligned = alignmentsOfPose(
-    plain,
-    skeleton.joints.map(() => STILL),
-    skeleton.rest,
-    stands,
-  );
+  const still = skeleton.joints.map(() => STILL);
+  const aligned = alignmentsOfPose(plain, still, skeleton.rest, stands);
   const notes = known ? ["the rest pose is one that the convention knows, which was made up for"] : [];
   const up = rotated(stands, Y);
   return {
@@ -180,13 +178,13 @@ function heights(body: Body, leg: number, rise?: number[]): Record<string, numbe
 /** Points of the soles in one frame, of the rotations of the humanoid's feet and toes and the figure's positions. */
 export function solesOf(
   { body, heights: rises, leg }: Fitted,
-  bones: Record<string, Quaternion>,
+  turnOf: (bone: string) => Quaternion,
   pose: Vector[],
 ): Vector[] {
   const scale = leg / LEG_LENGTH;
   return Object.entries(rises).flatMap(([bone, height]) =>
     SOLES[partOf(bone)]!.map(([x, , z]) =>
-      plus(pose[body.map.joints[bone]!]!, rotated(bones[bone]!, [x * scale, -height, z * scale])),
+      plus(pose[body.map.joints[bone]!]!, rotated(turnOf(bone), [x * scale, -height, z * scale])),
     ),
   );
 }
@@ -226,11 +224,8 @@ export function unitOf({ metresPerUnit }: Skeleton, leg: number): { metres: numb
 /** Refuse a figure on four legs. */
 function checkStance(body: Body, places: Vector[][]): void {
   const trunk = places.map((pose) => body.trunkUp(pose));
-  const beside =
-    quantile(
-      trunk.map((up, at) => dot(up, body.legsUp(places[at]!))),
-      0.95,
-    ) < 0.3;
+  const above = trunk.map((up, at) => dot(up, body.legsUp(places[at]!)));
+  const beside = quantile(above, 0.95) < 0.3;
   const sits = median(trunk.map((up) => up[1])) > 0.5;
   if (beside && !sits)
     throw new MotionError(
@@ -298,7 +293,7 @@ export function upright(
 function upOfFrames(body: Body, trunk: Vector[], places: Vector[][]): Vector | null {
   const mean = [0, 1, 2].map((axis) => median(trunk.map((up) => up[axis]!)));
   const axis = mean.map(Math.abs).indexOf(Math.max(...mean.map(Math.abs)));
-  const up = times([X, Y, Z][axis]!, Math.sign(mean[axis]!));
+  const up = times(AXES[axis]!, Math.sign(mean[axis]!));
   const share = (direction: Vector) =>
     trunk.filter((along) => dot(along, direction) > MEASURE.ALONG).length / trunk.length;
   if (axis === 1 || share(up) < 0.5 || share(Y) > 0.1) return null;
@@ -310,6 +305,6 @@ function walksAcross(body: Body, leg: number, up: Vector, places: Vector[][]): b
   const path = places.map((pose) => body.middle(pose, "UpperLeg"));
   const rise = spread(path.map((place) => dot(place, up)));
   const flat = path.map((place) => minus(place, times(up, dot(place, up))));
-  const extent = Math.hypot(...[0, 1, 2].map((axis) => spread(flat.map((place) => place[axis]!))));
+  const extent = Math.hypot(...extents(flat));
   return extent > Math.max(leg, 2 * rise);
 }

@@ -8,6 +8,7 @@ import {
   HIPS,
   HUMANOID,
   isHumanoid,
+  jointOf,
   LEG_LENGTH,
   NECK,
   SIDES,
@@ -131,11 +132,10 @@ function humanoidTurns(turns: Quaternion[], pose: Vector[], { body, aligned, pel
   const alignedTurn = (joint: number) => product(turns[joint]!, aligned[joint]!);
   const rotations: Record<string, Quaternion> = {};
   for (const [bone, joint] of Object.entries(joints)) rotations[bone] = alignedTurn(joint);
-  if (!pelvis)
-    rotations.hips = product(
-      swing(rotated(rotations.hips!, X), body.toLeft(pose, "UpperLeg")),
-      rotations.hips!,
-    );
+  if (!pelvis) {
+    const across = rotated(rotations.hips!, X);
+    rotations.hips = product(swing(across, body.toLeft(pose, "UpperLeg")), rotations.hips!);
+  }
   // back and neck share out the turns of as many joints as the figure has there
   const back = shared([rotations.hips!, ...spine.map(alignedTurn)], SPINE.length);
   SPINE.forEach((bone, at) => (rotations[bone] = back[at]!));
@@ -146,7 +146,7 @@ function humanoidTurns(turns: Quaternion[], pose: Vector[], { body, aligned, pel
   }
   // bones that the figure lacks go with their parents
   for (const bone of BONES.slice(1)) {
-    rotations[bone] ??= rotations[HUMANOID.names[HUMANOID.joints[HUMANOID.index(bone)]!.parent]!]!;
+    rotations[bone] ??= rotations[HUMANOID.names[jointOf(bone).parent]!]!;
   }
   return HUMANOID.names.map(
     (name) =>
@@ -235,25 +235,16 @@ function moves(
     minus(times(mean(HIPS.map((joint) => pose[joint]!)), scale), fitted.body.middle(figure[at]!, "UpperLeg")),
   );
   const soles = source.turns.map((turns, at) => {
-    const bones = Object.fromEntries(
-      Object.keys(fitted.heights).map((bone) => [bone, turns[HUMANOID.index(bone)]!]),
-    );
-    return solesOf(
-      fitted,
-      bones,
-      figure[at]!.map((place) => plus(place, moved[at]!)),
-    );
+    const pose = figure[at]!.map((place) => plus(place, moved[at]!));
+    return solesOf(fitted, (bone) => turns[HUMANOID.index(bone)]!, pose);
   });
   const rise = scale * groundUnder(solePoints(source)) - groundUnder(soles);
   return moved.map((move, at): Vector => {
     const place: Vector = [move[0], move[1] + rise, move[2]];
     if (!carrier) return place;
     const above = skeleton.joints[carrier]!.parent;
-    const fromAbove = minus(
-      minus(plus(figure[at]![carrier]!, place), figure[at]![above]!),
-      skeleton.joints[0]!.offset,
-    );
-    return rotated(inverse(turned[at]![above]!), fromAbove);
+    const apart = minus(plus(figure[at]![carrier]!, place), figure[at]![above]!);
+    return rotated(inverse(turned[at]![above]!), minus(apart, skeleton.joints[0]!.offset));
   });
 }
 
