@@ -1,14 +1,13 @@
 /* Commands to steered figures, and bundles of them, that are wrong are refused by name; the search is that of all rows. */
 import assert from "node:assert/strict";
-import { readFile } from "node:fs/promises";
 import test from "node:test";
 import { BundleError, ControlError, ControlModel, load, type Told } from "../src/index.js";
 import { Goals } from "../src/steering/goals.js";
 import { steeringSettings } from "../src/generated.js";
 import { settingsOf } from "../src/settings.js";
+import { bundle } from "./bundles.js";
 
-const bytes = new Uint8Array(await readFile("../motet/bundles/control.zip"));
-const model = (await load(bytes)) as ControlModel;
+const model = (await load(await bundle("control"))) as ControlModel;
 
 test("what cannot be followed is refused, and changes nothing", () => {
   const session = model.start({ characters: 2, strict: true });

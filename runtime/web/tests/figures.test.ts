@@ -1,7 +1,6 @@
 /* Figures and frames are those that Python gives: tests/runtime/web_cases.py writes the cases. */
 import assert from "node:assert/strict";
 import { readdirSync, readFileSync } from "node:fs";
-import { readFile } from "node:fs/promises";
 import test from "node:test";
 import {
   Bundle,
@@ -19,6 +18,8 @@ import {
   toVRMA,
   worldOf,
 } from "../src/index.js";
+import { cut } from "../src/motion/motion.js";
+import { bundle } from "./bundles.js";
 import { TABLES } from "../src/figures/humanoid/tables.js";
 
 interface Case {
@@ -39,8 +40,7 @@ const cases = JSON.parse(readFileSync("tests/cases.json", "utf8")) as {
   >;
   feet: { frames: number[][]; held: number[][]; places: number[][][] };
 };
-const manifestOf = async (name: string) =>
-  (await Bundle.open(new Uint8Array(await readFile(`../motet/bundles/${name}.zip`)))).manifest;
+const manifestOf = async (name: string) => (await Bundle.open(await bundle(name))).manifest;
 
 function near(found: unknown, wanted: unknown, within = 1e-4, what = ""): void {
   const own = [found].flat(4) as number[];
@@ -59,11 +59,7 @@ for (const [name, { text, convention, confidence, unit, places, back }] of Objec
     const found = toHumanoid(motion);
     assert.deepEqual([found.convention, found.confidence, found.unit], [convention, confidence, unit]);
     near(every(found.motion, text ? 4 : 1), places, 1e-4, "places");
-    const first = {
-      ...found.motion,
-      rotations: found.motion.rotations.slice(0, 4),
-      translations: found.motion.translations.slice(0, 4),
-    };
+    const first = cut(found.motion, 0, 4);
     // lengths are in the figure's unit
     if (back) near(every(fromHumanoid(first, motion), 1), back, 1e-4 / unit, "back");
     if (back)

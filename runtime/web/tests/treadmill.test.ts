@@ -1,7 +1,6 @@
 /* Clips in place are found and given a path as in Python, which wrote the cases: tests/runtime/test_web.py. */
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { readFile } from "node:fs/promises";
 import test from "node:test";
 import {
   Bundle,
@@ -14,7 +13,10 @@ import {
   resampled,
   withTravel,
 } from "../src/index.js";
+import { humanoidMotion } from "../src/figures/humanoid/bones.js";
+import { cut } from "../src/motion/motion.js";
 import { about, type Quaternion, type Vector, X } from "../src/motion/rotations.js";
+import { bundle } from "./bundles.js";
 import { close, equal } from "./cases.js";
 import python from "./python.json";
 
@@ -44,7 +46,7 @@ for (const [name, { inPlace: found, path, root }] of Object.entries(python.trave
       path.flat(),
       "path",
     );
-    const { manifest } = await Bundle.open(new Uint8Array(await readFile("../motet/bundles/describe.zip")));
+    const { manifest } = await Bundle.open(await bundle("describe"));
     const { mock } = context.mock.method(console, "warn", () => {});
     close(
       framesFor(still, manifest).flatMap((frame) => frame.slice(0, 6)),
@@ -76,10 +78,8 @@ function stepping(slides: number): Motion {
     }
     return own;
   });
-  const translations = rotations.map(() =>
-    HUMANOID.joints.map(({ offset }, at): Vector => (at ? offset : [0, 0.93, 0])),
-  );
-  return { skeleton: HUMANOID, fps: 30, rotations, translations, travels: true };
+  const hips = rotations.map((): Vector => [0, 0.93, 0]);
+  return humanoidMotion(rotations, hips, 30);
 }
 
 test("steps on the spot are no clip in place, but with legs that swing they are", () => {
@@ -88,14 +88,9 @@ test("steps on the spot are no clip in place, but with legs that swing they are"
 
 test("what says too little is left: no path, a few frames, no human", () => {
   const still = stepping(20);
-  const cut = (count: number) => ({
-    ...still,
-    rotations: still.rotations.slice(0, count),
-    translations: still.translations.slice(0, count),
-  });
   assert.ok(!isInPlace({ ...still, travels: false }));
-  for (const count of [1, 2, 3]) assert.ok(!isInPlace(cut(count)));
-  assert.equal(withTravel(cut(1)).rotations.length, 1);
+  for (const count of [1, 2, 3]) assert.ok(!isInPlace(cut(still, 0, count)));
+  assert.equal(withTravel(cut(still, 0, 1)).rotations.length, 1);
   const stick = readBVH(
     "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\nMOTION\nFrames: 3\nFrame Time: 0.1\n0 0 0\n0 0 0\n0 0 0\n",
   );

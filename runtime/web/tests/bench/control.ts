@@ -1,6 +1,6 @@
 /* Milliseconds of processor time of a tick of steered figures: `npm run bench:control`. They walk, run and stand; of several passes the best mean counts. */
-import { readFile } from "node:fs/promises";
 import { type ControlModel, load } from "../../src/index.js";
+import { bundle } from "../bundles.js";
 
 const PASSES = 7;
 const ORDERS = [
@@ -9,7 +9,7 @@ const ORDERS = [
   ["walk", 0, 90],
 ] as const;
 
-const model = (await load(new Uint8Array(await readFile("../motet/bundles/control.zip")))) as ControlModel;
+const model = (await load(await bundle("control"))) as ControlModel;
 
 /** The mean over a pass, and its slowest tick. */
 function pass(characters: number, holdFeet: boolean, ticks: number): { mean: number; worst: number } {

@@ -1,5 +1,5 @@
 /* npm run bench: the figures in Node, and in Chromium. */
-import { readFile } from "node:fs/promises";
+import { bundle } from "../bundles.js";
 import { inChromium } from "../browser/chromium.js";
 import { figures, type Times } from "./figures.js";
 
@@ -11,4 +11,4 @@ const print = (where: string, times: Times) => {
 };
 console.log(`${"".padEnd(24)}${["first", "median", "least"].map((one) => one.padStart(8)).join("")}   ms`);
 print("Chromium", (await inChromium("page.js")) as Times);
-print("Node", await figures(async (name) => new Uint8Array(await readFile(`../motet/bundles/${name}.zip`))));
+print("Node", await figures(bundle));
