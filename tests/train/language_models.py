@@ -12,6 +12,7 @@ from motet.errors import TextError
 from motet.models.describe import Description, Part
 from motet.motion.motion import Motion
 from motet.representation.root_block import ROOT_BLOCK, ROOT_BLOCK_UNITS
+from motet.search.model import IndexSettings
 from motet_train.data.store import Entry, Store
 from motet_train.evaluate.language.split_store import plain
 
@@ -51,6 +52,9 @@ def small_store(each: int = 6) -> Store:
         entries.append(Entry(f"{i:02}", f"{i // 10}", sentences, ((i * FRAMES, (i + 1) * FRAMES),), 0))
     frames = np.concatenate(motions).astype(np.float32)
     return Store(frames, "root_angles", CHANNELS, UNITS, FPS, (SKELETON,), tuple(entries), ())
+
+
+STORE = small_store()
 
 
 def manifest(store: Store, verb: str, by: str = "trial") -> dict[str, Any]:
@@ -122,3 +126,13 @@ class FakeGenerate:
 
     def score(self, sentence: str, motion: Motion) -> float:
         return -3.0 * (len(motion) + 1)
+
+
+class WholeMotions:
+    """Makes a search model see each motion as one window."""
+
+    def settings(self, kind: type[IndexSettings]) -> IndexSettings:
+        return kind()
+
+    def windows(self, motion: Motion, longest: float) -> list[tuple[float, Motion]]:
+        return [(0.0, motion)]

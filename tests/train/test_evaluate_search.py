@@ -5,11 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from language_models import KINDS, FakeDescribe, small_store, told
+from language_models import KINDS, STORE, FakeDescribe, WholeMotions, told
 from numpy.typing import NDArray
 
 from motet.motion.motion import Motion
-from motet.search.model import IndexSettings
 from motet.search.nearest import LOOPS
 from motet_train.data.errors import DataError
 from motet_train.data.store import Store
@@ -20,7 +19,7 @@ from motet_train.evaluate.tables import report_table
 Floats = NDArray[np.float32]
 
 
-class FakeSearch:
+class FakeSearch(WholeMotions):
     """Puts motions of a kind near each other, and a sentence to the motion it is about, or nearer to the next one."""
 
     loop = LOOPS["nearest"]
@@ -30,12 +29,6 @@ class FakeSearch:
         self.manifest, self.off = told(store, "search"), off
         self.records = {store.sequence(i).tobytes(): i for i in range(len(store.records))}
         self.about = {plain(s): i for i, entry in enumerate(store.records) for s in entry.sentences[2:]}
-
-    def settings(self, kind: type[IndexSettings]) -> IndexSettings:
-        return kind()
-
-    def windows(self, motion: Motion, longest: float) -> list[tuple[float, Motion]]:
-        return [(0.0, motion)]
 
     def embed(self, motions: Sequence[Motion]) -> Floats:
         return np.stack([self.vector(self.records[m.values.astype(np.float32).tobytes()]) for m in motions])
@@ -61,13 +54,8 @@ class Scorer(FakeDescribe):
 
 
 @pytest.fixture(scope="module")
-def store() -> Store:
-    return small_store()
-
-
-@pytest.fixture(scope="module")
-def corpus(store: Store) -> SplitStore:
-    return split_as(told(store, "search"), store)
+def corpus() -> SplitStore:
+    return split_as(told(STORE, "search"), STORE)
 
 
 def test_a_perfect_model_finds_all_at_once(corpus: SplitStore) -> None:
@@ -79,9 +67,7 @@ def test_a_perfect_model_finds_all_at_once(corpus: SplitStore) -> None:
     assert report["words_text"] == {**first, "first_1": 0.8}
     assert report["motion"] == {"alike": 1, "features_alike": 1, "of": 5}
     like = report["like"]
-    assert {name: like[name] for name in ("text_kept", "text_told", "motion_told")} == dict.fromkeys(
-        ("text_kept", "text_told", "motion_told"), 1
-    )
+    assert like["text_kept"] == like["text_told"] == like["motion_told"] == 1
     assert like["text_least"] == pytest.approx(1)
     assert "text.first_5" in report_table({"fake": report}, SEARCH_GOALS)
 
@@ -94,15 +80,15 @@ def test_the_rank_of_a_model_that_takes_the_next_one(corpus: SplitStore) -> None
     assert report["likelihood_text"] == {"first_1": 0.2, "first_5": 1, "first_10": 1, "median_rank": 3}
 
 
-def test_a_part_without_new_sentences_is_named_or_leaves_its_figure_out(store: Store) -> None:
-    records = [replace(entry, sentences=("a person walks",)) for entry in store.records]
-    model = FakeSearch(store)
+def test_a_part_without_new_sentences_is_named_or_leaves_its_figure_out() -> None:
+    records = [replace(entry, sentences=("a person walks",)) for entry in STORE.records]
+    model = FakeSearch(STORE)
     with pytest.raises(DataError, match=r"no sentence to search by: the test motions have none .* pool test"):
-        search_report(model, split_as(told(store, "search"), replace(store, records=tuple(records))))  # type: ignore[arg-type]
+        search_report(model, split_as(told(STORE, "search"), replace(STORE, records=tuple(records))))  # type: ignore[arg-type]
 
     # only the validation part has nothing new: the limit that it would choose is unknown
-    records[-5:] = store.records[-5:]
-    records[:-10] = store.records[:-10]
-    report = search_report(model, split_as(told(store, "search"), replace(store, records=tuple(records))))  # type: ignore[arg-type]
+    records[-5:] = STORE.records[-5:]
+    records[:-10] = STORE.records[:-10]
+    report = search_report(model, split_as(told(STORE, "search"), replace(STORE, records=tuple(records))))  # type: ignore[arg-type]
     assert np.isnan(report["like"]["text_least"])
     assert report["text"]["first_1"] == 1

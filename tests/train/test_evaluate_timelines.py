@@ -4,22 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from language_models import FRAMES, FakeDescribe, small_store, told
+from language_models import FRAMES, STORE, FakeDescribe, told
 
 from motet.models.describe import ConfidenceSettings, Description, Part
 from motet.motion.motion import Motion
 from motet_train.evaluate.language.attributes import action_right
-from motet_train.evaluate.language.confidence import (
-    ENOUGH,
-    calibrated,
-    confidence,
-    joined,
-    matched,
-    timeline_figures,
-)
+from motet_train.evaluate.language.confidence import ENOUGH, calibrated, confidence, joined, matched, timeline_figures
 from motet_train.evaluate.language.split_store import SplitStore, split_as
-
-STORE = small_store()
 
 
 @pytest.fixture(scope="module")

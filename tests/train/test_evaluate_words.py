@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from language_models import small_store, told
+from language_models import STORE, told
 
 from motet_train.data.errors import DataError
 from motet_train.evaluate.language.attributes import VERBS, common_side, common_turning, mentioned, side, words_right
@@ -22,8 +22,7 @@ from motet_train.evaluate.language.split_store import SplitStore, split_as
 
 @pytest.fixture(scope="module")
 def corpus() -> SplitStore:
-    store = small_store()
-    return split_as(told(store, "describe"), store)
+    return split_as(told(STORE, "describe"), STORE)
 
 
 def naive_bleu(hypotheses: list[list[str]], references: list[list[list[str]]], longest: int = 4) -> float:
@@ -157,20 +156,19 @@ def test_the_most_frequent_sentence(corpus: SplitStore) -> None:
 
 
 def test_a_model_of_other_data_is_refused() -> None:
-    store = small_store()
-    other = told(store, "describe")
+    other = told(STORE, "describe")
     other.training["split"]["train"] += 1
     with pytest.raises(DataError, match="was not trained on this data: its 21 training"):
-        split_as(other, store)
+        split_as(other, STORE)
     other.training.clear()
     with pytest.raises(DataError, match="does not say which motions"):
-        split_as(other, store)
-    other = told(store, "describe")
+        split_as(other, STORE)
+    other = told(STORE, "describe")
     other.training["split"]["test"][0] = "elsewhere"
     with pytest.raises(DataError, match="was not trained on this data"):
-        split_as(other, store)
+        split_as(other, STORE)
     # a motion that is both for validation and for testing is another division
-    other = told(store, "describe")
+    other = told(STORE, "describe")
     other.training["split"]["test"].append(other.training["split"]["validation"][0])
     with pytest.raises(DataError, match="was not trained on this data"):
-        split_as(other, store)
+        split_as(other, STORE)

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from language_models import CHANNELS, FPS, FRAMES, KINDS, UNITS, moving, small_store, told
+from language_models import CHANNELS, FPS, FRAMES, KINDS, STORE, UNITS, moving, told
 
 from motet.motion.kinematics import positions
 from motet.representation.root_block import from_root_block
-from motet_train.data.store import Store
 from motet_train.evaluate.language.motions import Looks
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 
@@ -16,13 +15,8 @@ TURN = KINDS["walks and turns left"]
 
 
 @pytest.fixture(scope="module")
-def store() -> Store:
-    return small_store()
-
-
-@pytest.fixture(scope="module")
-def looks(store: Store) -> Looks:
-    return Looks(split_as(told(store, "describe"), store))
+def looks() -> Looks:
+    return Looks(split_as(told(STORE, "describe"), STORE))
 
 
 def test_places_are_seen_from_the_root(looks: Looks) -> None:
@@ -49,9 +43,9 @@ def test_training_motions_are_the_scale_and_each_kind_weighs_the_same(looks: Loo
     np.testing.assert_allclose(found[:, turning] * np.sqrt(3), (means - means.mean()) / means.std())
 
 
-def test_without_a_root_block_channels_are_seen(store: Store) -> None:
-    angles = replace(store, frames=store.frames[:, 6:], channels=CHANNELS[6:], units=UNITS[6:], skeletons=())
-    entries = tuple(replace(entry, skeleton=None) for entry in store.records)
+def test_without_a_root_block_channels_are_seen() -> None:
+    angles = replace(STORE, frames=STORE.frames[:, 6:], channels=CHANNELS[6:], units=UNITS[6:], skeletons=())
+    entries = tuple(replace(entry, skeleton=None) for entry in STORE.records)
     angles = replace(angles, representation="angles", records=entries)
     corpus: SplitStore = split_as(told(angles, "describe"), angles)
     (seen,) = Looks(corpus).arrays(corpus.motion(3))
