@@ -60,7 +60,6 @@ def test_a_side_is_that_of_the_path_whatever_the_verb() -> None:
 
 def test_the_ways_that_ship_are_those_of_their_sentences() -> None:
     known = load_as(DescribeModel, "describe").known
-    assert known is not None
     np.testing.assert_array_equal(known.ways, [way_of(sentence) for sentence in known.sentences])
 
 

@@ -72,9 +72,9 @@ def measured(**systems: float) -> Measured:
     speeds = np.array([0.1, 0.0, 1.2, 2.5, 0.4])
     factor = np.array([10.0, 10, 1, 1, 2])[:, None] * np.ones(25)
     every = {**dict(zip(FLOORS, (2.0, 3, 1, 3, 1), strict=True)), **systems}
-    distances = {
-        name: {PLACE: v * factor, POSE: 0.5 * v * factor, BONES: 0.1 * v * factor} for name, v in every.items()
-    }
+    distances = {}
+    for name, v in every.items():
+        distances[name] = {PLACE: v * factor, POSE: 0.5 * v * factor, BONES: 0.1 * v * factor}
     return Measured(names, distances, (), speeds)
 
 
@@ -111,11 +111,8 @@ def test_distances_are_means_over_the_windows_of_a_kind() -> None:
 def test_windows_are_divided_by_whether_they_begin_on_the_way() -> None:
     entries = [*ENTRIES[:3], entry("wave", "wave", subject=ANIMALS)]
     found = measured(a=1.0)
-    assert {name: part.tolist() for name, part in found.by_going(entries).items()} == {
-        "going": [2, 3],
-        "animals": [4],
-        "others": [0, 1],
-    }
+    parts = {name: part.tolist() for name, part in found.by_going(entries).items()}
+    assert parts == {"going": [2, 3], "animals": [4], "others": [0, 1]}
     part = found.part("a", entries, np.array([2, 3]))
     assert (part["people"], part["recordings"], part["windows"]) == (1, 2, 2)
     assert part["behind_standing"] == 0.0
@@ -128,12 +125,8 @@ def test_the_table_has_a_row_of_each_system_for_each_kind() -> None:
     rows = [row.split() for row in text.splitlines()]
     assert rows[1] == ["milliseconds", "67", "133", "267", "333", "467", "833"]
     assert text.splitlines()[2] == "all: 2 people, 4 recordings, 5 windows"
-    assert [row[1:] for row in rows if row[0] == "a"] == [
-        ["4.8"] * 6,
-        ["2.4"] * 6,
-        ["0.5"] * 6,
-        *([v] * 6 for v in ("10.0", "1.0", "2.0", "1.0", "7.3")),
-    ]
+    cells = ("4.8", "2.4", "0.5", "10.0", "1.0", "2.0", "1.0", "7.3")
+    assert [row[1:] for row in rows if row[0] == "a"] == [[cell] * 6 for cell in cells]
     assert "walks and runs: 1 people, 2 recordings, 2 windows" in text
     assert sum(row[:2] == ["zero", "velocity"] for row in rows) == 8
 
@@ -195,13 +188,8 @@ def test_a_model_is_asked_for_its_errors_where_it_knows_them() -> None:
     models: Any = {"m": Honest(np.outer([2.0, 1, 1], np.ones(25)))}
     reports = mocap_report(models, found, ENTRIES[:2])
     one = json_ready(reports["m"]["calibration"])
-    assert {kind: ratio["frame_24"] for kind, ratio in one["ratio"].items()} == {
-        "all": 2,
-        "boxing": 2,
-        "walks and runs": 2,
-        "going": 2,
-        "others": 2,
-    }
+    kinds = ("all", "boxing", "walks and runs", "going", "others")
+    assert {kind: ratio["frame_24"] for kind, ratio in one["ratio"].items()} == dict.fromkeys(kinds, 2)
     assert one["rank_correlation"]["frame_1"] == pytest.approx(0.866, abs=1e-3)
     assert ["  boxing", *["2.00"] * 6] in calibration_rows(reports["m"]["calibration"])
     assert "measured mean error over the expected one" in mocap_text(reports, 30.0)
