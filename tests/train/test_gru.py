@@ -3,22 +3,16 @@
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
-from torch import Tensor
+from twins import Array, array, squash
 
 from motet_train.models.recurrent import GRU, Decoder, Encoder, WordEmbedding, mask
 from motet_train.papers.plappert2017.language_to_motion import LayerNormGRU
 
-Array = NDArray[np.float64]
 LAYERS = pytest.mark.parametrize("layer", [GRU, LayerNormGRU])
 
 
-def array(tensor: Tensor) -> Array:
-    return tensor.detach().double().numpy()
-
-
-def squash(x: Array, gates: str) -> Array:
-    return np.clip(0.2 * x + 0.5, 0, 1) if gates == "hard" else 1 / (1 + np.exp(-x))
+def opened(x: Array, gates: str) -> Array:
+    return np.clip(0.2 * x + 0.5, 0, 1) if gates == "hard" else squash(x)
 
 
 def norm(module: torch.nn.Module, x: Array, direction: int) -> Array:
@@ -35,11 +29,11 @@ def twin(layer: GRU, x: Array, direction: int) -> Array:
         both, candidate = np.split(frame @ w + b, [2 * n])
         if isinstance(layer, LayerNormGRU):
             both = norm(layer.input_gate_norm, both, direction) + norm(layer.gate_norm, h @ u, direction)
-            z, r = np.split(squash(both, layer.gates), 2)
+            z, r = np.split(opened(both, layer.gates), 2)
             candidate = norm(layer.input_candidate_norm, candidate, direction)
             candidate = np.tanh(candidate + r * norm(layer.candidate_norm, h @ uh, direction))
         else:
-            z, r = np.split(squash(both + h @ u, layer.gates), 2)
+            z, r = np.split(opened(both + h @ u, layer.gates), 2)
             candidate = np.tanh(candidate + (r * h) @ uh)
         h = z * h + (1 - z) * candidate
         states.append(h)

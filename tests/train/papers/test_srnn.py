@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
+from twins import Array, array, linear, squash
 
 from motet_train.data.errors import DataError
 from motet_train.papers.li2018.expmap import CMU_LAYOUT, H36M_LAYOUT
@@ -14,7 +14,6 @@ from motet_train.papers.li2018.srnn import SRNN, Config, parts_of
 from motet_train.papers.li2018.stepwise import noise_at, noisy
 from motet_train.run_folder import has_bfloat16
 
-Array = NDArray[np.float64]
 TINY = Config(9, ((8, 0, 4), (1, 2), (5, 6), (3,), (7,)), linear=6, units=5, narrow=4)
 MIRROR = [0, 5, 6, 7, 4, 1, 2, 3, 8]
 RANGES = "0-5 9-13 15-19 27-31 33-37 42-59 66-68 70-72 75-77 80-80 84-86 93-95 97-99 102-104 107-107 111-113"
@@ -27,22 +26,13 @@ def made(config: Config = TINY) -> SRNN:
     return SRNN(config).eval()
 
 
-def array(tensor: Tensor) -> Array:
-    return tensor.detach().double().numpy()
-
-
-def linear(layer: nn.Module, x: Array) -> Array:
-    return array(layer.weight) @ x + array(layer.bias)
-
-
 def cell(lstm: nn.Module, x: Array, state: Array) -> Array:
     """Hidden units and memory after one step of an LSTM (Hochreiter and Schmidhuber, with forget gates)."""
     h, c = np.split(state, 2)
     both = array(lstm.weight_ih_l0) @ x + array(lstm.bias_ih_l0) + array(lstm.weight_hh_l0) @ h + array(lstm.bias_hh_l0)
     i, f, g, o = np.split(both, 4)
-    i, f, o = (1 / (1 + np.exp(-gate)) for gate in (i, f, o))
-    c = f * c + i * np.tanh(g)
-    return np.concatenate([o * np.tanh(c), c])
+    c = squash(f) * c + squash(i) * np.tanh(g)
+    return np.concatenate([squash(o) * np.tanh(c), c])
 
 
 def neighbours(part: int) -> list[tuple[str, list[tuple[int, int]]]]:
@@ -114,11 +104,8 @@ def test_the_published_net_has_the_layers_of_the_paper() -> None:
     for name, node in net.nodes.items():
         width = widths[name] // 2
         assert tuple(node.lstm.weight_ih_l0.shape) == (2048, width + 3 * 512)
-        assert [tuple(layer.weight.shape) for layer in (node.hidden[0], node.hidden[2], node.outward)] == [
-            (256, 512),
-            (100, 256),
-            (width, 100),
-        ]
+        shapes = [tuple(layer.weight.shape) for layer in (node.hidden[0], node.hidden[2], node.outward)]
+        assert shapes == [(256, 512), (100, 256), (width, 100)]
 
 
 def test_the_parts_cover_the_columns_of_the_cmu_files_once() -> None:
