@@ -1,23 +1,16 @@
 """Both directions between motion and language: sizes, losses, and the three graphs of each."""
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 import torch
 from torch import Tensor
+from trainings import rebuilt
 
 from motet_train.data.batches import Batch
-from motet_train.models.motion_to_language import (
-    EOS,
-    PAD,
-    SOS,
-    MotionToLanguage,
-    MotionToLanguageConfig,
-)
+from motet_train.models.motion_to_language import EOS, PAD, SOS, MotionToLanguage, MotionToLanguageConfig
 from motet_train.papers.plappert2017.language_to_motion import LanguageToMotion, LanguageToMotionConfig
-from motet_train.runs import MODELS
 
 D, V = 3, 11
 DESCRIBE = MotionToLanguageConfig(D, V, encoder_units=(4, 5), decoder_units=(6, 7), embedding=4)
@@ -90,33 +83,21 @@ def test_the_encoder_sees_the_way_so_far(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (seen[0][..., D + 2 :] == 1).all()
 
 
-def test_the_loss_of_words_is_the_cross_entropy_of_steps() -> None:
-    net, rows = describer().eval(), batch()
-    step = net.graphs()["step"][0]
-    context = net.encode(rows.frames, rows.lengths)
-    sentences = [[SOS, *row[row != PAD].tolist(), EOS] for row in rows.words]
-    expected = []
-    for i, sentence in enumerate(sentences):
-        state = torch.zeros(1, 13)
-        for word, following in pairwise(sentence):
-            log_probabilities, state = step(torch.tensor([word]), context[i : i + 1], state)
-            assert log_probabilities.exp().sum().item() == pytest.approx(1, abs=1e-5)
-            expected.append(-log_probabilities[0, following])
-    torch.testing.assert_close(net.terms(rows)[0], torch.stack(expected), atol=1e-5, rtol=1e-5)
-
-
-def test_steps_that_attend_give_the_loss_of_whole_sentences() -> None:
-    net, rows = describer(ATTENTIVE).eval(), batch()
+@pytest.mark.parametrize("attention", [False, True])
+def test_the_loss_of_words_is_the_cross_entropy_of_steps(attention: bool) -> None:
+    net, rows = describer(replace(DESCRIBE, attention=attention)).eval(), batch()
     encoder, step = (net.graphs()[role][0] for role in ("encoder", "step"))
-    context, states = encoder(rows.frames, rows.lengths)
+    if attention:
+        known = [*encoder(rows.frames, rows.lengths), rows.lengths]
+    else:
+        known = [net.encode(rows.frames, rows.lengths)]
     sentences = [[SOS, *row[row != PAD].tolist(), EOS] for row in rows.words]
     expected = []
     for i, sentence in enumerate(sentences):
         state = torch.zeros(1, 13)
-        row = slice(i, i + 1)
+        of_row = [part[i : i + 1] for part in known]
         for word, following in pairwise(sentence):
-            given = (torch.tensor([word]), context[row], states[row], rows.lengths[row], state)
-            log_probabilities, state = step(*given)
+            log_probabilities, state = step(torch.tensor([word]), *of_row, state)
             assert log_probabilities.exp().sum().item() == pytest.approx(1, abs=1e-5)
             expected.append(-log_probabilities[0, following])
     torch.testing.assert_close(net.terms(rows)[0], torch.stack(expected), atol=1e-5, rtol=1e-5)
@@ -204,7 +185,6 @@ def test_training_drops_and_running_does_not() -> None:
     ],
 )
 def test_a_net_is_rebuilt_from_its_configuration(name: str, net: MotionToLanguage | LanguageToMotion) -> None:
-    other = MODELS[name](json.loads(json.dumps(asdict(net.config))))
-    assert other.config == net.config
-    other.load_state_dict(net.state_dict())
-    assert torch.equal(other.eval().terms(batch())[0], net.eval().terms(batch())[0])
+    again = rebuilt(name, net)
+    assert again.config == net.config
+    assert torch.equal(again.terms(batch())[0], net.eval().terms(batch())[0])

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+from trainings import same
 
 from motet_train.descent import GradientLearner, Term, Terms, Training
 from motet_train.models.net import Net
@@ -109,7 +110,7 @@ def test_a_resumed_muon_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     train(parts, 3, tmp_path / "parts")
     again = lines()
     train(again, 3, tmp_path / "parts")
-    assert all(torch.equal(value, again.kept.state_dict()[name]) for name, value in whole.kept.state_dict().items())
+    assert same(whole.kept.state_dict(), again.kept.state_dict())
     assert not torch.equal(parts.kept.state_dict()["first.weight"], again.kept.state_dict()["first.weight"])
 
 
