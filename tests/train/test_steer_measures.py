@@ -36,9 +36,7 @@ from motet_train.evaluate.steer.following import (
 from motet_train.evaluate.steer.players import STEERED_FIGURES, reversal_figures, stick_figures
 from motet_train.evaluate.steer.report import Limits, Watch, astray, broken, frozen, turns, wandering, watched
 
-
-def puppets(**how: Any) -> Any:
-    return Puppets(**how)
+puppets: Any = Puppets
 
 
 @pytest.fixture(scope="module")
