@@ -29,11 +29,7 @@ export function checkManifest(manifest: Fields): void {
       `tables.${name}`,
       "needs a file and a dtype",
     );
-    check(
-      isList(table.shape) && table.shape.every(isCount),
-      `tables.${name}.shape`,
-      "must hold whole numbers",
-    );
+    check(isListOf(table.shape, isCount), `tables.${name}.shape`, "must hold whole numbers");
   }
   checkMotion(manifest.motion as Fields);
   for (const [feature, values] of entries(manifest.settings)) {
@@ -46,22 +42,16 @@ export function checkManifest(manifest: Fields): void {
   check(vocabulary === undefined || isTexts(vocabulary), "vocabulary", "must hold texts");
   const named = (action: unknown) =>
     isObject(action) && typeof action.sentence === "string" && isTexts(action.words);
-  check(
-    actions === undefined || (isList(actions) && actions.every(named)),
-    "actions",
-    "must hold sentences with their words",
-  );
+  const hasActions = actions === undefined || isListOf(actions, named);
+  check(hasActions, "actions", "must hold sentences with their words");
   const meant = (command: unknown) =>
     isObject(command) &&
     typeof command.sentence === "string" &&
     isCount(command.action) &&
     isTexts(command.texts) &&
     isTexts(command.instead);
-  check(
-    commands === undefined || (isList(commands) && commands.every(meant)),
-    "commands",
-    "must hold sentences with their actions and texts",
-  );
+  const hasCommands = commands === undefined || isListOf(commands, meant);
+  check(hasCommands, "commands", "must hold sentences with their actions and texts");
 }
 
 function checkGraph(place: string, graph: Fields): void {
@@ -69,11 +59,7 @@ function checkGraph(place: string, graph: Fields): void {
   check(typeof (graph.weights ?? "") === "string", `${place}.weights`, "is no text");
   for (const key of ["inputs", "outputs"]) {
     const tensors = graph[key];
-    check(
-      isList(tensors) && tensors.length > 0 && tensors.every(isObject),
-      `${place}.${key}`,
-      "must hold tensors",
-    );
+    check(isListOf(tensors, isObject) && tensors.length > 0, `${place}.${key}`, "must hold tensors");
     for (const [at, { name, dtype, shape }] of (tensors as Fields[]).entries()) {
       check(
         typeof name === "string" && TENSOR_TYPES.includes(String(dtype)),
@@ -81,11 +67,7 @@ function checkGraph(place: string, graph: Fields): void {
         "needs a name and a dtype",
       );
       const axis = (size: unknown) => typeof size === "string" || (isCount(size) && size > 0);
-      check(
-        isList(shape) && shape.every(axis),
-        `${place}.${key}.${at}.shape`,
-        "must hold sizes, or names of axes",
-      );
+      check(isListOf(shape, axis), `${place}.${key}.${at}.shape`, "must hold sizes, or names of axes");
     }
   }
   const names = (key: string) => (graph[key] as Fields[]).map((tensor) => tensor.name);
@@ -99,7 +81,7 @@ function checkGraph(place: string, graph: Fields): void {
   }
   check(graph.start === undefined || isObject(graph.start), `${place}.start`, "is no object");
   for (const [state, sizes] of Object.entries((graph.start ?? {}) as Fields)) {
-    check(isList(sizes) && sizes.every(isCount), `${place}.start.${state}`, "must hold whole numbers");
+    check(isListOf(sizes, isCount), `${place}.start.${state}`, "must hold whole numbers");
   }
 }
 
@@ -110,25 +92,21 @@ function checkMotion({ channels, units, mean, std, fps, skeleton }: Fields): voi
     "does not say what frames are",
   );
   for (const [key, numbers] of Object.entries({ mean, std })) {
-    const fits =
-      isList(numbers) && numbers.length === (channels as string[]).length && numbers.every(Number.isFinite);
+    const fits = isListOf(numbers, Number.isFinite) && numbers.length === channels.length;
     check(fits, `motion.${key}`, "must hold a number for each channel");
   }
-  check(
-    (std as number[]).every((deviation) => deviation > 0),
-    "motion.std",
-    "must be above 0",
-  );
+  const isSpread = (std as number[]).every((deviation) => deviation > 0);
+  check(isSpread, "motion.std", "must be above 0");
   check(
     typeof fps === "number" && fps > 0 && fps <= MOST_FPS,
     "motion.fps",
     `must be above 0, and at most ${MOST_FPS}`,
   );
   const joints = isObject(skeleton) ? skeleton.joints : [];
-  check(isList(joints) && joints.every(isObject), "motion.skeleton", "must hold joints");
+  check(isListOf(joints, isObject), "motion.skeleton", "must hold joints");
   for (const [at, { name, parent, offset }] of (joints as Fields[]).entries()) {
     const below = Number.isInteger(parent) && (parent as number) >= -1 && (parent as number) < at;
-    const placed = isList(offset) && offset.length === 3 && offset.every(Number.isFinite);
+    const placed = isListOf(offset, Number.isFinite) && offset.length === 3;
     check(
       typeof name === "string" && below && placed,
       `motion.skeleton.joints.${at}`,
@@ -151,12 +129,12 @@ function isCount(value: unknown): value is number {
   return Number.isInteger(value) && (value as number) >= 0 && (value as number) <= MOST_SIZE;
 }
 
-function isList(value: unknown): value is unknown[] {
-  return Array.isArray(value);
+function isListOf(value: unknown, fits: (item: unknown) => boolean): value is unknown[] {
+  return Array.isArray(value) && value.every(fits);
 }
 
 function isTexts(value: unknown): value is string[] {
-  return isList(value) && value.every((text) => typeof text === "string");
+  return isListOf(value, (text) => typeof text === "string");
 }
 
 export function isObject(value: unknown): value is Fields {

@@ -35,7 +35,7 @@ export interface MeshPart {
   extensions?: object;
 }
 
-interface Material {
+export interface Material {
   pbrMetallicRoughness?: { baseColorFactor?: number[]; baseColorTexture?: { index: number } };
   alphaMode?: string;
   alphaCutoff?: number;
@@ -151,12 +151,7 @@ export class Gltf {
 
   /** Parse a file; FormatError where it is not glTF 2.0, is cut short, or needs other files. */
   static parse(content: Uint8Array): Gltf {
-    const isBinary =
-      content.length >= 12 &&
-      content[0] === 0x67 &&
-      content[1] === 0x6c &&
-      content[2] === 0x54 &&
-      content[3] === 0x46;
+    const isBinary = content.length >= 12 && new TextDecoder().decode(content.subarray(0, 4)) === "glTF";
     const { json, binary } = isBinary ? chunks(content) : { json: content, binary: new Uint8Array() };
     let document: Document;
     try {

@@ -4,6 +4,7 @@ import { integers, stacked } from "../bundle/arrays.js";
 import type { Graph } from "../bundle/graph.js";
 import type { Frames } from "../models/base.js";
 import { moved, type Pose, seenFrom } from "../motion/planar.js";
+import { dampingOf } from "../motion/springs.js";
 
 /** The graphs `decoder` and `tokens`, how many steps they look back and ahead, and the spring that joins motions. */
 export interface Codec {
@@ -146,7 +147,7 @@ function inertialized(
     Float64Array.from(context[row]!, (value, at) => value - frames[row]![at]!),
   ) as [Float64Array, Float64Array];
   const speed = off.map((value, at) => (at < CODEC.PATH_CHANNELS ? 0 : (value - before[at]!) * fps));
-  const y = (2 * Math.LN2) / halfLife;
+  const y = dampingOf(halfLife);
   const fading = Math.exp(-y / fps);
   return (frame) => {
     for (let at = 0; at < frame.length; at++) {

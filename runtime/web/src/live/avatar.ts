@@ -1,6 +1,6 @@
 /* Avatars: the mesh of a .vrm or .glb file, and its joints in the poses of the humanoid. */
 import { FormatError, MotionError } from "../errors.js";
-import { Gltf, inlined, mapped, type MeshPart, type Placed } from "../formats/gltfData.js";
+import { Gltf, inlined, mapped, type Material, type MeshPart, type Placed } from "../formats/gltfData.js";
 import { restOf } from "../formats/gltf.js";
 import { LEG_LENGTH } from "../figures/humanoid/bones.js";
 import { worldOf } from "../motion/motion.js";
@@ -160,14 +160,15 @@ async function primitiveOf(
     indices: Uint32Array.from(part.indices === undefined ? vertices.keys() : array(part.indices).flat()),
     colour: base?.baseColorFactor ?? [1, 1, 1, 1],
     image: await imageOf(gltf, base?.baseColorTexture?.index, images),
-    cut:
-      material?.alphaMode === "MASK"
-        ? (material.alphaCutoff ?? 0.5)
-        : material?.alphaMode === "BLEND"
-          ? 0.3
-          : 0,
+    cut: cutOf(material),
     twoSided: material?.doubleSided ?? false,
   };
+}
+
+/** The opacity below which a pixel is not drawn. */
+function cutOf(material?: Material): number {
+  if (material?.alphaMode === "MASK") return material.alphaCutoff ?? 0.5;
+  return material?.alphaMode === "BLEND" ? 0.3 : 0;
 }
 
 /** The picture of a texture; null where there is none in the file that a browser reads. */

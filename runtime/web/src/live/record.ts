@@ -46,12 +46,9 @@ export class Recorder {
     ink.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--back");
     const poses = this.poses.filter((_, at) => at % EVERY === 0);
     this.scene.cut();
+    const shows = { trails: false, contacts: false, pause: true };
     const pictures = poses.map((pose) => {
-      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, {
-        trails: false,
-        contacts: false,
-        pause: true,
-      });
+      this.scene.draw([shownOf(pose)], EVERY / this.fps, [], undefined, shows);
       const { width, height } = this.canvas; // which are those of a sharp picture now
       const side = Math.min(width, height);
       ink.fillRect(0, 0, SIZE, SIZE);

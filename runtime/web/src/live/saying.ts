@@ -67,12 +67,10 @@ export class Saying {
   private act({ name, side, tempo, count }: Step, page: Page): void {
     const isPlain = !side && tempo === 1 && count === 1;
     if (isPlain && page.net.gaits.includes(name)) page.once(name, this.all);
-    else
-      page.act(
-        page.repertoire.act(name, side, tempo, count),
-        page.repertoire.entries.get(name)!.arms,
-        this.all,
-      );
+    else {
+      const { arms } = page.repertoire.entries.get(name)!;
+      page.act(page.repertoire.act(name, side, tempo, count), arms, this.all);
+    }
   }
 }
 

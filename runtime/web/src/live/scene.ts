@@ -84,21 +84,12 @@ export class Scene {
     const { width, height } = this.painter.begin(shows.pause);
     if (!width || !height) return;
     this.camera = this.follow(poses, passed, width, height);
-    const ways = shows.trails
-      ? [
-          ...figures.slice(0, TRACED).map((figure, n) => this.gone(figure, n)),
-          ...(figures[0] ? [this.planned(figures[0])] : []),
-        ]
-      : [];
-    const spots = [
-      ...(shows.contacts ? poses.flatMap((pose) => this.standing(pose)) : []),
-      ...(goal ? [this.spot(goal, 0.09, this.accent, 0.6)] : []),
-    ];
-    this.painter.draw(this.camera, {
-      figures: [this.landscape, ...poses.map((pose, n) => this.looks(pose, n))],
-      strips: ways,
-      spots,
-    });
+    const strips = shows.trails ? figures.slice(0, TRACED).map((figure, n) => this.gone(figure, n)) : [];
+    if (shows.trails && figures[0]) strips.push(this.planned(figures[0]));
+    const spots = shows.contacts ? poses.flatMap((pose) => this.standing(pose)) : [];
+    if (goal) spots.push(this.spot(goal, 0.09, this.accent, 0.6));
+    const drawn = [this.landscape, ...poses.map((pose, n) => this.looks(pose, n))];
+    this.painter.draw(this.camera, { figures: drawn, strips, spots });
   }
 
   /** Let the camera be at once where it would come to. */
@@ -121,14 +112,8 @@ export class Scene {
     const goal = [ground[0], middle, ground[1]].map((x) => x / this.height) as Vector;
     const before = this.target ?? goal;
     this.target = before.map((x, i) => goal[i]! + (x - goal[i]!) * 0.5 ** (passed / LATE[i]!)) as Vector;
-    return this.stage.cameraAt(
-      [...this.target],
-      0,
-      STEP_BACK * Math.sqrt(4 * (poses.length - 1)),
-      width,
-      height,
-      this.covered(height),
-    );
+    const away = STEP_BACK * Math.sqrt(4 * (poses.length - 1));
+    return this.stage.cameraAt([...this.target], 0, away, width, height, this.covered(height));
   }
 
   /** Pixels at the lower end of the canvas that the text box takes, if it is there. */

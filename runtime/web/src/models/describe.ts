@@ -70,12 +70,8 @@ export class DescribeModel extends LanguageModel {
     const beams = this.setting("beams", settings.beams);
     const { vector } = await this.graphs.space!.run(this.motion(frames));
     const { known, manifest } = this;
-    const answers = known.answers(
-      vector!.data as Float32Array,
-      frames.length / this.fps,
-      pathOf(frames, manifest.motion),
-      beams,
-    );
+    const path = pathOf(frames, manifest.motion);
+    const answers = known.answers(vector!.data, frames.length / this.fps, path, beams);
     return answers.map(({ text, probability }) => {
       const logProbability = Math.log(Math.max(probability, DESCRIBE.LEAST_PROBABILITY));
       return { text, logProbability, score: probability, confident: probability >= known.settings.sure };
@@ -94,14 +90,8 @@ export class DescribeModel extends LanguageModel {
     const source = noise ?? new Pcg64(this.setting("seed", settings.seed ?? 0));
     const temperature = this.setting("temperature", settings.temperature);
     const contexts = await this.contexts(frames);
-    const beginnings = await consensus(
-      this.graphs.step!,
-      contexts,
-      limits,
-      this.setting("draws", draws),
-      temperature,
-      source,
-    );
+    const count = this.setting("draws", draws);
+    const beginnings = await consensus(this.graphs.step!, contexts, limits, count, temperature, source);
     return beginnings.slice(0, beams);
   }
 

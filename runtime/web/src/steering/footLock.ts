@@ -45,8 +45,7 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
   const { ground, rotations } = pose;
   const hips = product(about(Y, ground[2]), turnAt(rotations, 0));
   const place: Vector = [ground[0], pose.height, ground[1]];
-  const left = footingOf(lock, 0, pose, settings);
-  const right = footingOf(lock, 1, pose, settings);
+  const footings = [footingOf(lock, 0, pose, settings), footingOf(lock, 1, pose, settings)];
   for (let side = 0; side < 2; side++) {
     const foot = lock[side]!;
     // where the leg and the points of its sole are played
@@ -55,9 +54,13 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
     let lowest = 0;
     for (let at = 1; at < soles.length; at++) if (soles[at]![1] < soles[lowest]![1]) lowest = at;
     // the point that bears the foot: the ball, or heel or tip if they are lower
-    const bears = soles[lowest]![1] < soles[BALL]![1] - settings.bears ? lowest : BALL;
-    const moveX = foot.isNew ? 0 : soles[bears]![0] - foot.soles[3 * bears]!;
-    const moveZ = foot.isNew ? 0 : soles[bears]![2] - foot.soles[3 * bears + 2]!;
+    const low = soles[lowest]![1];
+    const bears = low < soles[BALL]![1] - settings.bears ? lowest : BALL;
+    const move: [number, number] = [0, 0];
+    if (!foot.isNew) {
+      move[0] = soles[bears]![0] - foot.soles[3 * bears]!;
+      move[1] = soles[bears]![2] - foot.soles[3 * bears + 2]!;
+    }
     for (let point = 0, at = 0; point < soles.length; point++)
       for (let axis = 0; axis < 3; axis++, at++) foot.soles[at] = soles[point]![axis]!;
     foot.isNew = false;
@@ -68,18 +71,8 @@ export function held(lock: Lock, pose: Played, settings: LockSettings, dt: numbe
     foot.released = isReleased(foot, contact, leg, settings);
     const rises =
       planned && foot.clock >= 0
-        ? byPlan(
-            foot,
-            side ? right : left,
-            side ? left : right,
-            moveX,
-            moveZ,
-            planned,
-            soles[lowest]![1],
-            settings,
-            dt,
-          )
-        : free(foot, contact, moveX, moveZ, isHigh, !!planned, soles[lowest]![1], settings, dt);
+        ? byPlan(foot, footings[side]!, footings[1 - side]!, move, planned, low, settings, dt)
+        : free(foot, contact, move, isHigh, !!planned, low, settings, dt);
     if (foot.shift[0] || foot.shift[1] || rises)
       reach(rotations, side, hips, leg, [foot.shift[0], rises, foot.shift[1]]);
   }
@@ -120,14 +113,13 @@ function byPlan(
   foot: Foot,
   footing: Footing,
   other: Footing,
-  x: number,
-  z: number,
+  move: [number, number],
   plan: Plan,
   lowest: number,
   settings: LockSettings,
   dt: number,
 ): number {
-  const step = stepped(foot, footing, other, [x, z], plan, dt);
+  const step = stepped(foot, footing, other, move, plan, dt);
   Object.assign(foot, step);
   const goal = liftOf(step, plan);
   rise(foot, goal, settings, dt);
@@ -140,8 +132,7 @@ function byPlan(
 function free(
   foot: Foot,
   contact: number,
-  x: number,
-  z: number,
+  [x, z]: [number, number],
   isHigh: boolean,
   planned: boolean,
   lowest: number,

@@ -50,13 +50,8 @@ export function looked(
   if (!look.point && shownBy(look.turn).every((angle) => Math.abs(angle) <= LOOK_LAYER.LEAST_TURN)) return;
   const seen = bonesOf(pose);
   const now = angles(rotated(seen.at(-1)!, Z));
-  look.turn = followed(
-    look.turn,
-    wanted(look, pose, seen, now, settings),
-    settings.leap,
-    settings.half_life,
-    seconds,
-  );
+  const goal = wanted(look, pose, seen, now, settings);
+  look.turn = followed(look.turn, goal, settings.leap, settings.half_life, seconds);
   let above: Quaternion = STILL;
   turned(seen, now[0], shownBy(look.turn)).forEach((bone, i) => {
     setTurn(pose.rotations, SHARES[i]![0], product(inverse(above), bone));
@@ -114,10 +109,7 @@ function turned(bones: Quaternion[], gaze: number, [left, up]: number[]): Quater
     const way = gaze + share * left!;
     const half = (share * up!) / 2;
     const sine = Math.sin(half);
-    const cosine = Math.cos(half);
-    return product(
-      [-Math.cos(way) * sine, 0, Math.sin(way) * sine, cosine],
-      product(about(Y, share * left!), bone),
-    );
+    const lifted: Quaternion = [-Math.cos(way) * sine, 0, Math.sin(way) * sine, Math.cos(half)];
+    return product(lifted, product(about(Y, share * left!), bone));
   });
 }

@@ -110,14 +110,9 @@ export class ControlModel extends Model {
         `characters must be a whole number from 1 to ${CONTROL.LARGEST_CROWD}, not ${characters}`,
       );
     }
-    const session = new ControlSession(
-      this,
-      this.abilities.number(gait),
-      characters,
-      holdFeet,
-      strict,
-      this.phases(characters, phases),
-    );
+    const number = this.abilities.number(gait);
+    const turns = this.phases(characters, phases);
+    const session = new ControlSession(this, number, characters, holdFeet, strict, turns);
     if (places !== undefined) session.put(places);
     return session;
   }

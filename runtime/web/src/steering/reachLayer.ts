@@ -147,12 +147,8 @@ const READY = SIDES.map((_, side): [Quaternion, Quaternion] => {
 function readied(side: number, along: Vector, down: Vector): TwoBones {
   const [upper, lower] = READY[side]!;
   const elbow = rotated(upper, along);
-  return new TwoBones(
-    [0, 0, 0],
-    elbow,
-    plus(elbow, rotated(lower, down)),
-    rotated(lower, times(Y, -out(side))),
-  );
+  const hand = plus(elbow, rotated(lower, down));
+  return new TwoBones([0, 0, 0], elbow, hand, rotated(lower, times(Y, -out(side))));
 }
 
 /** The place nearest to one, from the shoulder, that an arm of a length reaches, turned and stretched no farther than it can be. */

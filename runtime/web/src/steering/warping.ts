@@ -35,11 +35,7 @@ export function strided(rotations: Float64Array, stride: number): void {
   for (let side = 0; side < SIDES.length; side++) {
     const leg = legOf(rotations, side, hips, [0, 0, 0]);
     const [x, , z] = plus(leg.places[2]!, rotated(leg.turned[2]!, BALL));
-    const led: [number, number, number] = [
-      (x - LEG_OFFSETS[side]![0]![0]) * (stride - 1),
-      0,
-      (z - UNDER) * (stride - 1),
-    ];
-    reach(rotations, side, hips, leg, led);
+    const [hipX] = LEG_OFFSETS[side]![0]!;
+    reach(rotations, side, hips, leg, [(x - hipX) * (stride - 1), 0, (z - UNDER) * (stride - 1)]);
   }
 }

@@ -71,10 +71,8 @@ function bendFingers(
         dot(cross(before, bone), aside),
         dot(before, bone) - dot(before, aside) * dot(bone, aside),
       );
-      const turn = times(
-        aside,
-        Math.max(0, ((RETARGET.FINGER_BENDS[at]! * Math.PI) / 180) * SHARES[finger]![1] - now),
-      );
+      const wanted = ((RETARGET.FINGER_BENDS[at]! * Math.PI) / 180) * SHARES[finger]![1];
+      const turn = times(aside, Math.max(0, wanted - now));
       bent[joint] = product(bent[joint]!, ofVector(rotated(inverse(turns[joint]!), turn)));
     });
   }

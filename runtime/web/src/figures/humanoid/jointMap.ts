@@ -314,15 +314,9 @@ function checkedMap(skeleton: Skeleton, map: JointMap): JointMap {
     );
   const chains = [map.spine, [map.spine[0]!, ...map.neck]];
   for (const side of SIDES) {
-    for (const [first, parts] of [
-      [map.joints.hips!, LEG],
-      [map.spine[0]!, ARM],
-    ] as const) {
-      chains.push([
-        first,
-        ...parts.map((part) => map.joints[side + part]).filter((joint) => joint !== undefined),
-      ]);
-    }
+    const limb = (parts: string[]) =>
+      parts.map((part) => map.joints[side + part]).filter((joint) => joint !== undefined);
+    chains.push([map.joints.hips!, ...limb(LEG)], [map.spine[0]!, ...limb(ARM)]);
   }
   for (const chain of chains) {
     chain.slice(1).forEach((lower, at) => {

@@ -57,12 +57,14 @@ export function fit(skeleton: Skeleton, map: JointMap, world: World): Fitted {
     dot(rotated(turned[hips]!, axis), unit(measured.body.toLeft(world.places[at]!, "UpperLeg"))),
   );
   const apart = Math.acos(clamp(median(cosines), -1, 1)) / RADIANS;
-  if (apart <= 30) return measured;
+  if (apart <= 30) return { ...measured, pelvis: true };
   const note = `the legs' joints lie ${Math.round(apart)} degrees off the turn of ${skeleton.names[hips]}: the pelvis is turned as they lie`;
   return { ...measured, pelvis: false, notes: [...measured.notes, note] };
 }
 
-function fitted(body: Body, world: World): Fitted {
+type Measured = Omit<Fitted, "pelvis">;
+
+function fitted(body: Body, world: World): Measured {
   const { skeleton, map } = body;
   const { turns, places } = world;
   const leg = checkedLeg(body, places[0]!);
@@ -76,21 +78,13 @@ function fitted(body: Body, world: World): Fitted {
     const aligned = alignmentsOfPose(plain, turns[0]!, places[0]!, first);
     const rise = heightsOver(places[0]!, rotated(first, Y));
     const notes = ["the rest pose is not a standing body: the first frame's pose was used in its place"];
-    return {
-      body: plain,
-      aligned,
-      leg,
-      heights: heights(plain, leg, rise),
-      up: null,
-      confidence: 0.95,
-      notes,
-      pelvis: true,
-    };
+    const rises = heights(plain, leg, rise);
+    return { body: plain, aligned, leg, heights: rises, up: null, confidence: 0.95, notes };
   }
   return fittedInFrames(plain, world, leg, known, moving);
 }
 
-function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
+function fittedAtRest(body: Body, leg: number, stands: Quaternion): Measured {
   const { skeleton, map } = body;
   const points = Object.entries(map.points).map(([bone, at]): [string, Vector] => [bone, unit(at)]);
   const known =
@@ -100,19 +94,11 @@ function fittedAtRest(body: Body, leg: number, stands: Quaternion): Fitted {
   const aligned = alignmentsOfPose(plain, still, skeleton.rest, stands);
   const notes = known ? ["the rest pose is one that the convention knows, which was made up for"] : [];
   const up = rotated(stands, Y);
-  return {
-    body: plain,
-    aligned,
-    leg,
-    heights: heights(plain, leg, heightsOver(skeleton.rest, up)),
-    up,
-    confidence: 1,
-    notes,
-    pelvis: true,
-  };
+  const rises = heights(plain, leg, heightsOver(skeleton.rest, up));
+  return { body: plain, aligned, leg, heights: rises, up, confidence: 1, notes };
 }
 
-function fittedInFrames(body: Body, world: World, leg: number, known: boolean, moving: boolean): Fitted {
+function fittedInFrames(body: Body, world: World, leg: number, known: boolean, moving: boolean): Measured {
   const { turns, places } = world;
   if (!known) {
     if (places.length < 2)
@@ -132,16 +118,7 @@ function fittedInFrames(body: Body, world: World, leg: number, known: boolean, m
   const carrier = carrierOf(body.map, body.skeleton);
   aligned[carrier] = product(product(inverse(turns[0]![carrier]!), turns[0]![hips]!), aligned[hips]!);
   const confidence = guessed ? 0.7 : known ? 0.95 : 0.85;
-  return {
-    body,
-    aligned,
-    leg,
-    heights: heights(body, leg),
-    up: null,
-    confidence,
-    notes: [note],
-    pelvis: true,
-  };
+  return { body, aligned, leg, heights: heights(body, leg), up: null, confidence, notes: [note] };
 }
 
 /** Whether a pose is a T-pose: upright in its frame, and limbs within 16 degrees of the humanoid's. */
@@ -278,15 +255,13 @@ export function upright(
   if (!up) return { turn: STILL };
   const name = "xyz"[up.findIndex((part) => part !== 0)];
   const standing = places.filter((_, at) => dot(trunk[at]!, up) > MEASURE.ALONG);
-  return walksAcross(body, leg, up, standing)
-    ? {
-        turn: swing(up, Y),
-        note: `turned upright: the frames stand along ${name}, the rest pose along y`,
-      }
-    : {
-        turn: STILL,
-        note: `the body lies along ${name} in most frames: if it stands there, export the file with y up`,
-      };
+  if (walksAcross(body, leg, up, standing))
+    return {
+      turn: swing(up, Y),
+      note: `turned upright: the frames stand along ${name}, the rest pose along y`,
+    };
+  const note = `the body lies along ${name} in most frames: if it stands there, export the file with y up`;
+  return { turn: STILL, note };
 }
 
 /** The direction along x or z in which trunks and legs point in most frames; null where y is up. */
