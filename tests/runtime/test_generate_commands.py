@@ -117,6 +117,10 @@ def test_commands_may_be_misspelt_and_have_a_pace(model: CodesModel) -> None:
         assert model.quantities(text).amounts["pace"] == pace
 
 
+def test_a_turn_on_the_spot_is_the_command(model: CodesModel) -> None:
+    assert model.likeliest("a person turns around on the spot") == model.likeliest("turn around")
+
+
 def test_who_stands_still_after_a_walk_does_not_go_on(model: CodesModel) -> None:
     for seed in range(3):
         story = model.story(["walk", "stand still"], seed=seed)

@@ -160,7 +160,8 @@ class Quantities:
     beginnings."""
 
     spot: str = ""
-    """The sentence without the numbers, as words alone: a turn without a gait, which ``text`` makes walking."""
+    """The sentence without the numbers and "on the spot", as words alone: a turn without a gait, which ``text`` makes
+    walking."""
 
 
 def numerals(sentence: str) -> str:
@@ -193,7 +194,8 @@ def quantities_of(sentence: str) -> Quantities:
     if pace := PACE_PHRASES.search(text):
         amounts["pace"] = SLOWER if pace[1] else FASTER
     remaining = _plain(text, amounts) if phrases or "degrees" in amounts else sentence
-    spot = re.sub(r"\s+", " ", text).strip(" ,.")
+    without_place = re.sub(r"\b(?:on the spot|in place)\b", "", text)
+    spot = re.sub(r"\s+", " ", without_place).strip(" ,.")
     return Quantities(remaining, amounts, len(sides) != 1, _act_in(text), spot)
 
 
