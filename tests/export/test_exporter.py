@@ -4,6 +4,7 @@ import numpy as np
 import onnx
 import pytest
 import torch
+from test_real_graph_safety import info
 from torch import Tensor, nn
 
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
@@ -106,24 +107,13 @@ def test_a_stack_of_one_matrix_is_stored_as_a_matrix(half: bool) -> None:
 
 
 def test_the_bodies_of_loops_are_stripped(exported: bytes) -> None:
-    float32 = onnx.TensorProto.FLOAT
     helper = onnx.helper
-    body = helper.make_graph(
-        [helper.make_node("Add", ["state", "x"], ["sum"]), helper.make_node("Identity", ["sum"], ["y"])],
-        "body",
-        [helper.make_tensor_value_info(name, float32, [1]) for name in ("state", "x")],
-        [helper.make_tensor_value_info(name, float32, [1]) for name in ("sum", "y")],
-    )
+    steps = [helper.make_node("Add", ["state", "x"], ["sum"]), helper.make_node("Identity", ["sum"], ["y"])]
+    body = helper.make_graph(steps, "body", [info("state"), info("x")], [info("sum"), info("y")])
     body.node[0].metadata_props.add(key="pkg.torch.onnx.stack_trace", value='File "/home/me/net.py", line 1')
     scan = helper.make_node("Scan", ["start", "xs"], ["last", "ys"], num_scan_inputs=1, body=body)
-    inputs = [
-        helper.make_tensor_value_info("start", float32, [1]),
-        helper.make_tensor_value_info("xs", float32, [5, 1]),
-    ]
-    outputs = [
-        helper.make_tensor_value_info("last", float32, [1]),
-        helper.make_tensor_value_info("ys", float32, [5, 1]),
-    ]
+    inputs = [info("start"), info("xs", shape=(5, 1))]
+    outputs = [info("last"), info("ys", shape=(5, 1))]
     graph = helper.make_graph([scan], "graph", inputs, outputs)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=8)
     assert b".py" in model.SerializeToString()

@@ -6,14 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from codes_data import humanoid_contract
 
 from motet.bundle.bundle import Bundle
-from motet.figures.humanoid.bones import BONES, HUMANOID
 from motet.models.load import load, verify
 from motet.predict.fill import FillModel
-from motet.representation.contract import MotionContract
 from motet.representation.placed import PLACED_CHANNELS
-from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_export.bundles import export_run, parity_of
 from motet_export.parity import sides
 from motet_train.models.filler import Filler, FillerConfig
@@ -22,12 +20,7 @@ from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
 
-NAMES = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
-D = len(NAMES)
-AT_REST = np.array([0.0, 0.0, 0.0, 0.95, *(1.0, 0.0, 0.0, 0.0, 1.0, 0.0) * len(BONES)])
-CONTRACT = MotionContract(
-    "root_sixd", NAMES, (*ROOT_SIXD_UNITS, *("1",) * (D - 4)), 30.0, AT_REST, np.full(D, 0.2), HUMANOID
-)
+CONTRACT = humanoid_contract()
 
 
 def run() -> Run:
@@ -61,7 +54,6 @@ def test_the_bundle_computes_what_torch_does(bundle: Path) -> None:
 
 def test_the_golden_vectors_are_a_whole_gap(bundle: Path) -> None:
     opened = Bundle.open(bundle)
-    assert opened.manifest.golden is not None
     assert opened.manifest.golden.run == {"frames": 15}
     assert set(verify(opened).errors) == {"filler", "meaning", "run"}
     assert parity_of(run(), opened)["runs"]["error"] < 1e-5
@@ -69,7 +61,6 @@ def test_the_golden_vectors_are_a_whole_gap(bundle: Path) -> None:
 
 def test_frames_beyond_the_context_are_not_seen(bundle: Path) -> None:
     model = load(bundle)
-    assert isinstance(model, FillModel)
     past, after = sides(CONTRACT, np.random.default_rng(2), 20)
     one = model.frames_between(past, after, 12)
     again = model.frames_between(np.concatenate([past[:3] + 1, past]), after, 12)  # beyond what it sees

@@ -9,7 +9,6 @@ import torch
 from numpy.typing import NDArray
 from predict_manifest import predict_manifest
 
-from motet.bundle.manifest import Manifest
 from motet.models.load import load
 from motet.predict.model import PredictModel
 from motet_export.bundles import export_run
@@ -25,16 +24,11 @@ CHANNELS = 9
 @pytest.fixture(scope="module")
 def run() -> Run:
     torch.manual_seed(0)
+    bones = ((0, 1, 0), (0, 0.3, 0), (0.1, 0.2, 0))
+    figure = VectorFigure((-1, 0, 1), bones, (0, 1), (6, 7, 8), tuple(range(6)), partners=(0, 1, 2))
     config = FigurePredictorConfig(
         CHANNELS,
-        VectorFigure(
-            (-1, 0, 1),
-            ((0, 1, 0), (0, 0.3, 0), (0.1, 0.2, 0)),
-            (0, 1),
-            (6, 7, 8),
-            tuple(range(6)),
-            partners=(0, 1, 2),
-        ),
+        figure,
         frames=6,
         hidden=12,
         doubts=True,
@@ -43,7 +37,6 @@ def run() -> Run:
     with torch.no_grad():
         for parameter in net.parameters():
             parameter.add_(0.03 * torch.randn_like(parameter))
-    assert net.doubt is not None
     net.doubt.weight.uniform_(-0.5, 0.5)
     return Run({**predict_manifest("figure-trajectory", 3, 6), "config": asdict(config)}, net)
 
@@ -56,7 +49,7 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
             # bones that are aimed at points amplify rounding
             bound = {"encoder.one_step": 3e-4, "runs": 1e-4}.get(name, 1e-5)
             assert rung["error"] <= (rung["bound"] if name.endswith(".far") else bound), name
-    bundle, torch_model = load(tmp_path / "x.zip"), PredictModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    bundle, torch_model = load(tmp_path / "x.zip"), run.bundle_model()
     assert isinstance(bundle, PredictModel)
     seeds = 0.3 * np.random.default_rng(0).normal(size=(7, 10, CHANNELS))
     np.testing.assert_allclose(bundle.next_frames(seeds, 15), torch_model.next_frames(seeds, 15), rtol=1e-4, atol=1e-4)
@@ -73,7 +66,6 @@ def test_the_bundle_predicts_what_torch_predicts(run: Run, tmp_path: Path) -> No
 @torch.no_grad()
 def net_errors(run: Run, seeds: NDArray[np.float64]) -> NDArray[np.float32]:
     """What torch expects, in metres."""
-    assert isinstance(run.model, FigurePredictor)
     frames = torch.from_numpy(seeds.astype(np.float32))
     found: NDArray[np.float32] = run.model.expected_error(frames, *run.model.with_disagreement(frames)).numpy()
     return found

@@ -22,10 +22,8 @@ from motet_train.models.kinematics import figure_of
 from motet_train.runs import Run
 
 pytestmark = pytest.mark.slow  # torch's exporter
-CHANNELS = (
-    *ROOT_BLOCK,
-    *(f"{joint}.r{axis}" for joint in ("spine", "leftUpperLeg", "rightUpperLeg") for axis in "xyz"),
-)
+JOINTS = ("spine", "leftUpperLeg", "rightUpperLeg")
+CHANNELS = (*ROOT_BLOCK, *(f"{joint}.r{axis}" for joint in JOINTS for axis in "xyz"))
 D = len(CHANNELS)
 CONTRACT = MotionContract(
     "root_angles", CHANNELS, (*ROOT_BLOCK_UNITS, *("deg",) * 9), 10.0, np.zeros(D), np.full(D, 10.0), HUMANOID
@@ -39,13 +37,9 @@ def run() -> Run:
     frames = torch.from_numpy(walks(CONTRACT, np.random.default_rng(0), 50, 20))
     net.see_by(net.statistics(frames, torch.full((50,), 20)))
     named = {"name": "small-search", "verb": "search", "model": "joint-embedding", "loop": "nearest"}
-    known = {
-        "text": NEW_MODEL_RULES.to_json(),
-        "vocabulary": WORDS,
-        "config": asdict(net.config),
-        "defaults": {"count": 5},
-    }
-    return Run({**named, **known, "motion": CONTRACT.to_json(), "licence": {}, "training": {}}, net)
+    words = {"text": NEW_MODEL_RULES.to_json(), "vocabulary": WORDS}
+    known = {"config": asdict(net.config), "defaults": {"count": 5}, "motion": CONTRACT.to_json()}
+    return Run({**named, **words, **known, "licence": {}, "training": {}}, net)
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +64,6 @@ def test_a_row_of_a_padded_batch_gets_what_it_gets_alone(bundle: Path, role: str
 def test_a_loaded_bundle_gives_what_the_net_gives(bundle: Path) -> None:
     model, net = load(bundle), run().model.eval()
     assert isinstance(model, SearchModel)
-    assert isinstance(net, JointEmbedding)
     frames = walks(CONTRACT, np.random.default_rng(1), 3, 25)
     found = model.embed([model.contract.features(row) for row in frames])
     with torch.no_grad():

@@ -6,14 +6,13 @@ import numpy as np
 import onnx
 import pytest
 import torch
-from click.testing import CliRunner
 from onnx import TensorProto, helper, numpy_helper
 from onnx.reference import ReferenceEvaluator
 from torch import nn
+from trainings import done
 
 from motet.bundle.bundle import Bundle, list_bundles
 from motet.bundle.graph import GraphSpec, OnnxGraph, TensorSpec
-from motet.cli import main
 from motet.models.load import load_as, verify
 from motet.papers.tdbn_control import TdbnModel
 from motet_export.exporter import export_graph, halved, quantised, round_weights
@@ -55,8 +54,7 @@ def test_weights_that_would_lose_something_stay_as_they_are() -> None:
 @pytest.mark.slow
 def test_a_bundle_is_written_anew_with_half_the_weights(tmp_path: Path) -> None:
     exact = list_bundles()["tdbn"]
-    done = CliRunner().invoke(main, ["export", str(exact), "--half", "-o", str(tmp_path / "half.zip")])
-    assert done.exit_code == 0, done.output
+    done("export", exact, "--half", "-o", tmp_path / "half.zip")
     assert (tmp_path / "half.zip").stat().st_size < 0.62 * exact.stat().st_size
     small = load_as(TdbnModel, tmp_path / "half.zip")
     assert small.manifest.parity["weights"] == "float16"
@@ -130,8 +128,7 @@ def test_vectors_rows_of_zeros_and_masks_stay(step: tuple[Bundle, bytes]) -> Non
 
 def test_a_bundle_is_written_anew_with_the_same_weights(tmp_path: Path) -> None:
     before = Bundle.open("tdbn")
-    done = CliRunner().invoke(main, ["export", str(before.path), "--golden", "-o", str(tmp_path / "again.zip")])
-    assert done.exit_code == 0, done.output
+    done("export", before.path, "--golden", "-o", tmp_path / "again.zip")
     again = Bundle.open(tmp_path / "again.zip")
     assert max(verify(again).errors.values()) == 0
     assert {**again.manifest.source, "files": 0} == {**before.manifest.source, "files": 0}

@@ -1,6 +1,5 @@
 """From a folder of recordings to bundles of every verb, by two commands; stopped once on the way, with tiny nets."""
 
-import json
 import logging
 import shutil
 from collections.abc import Iterator
@@ -8,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
+from trainings import done, log_of, refused, same
+from trainings import motet as command
 
 import motet
-from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet_train import run_folder
 from motet_train.data.cmu_trials import CMU_FOLDER
@@ -106,10 +106,6 @@ class Stopped(Shown):
     place: Path
 
 
-def command(*given: object) -> Result:
-    return CliRunner().invoke(main, [str(one) for one in given])
-
-
 @pytest.fixture(scope="module")
 def outputs(recordings: Path) -> Iterator[list[Result]]:
     """What the same command says when it is stopped, when it is started again, and when all is done."""
@@ -134,7 +130,7 @@ def test_what_was_stopped_resumes_and_what_is_done_is_passed_over(outputs: list[
     for name in ("control", "search", "predict", "actions"):
         assert f"{name} is trained already" in resumed.output
     assert all(f"{name} is trained already" in again.output for name in STAGES)
-    steps = [json.loads(line)["step"] for line in (runs / "codec" / "log.jsonl").read_text().splitlines()]
+    steps = [line["step"] for line in log_of(runs / "codec")]
     assert (steps, "step 1 of 2" in stopped.output, "step 2 of 2" in resumed.output) == ([1, 2], True, True)
     assert f"next: motet export {runs} -o bundles" in resumed.output
 
@@ -142,18 +138,13 @@ def test_what_was_stopped_resumes_and_what_is_done_is_passed_over(outputs: list[
 def test_one_store_serves_every_stage_and_a_stage_alone_too(outputs: list[Result], recordings: Path) -> None:
     runs = recordings.parent / "runs"
     parts = {path.parent.name: Store.open(path.parent) for path in runs.glob("store/*/store.json")}
-    assert {name: store.fps for name, store in parts.items()} == {
-        "root_angles": 10,
-        "root_sixd": 30,
-        "root_vectors": 30,
-    }
+    rates = {"root_angles": 10, "root_sixd": 30, "root_vectors": 30}
+    assert {name: store.fps for name, store in parts.items()} == rates
     assert all(len(store.records) == 10 for store in parts.values())
     config = ("--config", runs / "fill" / "run.toml", "-o", runs.parent / "again")
-    alone = command("train", "fill", *config)  # its settings repeat it, from the same store
-    assert alone.exit_code == 0, alone.output
+    alone = done("train", "fill", *config)  # its settings repeat it, from the same store
     assert f"next: motet evaluate {runs.parent / 'again'}; motet export" in alone.output
-    one, other = (Run.load(place).model.state_dict() for place in (runs / "fill", runs.parent / "again"))
-    assert all(value.equal(other[key]) for key, value in one.items())
+    assert same(*(Run.load(place).model.state_dict() for place in (runs / "fill", runs.parent / "again")))
     assert Run.load(runs / "control").manifest["config"]["gaits"] == ["walk", "run"]
 
 
@@ -167,9 +158,8 @@ def test_a_stage_that_fails_is_named_and_stops_no_other(recordings: Path, tmp_pa
     with pytest.raises(RunError, match="of 2 trainings 1 failed"):
         plan.train()
     assert [path.name for path in sorted((tmp_path / "runs").iterdir())] == ["search", "store"]
-    only = command("train", "all", tmp_path / "runs" / "store", "-o", tmp_path / "runs", "--only", "control")
-    assert only.exit_code == 2
-    assert "control failed: no recording of 1.5 s shows the gait 'walk': name gaits in a column gait" in only.output
+    reason = "control failed: no recording of 1.5 s shows the gait 'walk': name gaits in a column gait"
+    refused(reason, "train", "all", tmp_path / "runs" / "store", "-o", tmp_path / "runs", "--only", "control")
 
 
 def test_settings_of_unknown_stages_are_refused(tmp_path: Path) -> None:
@@ -183,8 +173,7 @@ def test_settings_of_unknown_stages_are_refused(tmp_path: Path) -> None:
 def test_bundles_are_exported_and_run(outputs: list[Result], recordings: Path) -> None:
     bundles, chosen = recordings.parent / "bundles", recordings.parent / "chosen"
     shutil.copytree(recordings.parent / "runs", chosen, ignore=shutil.ignore_patterns("store"))
-    exported = command("export", chosen, "-o", bundles)
-    assert exported.exit_code == 0, exported.output
+    done("export", chosen, "-o", bundles)
     verbs = sorted([*PLANNED_VERBS, "known"])  # which answers for describe
     assert sorted(path.stem for path in bundles.iterdir()) == verbs
     models = {verb: motet.load(bundles / f"{verb}.zip") for verb in verbs}

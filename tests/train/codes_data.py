@@ -1,18 +1,19 @@
 """Walkers in ``root_sixd``, each shown as one of a few actions, and tiny nets for their codes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from click.testing import CliRunner
+import numpy as np
 from language_data import walker
 from stores import prepare
 
-from motet.cli import main
+from motet.figures.humanoid.bones import BONES, HUMANOID
+from motet.representation.contract import MotionContract
+from motet.representation.root_sixd import ROOT_SIXD, ROOT_SIXD_UNITS, SIXD_KINDS
 from motet_train.data.corpus import Record
 from motet_train.data.preparation import Preparation
 from motet_train.data.store import Store
-from motet_train.runs import Run
 
 ACTIONS = {
     "walk": ("a person walks", "someone walks along", "walking"),
@@ -74,6 +75,14 @@ hidden = 5
 """
 
 
+def humanoid_contract(root: Sequence[float] = (0.0, 0.0, 0.0, 0.95), std: float = 0.2) -> MotionContract:
+    """Of frames in ``root_sixd`` whose mean has all joints at rest; root: the mean of the root's four numbers."""
+    channels = (*ROOT_SIXD, *(f"{bone}.{kind}" for bone in BONES for kind in SIXD_KINDS))
+    units = (*ROOT_SIXD_UNITS, *("1",) * (len(channels) - len(ROOT_SIXD)))
+    mean = np.array([*root, *(1.0, 0.0, 0.0, 0.0, 1.0, 0.0) * len(BONES)])
+    return MotionContract("root_sixd", channels, units, 30.0, mean, np.full(len(channels), std), HUMANOID)
+
+
 def records(count: int = 20) -> Iterator[Record]:
     """Motions of 1.3 to 1.8 seconds, each with an action, its sentences, and one for measuring."""
     for i in range(count):
@@ -90,13 +99,3 @@ def small_store(folder: Path, count: int = 20) -> Store:
 def without_actions(store: Store) -> Store:
     """The same, nobody having said what is shown."""
     return replace(store, records=tuple(replace(entry, action="") for entry in store.records))
-
-
-def trained(command: str, settings: str, store: Path, out: Path, *options: object) -> Run:
-    """The run of a training command with settings, as users start it."""
-    config = out.parent / f"{command}.toml"
-    config.write_text(settings)
-    given = ("train", command, "--data", store, "--out", out, "--config", config, *options)
-    result = CliRunner().invoke(main, [str(option) for option in given])
-    assert result.exit_code == 0, result.output or result.exception
-    return Run.load(out)

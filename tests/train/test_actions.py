@@ -1,17 +1,16 @@
 """Which action a sentence asks for: the net, the actions of a store, vectors of words, and the training."""
 
-import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
-from codes_data import ACTIONS, TEXT, small_store, trained
+from codes_data import ACTIONS, TEXT, small_store
 from torch import nn
+from trainings import check_resumed, log_of, refused, trained
 
-from motet.cli import main
 from motet.text.vocabulary import SPECIALS
 from motet_train.data.errors import DataError
 from motet_train.data.sentences import actions_of, mirror_text
@@ -92,11 +91,9 @@ def test_vectors_are_read_as_glove_and_word2vec_write_them(tmp_path: Path) -> No
     file = tmp_path / "vectors.txt"
     for text in (VECTORS, f"4 4\n{VECTORS}", VECTORS.replace("\n", " \r\n"), f"{VECTORS}walks 9 9 9 9\n. . x x x x\n"):
         file.write_text(text)
-        found = read_word_vectors(file, ("walks", "turns", "hops"))
-        assert {word: vector.tolist() for word, vector in found.items()} == {
-            "walks": [1, 0, 2, 0.5],
-            "turns": [0, 0, 0.1, 3],
-        }
+        vectors = read_word_vectors(file, ("walks", "turns", "hops"))
+        numbers = {word: vector.tolist() for word, vector in vectors.items()}
+        assert numbers == {"walks": [1, 0, 2, 0.5], "turns": [0, 0, 0.1, 3]}
 
 
 @pytest.mark.parametrize(
@@ -226,7 +223,6 @@ def test_sentences_without_a_known_word_are_not_measured_by(store: Store) -> Non
     actions = actions_of(store, found.parts.train)
     more = replace(actions, unseen=(("pirouettes", "a person pirouettes"), *actions.unseen[1:]))
     known = ActionSentences(more, found.vocabulary)
-    assert known.unseen is not None
     asked = {s for said in more.unseen for s in said}
     assert len(known.unseen[1]) == len(known.alike) == len(asked) - 1
 
@@ -238,7 +234,7 @@ def test_a_run_learns_with_vectors_and_without(folder: Path, tmp_path: Path) -> 
     runs = [trained("actions", longer, folder, tmp_path / "plain")]
     runs.append(trained("actions", longer, folder, tmp_path / "run", *given))
     for run, name in zip(runs, ("plain", "run"), strict=True):
-        log = [json.loads(line) for line in (tmp_path / name / "log.jsonl").read_text().splitlines()]
+        log = log_of(tmp_path / name)
         assert [line["step"] for line in log] == [40, 80, 120]
         assert log[-1]["loss"] < log[1]["loss"] < log[0]["loss"]
         assert all(0 <= line["understood"] <= 1 and line["validation"] > 0 for line in log)
@@ -260,25 +256,19 @@ def test_a_run_learns_with_vectors_and_without(folder: Path, tmp_path: Path) -> 
 
 
 def test_resumed_training_is_the_same_to_the_bit(folder: Path, tmp_path: Path) -> None:
-    whole = trained("actions", TEXT, folder, tmp_path / "whole").model.state_dict()
-    trained("actions", TEXT, folder, tmp_path / "parts", "--steps", 3)
-    parts = trained("actions", TEXT, folder, tmp_path / "parts", "--resume").model.state_dict()
-    assert all(torch.equal(whole[name], parts[name]) for name in whole)
+    check_resumed(partial(trained, "actions", TEXT, folder), tmp_path, "--steps", 3)
 
 
 def test_a_net_of_actions_is_no_bundle_by_itself(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("motet_export")
     trained("actions", TEXT, folder, tmp_path / "run")
-    result = CliRunner().invoke(main, ["export", str(tmp_path / "run"), "--out", str(tmp_path / "run.zip")])
-    assert result.exit_code != 0
-    assert "manifest, verb: 'actions' is unknown" in result.output
+    refused("manifest, verb: 'actions' is unknown", "export", tmp_path / "run", "--out", tmp_path / "run.zip")
     assert not (tmp_path / "run.zip").exists()
 
 
 def test_a_wrong_file_of_vectors_leaves_no_run(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "vectors.txt").write_text("walks 1 2\nruns 1 x\n")
-    given = ["train", "actions", "--data", folder, "--word-vectors", tmp_path / "vectors.txt"]
-    result = CliRunner().invoke(main, [str(option) for option in (*given, "--out", tmp_path / "run")])
-    assert result.exit_code != 0
-    assert "vectors.txt, line 2: could not convert string to float: 'x'" in result.output
+    command = ("train", "actions", "--data", folder, "--word-vectors", tmp_path / "vectors.txt")
+    reason = "vectors.txt, line 2: could not convert string to float: 'x'"
+    refused(reason, *command, "--out", tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -1,18 +1,16 @@
 """The model that writes codes: its steps and its loss, the windows that it learns from, and its training."""
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
-from codes_data import CODEC, CODES, TEXT, small_store, trained
+from codes_data import CODEC, CODES, TEXT, small_store
 from torch import Tensor, nn
+from trainings import check_resumed, log_of, rebuilt, refused, trained
 
 import motet
-from motet.cli import main
 from motet.generate.memory import MemorySettings
 from motet_train.data.sentences import actions_of
 from motet_train.data.sixd_windows import CodedMotion, CodeWindows, memory_of
@@ -22,7 +20,7 @@ from motet_train.models.codec import CodecConfig, MotionCodec
 from motet_train.models.kinematics import Tree
 from motet_train.models.motion_codes import CodeModelConfig, MotionCodes, MotionCodesConfig
 from motet_train.recipes.codes import alike_distance, coded, codes_of
-from motet_train.runs import MODELS, Run
+from motet_train.runs import Run
 
 TREE = Tree((-1, 0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), (0, 1))
 MOVES, END, NOBODY, NOTHING = 6, 6, 4, 7
@@ -158,10 +156,7 @@ def test_the_distance_of_alike_steps_is_that_of_the_codec() -> None:
 
 def test_a_model_comes_back_from_its_configuration() -> None:
     model, (codes, *rest) = net(), window()
-    again = MODELS["motion-codes"](json.loads(json.dumps(asdict(model.config))))
-    again.load_state_dict(model.state_dict())
-    assert isinstance(again, MotionCodes)
-    assert torch.equal(again.eval().losses(codes, *rest), model.losses(codes, *rest))
+    assert torch.equal(rebuilt("motion-codes", model).losses(codes, *rest), model.losses(codes, *rest))
 
 
 def test_of_the_codec_nothing_is_trained() -> None:
@@ -265,7 +260,7 @@ def parts(folder: Path) -> tuple[object, ...]:
 def test_a_run_learns_and_says_how_its_parts_were_made(folder: Path, parts: tuple[object, ...], tmp_path: Path) -> None:
     longer = CODES.replace("steps = 6\nevery = 3", "steps = 60\nevery = 20")
     run = trained("codes", longer, folder / "store", tmp_path / "run", *parts)
-    log = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text().splitlines()]
+    log = log_of(tmp_path / "run")
     assert [line["step"] for line in log] == [20, 40, 60]
     assert log[-1]["loss"] < log[0]["loss"]
     manifest, model = run.manifest, run.model
@@ -286,13 +281,10 @@ def test_a_run_learns_and_says_how_its_parts_were_made(folder: Path, parts: tupl
 
 
 def test_resumed_training_is_the_same_to_the_bit(folder: Path, parts: tuple[object, ...], tmp_path: Path) -> None:
-    given = ("codes", CODES, folder / "store")
-    whole = trained(*given, tmp_path / "whole", *parts).model.state_dict()
-    trained(*given, tmp_path / "parts", *parts, "--steps", 3)
-    again = trained(*given, tmp_path / "parts", *parts, "--resume").model.state_dict()
-    assert all(torch.equal(whole[name], again[name]) for name in whole)
-    other = trained(*given, tmp_path / "other", *parts, "--seed", 1).model.state_dict()
-    assert any(not torch.equal(whole[name], other[name]) for name in whole)
+    def train(out: Path, *options: object) -> Run:
+        return trained("codes", CODES, folder / "store", out, *parts, *options)
+
+    whole = check_resumed(train, tmp_path, "--steps", 3).model.state_dict()
     # codec and net of actions are what they were
     for name, prefix in (("codec", "codec"), ("actions", "text")):
         kept = torch.load(folder / name / "weights.pt", weights_only=True)
@@ -317,8 +309,7 @@ def test_a_writer_is_trained_further_with_its_parts(folder: Path, parts: tuple[o
     larger = tmp_path / "larger.toml"
     larger.write_text(CODES.replace("width = 12", "width = 24"))
     command = ("train", "codes", "--data", folder / "store", "--config", larger, *of_first, "--out", tmp_path / "out")
-    result = CliRunner().invoke(main, [str(option) for option in command])
-    assert "first is a writer of other sizes" in result.output
+    refused("first is a writer of other sizes", *command)
 
 
 def test_codes_need_a_codec_and_a_net_of_the_same_actions(
@@ -327,16 +318,12 @@ def test_codes_need_a_codec_and_a_net_of_the_same_actions(
     small_store(tmp_path, 10)
     trained("actions", TEXT, tmp_path / "store", tmp_path / "other")
     codec, net, other = folder / "codec", folder / "actions", tmp_path / "other"
-    for given, said in (
-        ((net, net), "codes need the run of a codec (motet train codec), not of motion-actions"),
-        ((codec, codec), "codes need the run of a net of actions (motet train actions), not of motion-codec"),
-        (
-            (codec, other),
-            "the net of actions other was trained on other sentences: train it on the same data and split",
-        ),
+    other_sentences = "the net of actions other was trained on other sentences: train it on the same data and split"
+    for first, second, reason in (
+        (net, net, "codes need the run of a codec (motet train codec), not of motion-actions"),
+        (codec, codec, "codes need the run of a net of actions (motet train actions), not of motion-codec"),
+        (codec, other, other_sentences),
     ):
-        command = ["train", "codes", "--data", folder / "store", "--codec", given[0], "--actions", given[1]]
-        result = CliRunner().invoke(main, [str(option) for option in (*command, "--out", tmp_path / "run")])
-        assert result.exit_code != 0
-        assert said in result.output
+        runs = ("--codec", first, "--actions", second)
+        refused(reason, "train", "codes", "--data", folder / "store", *runs, "--out", tmp_path / "run")
         assert not (tmp_path / "run").exists()

@@ -9,9 +9,10 @@ import pytest
 import torch
 from language_data import small_store
 from test_trainer import EPOCHS, adversarial, regression
+from trainings import log_of
 
 from motet_train import distributed
-from motet_train.trainer import LOG, train
+from motet_train.trainer import train
 
 SMALL = """
 epochs = 3
@@ -37,8 +38,7 @@ def nearly_same(one: Path, other: Path) -> None:
     states = [torch.load(path / "weights.pt", weights_only=True) for path in (one, other)]
     for name, value in states[0].items():
         torch.testing.assert_close(value, states[1][name], atol=2e-5, rtol=1e-4)
-    logs = [[json.loads(line) for line in (path / LOG).read_text().splitlines()] for path in (one, other)]
-    for first, second in zip(*logs, strict=True):
+    for first, second in zip(log_of(one), log_of(other), strict=True):
         assert first["loss"] == pytest.approx(second["loss"], rel=1e-4)
         assert first.get("validation", 0) == pytest.approx(second.get("validation", 0), rel=1e-4)
 
@@ -63,13 +63,8 @@ def test_the_command_gives_the_same_run(verb: str, more: str, parts: int, tmp_pa
 def both(folder: Path) -> None:
     """Train what has no command of its own here, without dropout."""
     for name, learner in (("average", regression(EPOCHS)), ("adversary", adversarial())):
-        for module in learner.net.modules():
-            if isinstance(module, torch.nn.Dropout):
-                module.p = 0.0
-        if name == "adversary":
-            judge = learner.parts["judge"]
-            assert isinstance(judge, torch.nn.Module)
-            for module in judge.modules():
+        for net in (learner.net, learner.parts.get("judge", learner.net)):
+            for module in net.modules():
                 if isinstance(module, torch.nn.Dropout):
                     module.p = 0.0
         if distributed.rank() == 0:

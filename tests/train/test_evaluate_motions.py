@@ -8,23 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
 from language_data import SKELETON
 from language_models import (
     CHANNELS,
     FPS,
     FRAMES,
     KINDS,
+    STORE,
     UNITS,
     FakeDescribe,
     FakeGenerate,
     manifest,
     moving,
-    small_store,
     told,
 )
+from trainings import done, refused
 
-from motet.cli import main
 from motet.motion.motion import Motion
 from motet.text.vocabulary import NEW_MODEL_RULES, Vocabulary
 from motet_train.data.store import FRAMES_FILE, INDEX, Store
@@ -47,8 +46,6 @@ from motet_train.evaluate.language.motions import energy, feet_of, last_energy, 
 from motet_train.evaluate.language.split_store import SplitStore, split_as
 from motet_train.evaluate.tables import aligned, json_ready, reached, report_table
 from motet_train.runs import MODELS, Run
-
-STORE = small_store()
 
 
 @pytest.fixture(scope="module")
@@ -230,27 +227,23 @@ def runs(tmp_path: Path) -> Path:
     vocabulary = list(Vocabulary.of(s for entry in STORE.records for s in entry.sentences).words)
     shared = {"channels": len(CHANNELS), "words": len(vocabulary), **SIZES}
     more = {"motion": STORE.contract(range(20)).to_json(), "text": NEW_MODEL_RULES.to_json(), "vocabulary": vocabulary}
-    for name, verb, by in (("describe", "describe", "trial"), ("unseen", "describe", "subject")):
-        net = MODELS["motion-to-language"](shared | {"dropout": 0.4, "gates": "sigmoid"})
-        settings = {
-            "model": "motion-to-language",
-            "loop": "beam",
-            "config": shared | {"dropout": 0.4, "gates": "sigmoid"},
-        }
-        defaults = {"defaults": {"beams": 5, "max_words": 5}}
-        _save(Run(manifest(STORE, verb, by) | more | settings | defaults, net), tmp_path / name)
-    net = MODELS["language-to-motion"](shared | {"components": 2})
-    settings = {"model": "language-to-motion", "loop": "mixture", "config": shared | {"components": 2}}
-    defaults = {"defaults": {"hypotheses": 2, "candidates": 2, "temperature": 1.0, "max_seconds": 1}}
-    _save(Run(manifest(STORE, "generate") | more | settings | defaults, net), tmp_path / "generate")
+    config = shared | {"dropout": 0.4, "gates": "sigmoid"}
+    settings = {"model": "motion-to-language", "loop": "beam", "config": config}
+    settings["defaults"] = {"beams": 5, "max_words": 5}
+    for name, by in (("describe", "trial"), ("unseen", "subject")):
+        net = MODELS["motion-to-language"](config)
+        _save(Run(manifest(STORE, "describe", by) | more | settings, net), tmp_path / name)
+    config = shared | {"components": 2}
+    settings = {"model": "language-to-motion", "loop": "mixture", "config": config}
+    settings["defaults"] = {"hypotheses": 2, "candidates": 2, "temperature": 1.0, "max_seconds": 1}
+    net = MODELS["language-to-motion"](config)
+    _save(Run(manifest(STORE, "generate") | more | settings, net), tmp_path / "generate")
     return tmp_path
 
 
 def test_evaluate_of_runs(runs: Path) -> None:
     names = [str(runs / name) for name in ("describe", "unseen", "generate")]
-    result = CliRunner().invoke(main, ["evaluate", *names, "--data", str(runs / "store"), "--json", "--save"])
-    assert result.exit_code == 0, result.output
-    reports = json.loads(result.output)
+    reports = json.loads(done("evaluate", *names, "--data", runs / "store", "--json", "--save").output)
     for name in names:
         assert json.loads((Path(name) / "run.json").read_text())["quality"] == reports[name]
     assert reports[names[0]]["people_unseen"] == reports[names[1]]
@@ -258,12 +251,8 @@ def test_evaluate_of_runs(runs: Path) -> None:
 
 
 def test_evaluate_draws_the_papers_figures(runs: Path) -> None:
-    names = [str(runs / name) for name in ("describe", "generate")]
-    result = CliRunner().invoke(
-        main, ["evaluate", *names, "--data", str(runs / "store"), "--plots", str(runs / "plots")]
-    )
-    assert result.exit_code == 0, result.output
-    assert "relative_test.1" in result.output
+    command = ("evaluate", runs / "describe", runs / "generate", "--data", runs / "store", "--plots", runs / "plots")
+    assert "relative_test.1" in done(*command).output
     drawn = sorted(path.relative_to(runs / "plots").as_posix() for path in (runs / "plots").glob("*/*.png"))
     assert [path.split("-contexts")[0] for path in drawn] == [
         "describe/figure-10-walking.png",
@@ -282,18 +271,11 @@ def test_evaluate_refuses_before_it_measures(runs: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr("motet_train.cli.suites.describe_report", measured)
     (runs / "file").touch()
-    arguments = ["evaluate", str(runs / "describe"), "--data", str(runs / "store")]
-    result = CliRunner().invoke(main, [*arguments, "--plots", str(runs / "file" / "plots")])
-    assert (result.exit_code, "cannot write plots to" in result.stderr) == (2, True)
-    result = CliRunner().invoke(main, [*arguments, "describe", "--save"])
-    assert (result.exit_code, "describe is a bundle" in result.stderr) == (2, True)
-
-
-def test_evaluate_says_what_it_lacks(runs: Path) -> None:
-    result = CliRunner().invoke(main, ["evaluate", str(runs / "describe")])
-    assert (result.exit_code, "need --data" in result.output) == (2, True)
-    result = CliRunner().invoke(main, ["evaluate", str(runs / "describe"), "tdbn"])
-    assert (result.exit_code, "separately" in result.output) == (2, True)
+    command = ("evaluate", runs / "describe")
+    refused("cannot write plots to", *command, "--data", runs / "store", "--plots", runs / "file" / "plots")
+    refused("describe is a bundle", *command, "--data", runs / "store", "describe", "--save")
+    refused("need --data", *command)
+    refused("separately", *command, "tdbn")
 
 
 def _save(run: Run, folder: Path) -> None:

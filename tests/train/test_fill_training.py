@@ -1,23 +1,21 @@
 """Training to fill gaps: windows, the net, the recipe, and how a model is measured."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
-from codes_data import PREPARATION, trained
+from codes_data import PREPARATION
 from codes_data import small_store as own_figures
 from language_data import small_store as angles_store
 from stores import prepare
+from trainings import done, refused, trained
 
 from motet.bundle.manifest import Manifest
-from motet.cli import main
 from motet.figures.humanoid.bones import BONES, HUMANOID
-from motet.models.load import build
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.predict.fill import FillModel
@@ -171,7 +169,7 @@ def test_training_gives_a_model_that_fills(run: Run) -> None:
     assert (run.manifest["verb"], run.manifest["loop"]) == ("fill", "between")
     assert run.manifest["defaults"] == {"context": 5, "least": 2, "longest": 30}
     assert run.manifest["training"]["steps"] == 6
-    model = build(Manifest.from_json(run.manifest), run.torch_graphs())
+    model = run.bundle_model()
     assert isinstance(model, FillModel)
     motion = dancer(1, 30)
     found = model.fill(motion, [(0.5, 0.6)])
@@ -179,21 +177,17 @@ def test_training_gives_a_model_that_fills(run: Run) -> None:
     assert np.flatnonzero(changed).tolist() == [15, 16, 17]
 
 
-def test_a_store_of_another_kind_is_refused(tmp_path: Path) -> None:
-    angles_store(tmp_path)
-    given = ("train", "fill", "--data", tmp_path / "store", "--out", tmp_path / "run")
-    result = CliRunner().invoke(main, [str(one) for one in given])
-    assert result.exit_code == 2
-    assert "gaps are filled in root_sixd (motet prepare --for codes), not root_angles" in result.output
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (angles_store, "gaps are filled in root_sixd (motet prepare --for codes), not root_angles"),
+        (own_figures, "gaps are filled on the humanoid (motet prepare --for codes --figure humanoid)"),
+    ],
+)
+def test_a_store_of_another_kind_is_refused(make: Callable[[Path], Store], reason: str, tmp_path: Path) -> None:
+    make(tmp_path)
+    refused(reason, "train", "fill", "--data", tmp_path / "store", "--out", tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-def test_a_store_of_another_figure_is_refused(tmp_path: Path) -> None:
-    own_figures(tmp_path)
-    given = ("train", "fill", "--data", tmp_path / "store", "--out", tmp_path / "run")
-    result = CliRunner().invoke(main, [str(one) for one in given])
-    assert result.exit_code == 2
-    assert "gaps are filled on the humanoid (motet prepare --for codes --figure humanoid)" in result.output
 
 
 class Knowing(FillModel):
@@ -231,8 +225,6 @@ def test_a_model_that_knows_has_no_error_and_standing_has_that_of_the_way(run: R
 def test_evaluate_prints_the_table(run: Run, store: Store, tmp_path: Path) -> None:
     run.save(tmp_path)
     prepare(records(frames=75), tmp_path / "store", PREPARATION)
-    told = CliRunner().invoke(main, ["evaluate", str(tmp_path), "--data", str(tmp_path / "store"), "--json"])
-    assert told.exit_code == 0, told.output
-    assert set(json.loads(told.stdout)) == {"gap_0.5", "gap_1", "gap_2"}
-    refused = CliRunner().invoke(main, ["evaluate", str(tmp_path)])
-    assert (refused.exit_code, "need --data" in refused.output) == (2, True)
+    result = done("evaluate", tmp_path, "--data", tmp_path / "store", "--json")
+    assert set(json.loads(result.stdout)) == {"gap_0.5", "gap_1", "gap_2"}
+    refused("need --data", "evaluate", tmp_path)

@@ -1,18 +1,17 @@
 """Motions and sentences in one space: what the net sees, its loss, its graphs, and its training."""
 
-import json
-from dataclasses import asdict, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner
 from language_data import records
 from stores import prepare
 from torch import Tensor
+from trainings import check_resumed, log_of, rebuilt, trained
 
-from motet.cli import main
 from motet.figures.humanoid.bones import HUMANOID
 from motet.motion.kinematics import positions
 from motet.representation.contract import MotionContract
@@ -31,7 +30,6 @@ from motet_train.models.joint_embedding import (
 )
 from motet_train.models.kinematics import EulerPlaces, Figure, figure_of
 from motet_train.recipes.language import divided
-from motet_train.runs import MODELS, Run
 
 JOINTS = [joint.name for joint in HUMANOID.joints[1:] if not joint.name.endswith("_end")]
 CHANNELS = (*ROOT_BLOCK, *(f"{name}.r{axis}" for name in JOINTS for axis in "xyz"))
@@ -131,11 +129,9 @@ def test_what_shows_the_same_is_what_is_linked_by_sentences() -> None:
 
 
 def test_a_net_comes_back_from_its_configuration() -> None:
-    model = net()
-    again = MODELS["joint-embedding"](json.loads(json.dumps(asdict(model.config))))
-    again.load_state_dict(model.state_dict())
-    assert isinstance(again, JointEmbedding)
-    assert torch.equal(again.eval().embed_motion(FRAMES, LENGTHS), model.eval().embed_motion(FRAMES, LENGTHS))
+    model = net().eval()
+    again = rebuilt("joint-embedding", model)
+    assert torch.equal(again.embed_motion(FRAMES, LENGTHS), model.embed_motion(FRAMES, LENGTHS))
 
 
 @pytest.fixture(scope="module")
@@ -165,33 +161,20 @@ def test_views_are_parts_of_the_motions_with_their_sentences(store: Path) -> Non
         assert other[other != 0].tolist() in said
 
 
-def trained(store: Path, out: Path, *options: object) -> Run:
-    config = out.parent / "small.toml"
-    config.write_text(
-        "[training]\nepochs = 4\nevery = 2\nbatch = 8\nwarm_up = 0\ncosine = false\n[model]\nvector = 5\n"
-    )
-    given = ("train", "search", "--data", store, "--out", out, "--config", config, *options)
-    result = CliRunner().invoke(main, [str(option) for option in given])
-    assert result.exit_code == 0, result.output
-    return Run.load(out)
+SETTINGS = "[training]\nepochs = 4\nevery = 2\nbatch = 8\nwarm_up = 0\ncosine = false\n[model]\nvector = 5\n"
 
 
 def test_a_run_says_what_it_is_and_learns(store: Path, tmp_path: Path) -> None:
-    manifest = trained(store, tmp_path / "run").manifest
+    manifest = trained("search", SETTINGS, store, tmp_path / "run").manifest
     assert (manifest["verb"], manifest["model"], manifest["loop"]) == ("search", "joint-embedding", "nearest")
-    lines = [json.loads(line) for line in (tmp_path / "run" / "log.jsonl").read_text().splitlines()]
+    lines = log_of(tmp_path / "run")
     assert [line["epoch"] for line in lines] == [2, 4]
     assert lines[1]["loss"] < lines[0]["loss"]
     assert all(0 <= line["first_5"] <= 1 for line in lines)
 
 
 def test_resumed_training_is_the_same_to_the_bit(store: Path, tmp_path: Path) -> None:
-    whole = trained(store, tmp_path / "whole").model.state_dict()
-    trained(store, tmp_path / "parts", "--epochs", 2)
-    parts = trained(store, tmp_path / "parts", "--resume").model.state_dict()
-    assert all(torch.equal(whole[name], parts[name]) for name in whole)
-    other = trained(store, tmp_path / "other", "--seed", 1).model.state_dict()
-    assert any(not torch.equal(whole[name], other[name]) for name in whole)
+    check_resumed(partial(trained, "search", SETTINGS, store), tmp_path, "--epochs", 2)
 
 
 def test_vectors_of_many_views_are_of_length_1() -> None:

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 from language_data import small_store
+from trainings import done, refused
 
-from motet.cli import main
 from motet.models.describe import DescribeModel
 from motet.models.nearest_neighbour import NOTHING
 from motet.text.vocabulary import NEW_MODEL_RULES
@@ -18,10 +17,6 @@ from motet_train.recipes.known import KEYED
 from motet_train.runs import Run
 
 NETS = "[model]\nencoder_units = [4, 4]\ndecoder_units = [6, 6]\nembedding = 4\n"
-
-
-def motet(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +30,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (found / "store" / INDEX).write_text(json.dumps(index))
     (found / "small.toml").write_text(NETS)
     given = ("--data", found / "store", "--split", "trial", "--epochs", 1, "--config", found / "small.toml")
-    for arguments in (
-        ("describe", *given, "--out", found / "writer"),
-        ("known", *given[:4], "--writer", found / "writer", "--out", found / "known"),
-    ):
-        result = motet("train", *arguments)
-        assert result.exit_code == 0, result.output
+    done("train", "describe", *given, "--out", found / "writer")
+    done("train", "known", *given[:4], "--writer", found / "writer", "--out", found / "known")
     return found
 
 
@@ -48,7 +39,6 @@ def test_known_motions_answer_for_clips_kept_back(folder: Path) -> None:
     run, store = Run.load(folder / "known"), Store.open(folder / "store")
     model = run.bundle_model()
     assert isinstance(model, DescribeModel)
-    assert model.known is not None
     split = run.manifest["training"]["split"]
     test = [i for i, entry in enumerate(store.records) if entry.name in split["test"]]
     said = {NEW_MODEL_RULES.normalise(s) for entry in store.records for s in entry.sentences}
@@ -67,21 +57,18 @@ def test_known_motions_answer_for_clips_kept_back(folder: Path) -> None:
 
 def test_descriptions_are_judged_by_action(folder: Path) -> None:
     for clips, count in (("test", 4), ("0*,1*", 20)):
-        result = motet("evaluate", folder / "known", "--actions", clips, "--data", folder / "store", "--json")
-        assert result.exit_code == 0, result.output
+        result = done("evaluate", folder / "known", "--actions", clips, "--data", folder / "store", "--json")
         report = json.loads(result.stdout)
         assert report["actions"]["of"] == count
         assert 0 <= report["actions"]["right"] <= report["actions"]["reachable"] <= 1
         assert 0 <= report["lookup"]["right"] <= 1
         assert 0 <= report["actions"]["calibration_by_chance"] <= 1
-    assert "--actions takes describe models" in motet("evaluate", "search", "--actions", "test").output
+    refused("--actions takes describe models", "evaluate", "search", "--actions", "test")
 
 
 def test_known_motions_need_a_net_that_writes(folder: Path) -> None:
-    given = ("train", "known", "--data", folder / "store", "--out", folder / "none")
-    result = motet(*given, "--writer", folder / "known")
-    assert result.exit_code != 0
-    assert "known motions need a run of describe (--writer)" in result.output
+    command = ("train", "known", "--data", folder / "store", "--out", folder / "none", "--writer", folder / "known")
+    refused("known motions need a run of describe (--writer)", *command)
     assert not (folder / "none" / "run.json").exists()
 
 

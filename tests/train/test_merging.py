@@ -4,10 +4,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 from kit_zip import write_kit_zip
+from trainings import done, refused
 
-from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
@@ -15,8 +14,7 @@ from motet_train.data.merging import merge_stores
 
 
 def prepared(corpus: Path, out: Path, *options: str) -> Path:
-    result = CliRunner().invoke(main, ["prepare", str(corpus), "--out", str(out), *options])
-    assert result.exit_code == 0, result.output
+    done("prepare", corpus, "--out", out, *options)
     return out
 
 
@@ -42,8 +40,7 @@ def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_merged_shards_are_the_bytes_of_the_whole(clips: Path, tmp_path: Path) -> None:
     whole = prepared(clips, tmp_path / "whole", "--for", "all")
     parts = shards(clips, tmp_path / "parts", 3, "--for", "all")
-    result = CliRunner().invoke(main, ["prepare", *map(str, reversed(parts)), "--out", str(tmp_path / "merged")])
-    assert result.exit_code == 0, result.output
+    done("prepare", *reversed(parts), "--out", tmp_path / "merged")
     files = sorted(path.relative_to(whole) for path in whole.rglob("*.*"))
     assert len(files) == 6
     for file in files:
@@ -72,6 +69,5 @@ def test_what_does_not_fit_is_refused_and_nothing_written(clips: Path, tmp_path:
         with pytest.raises(DataError, match=said):
             merge_stores(places, tmp_path / "merged")
         assert not (tmp_path / "merged").exists()
-    result = CliRunner().invoke(main, ["prepare", str(clips), "--out", str(tmp_path / "x"), "--shard", "1/9"])
-    assert result.exit_code == 2
-    assert "5 motion files are too few for 9 shards" in result.stderr
+    command = ("prepare", clips, "--out", tmp_path / "x", "--shard", "1/9")
+    refused("5 motion files are too few for 9 shards", *command)

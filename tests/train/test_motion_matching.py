@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from stores import prepare
+from trainings import rebuilt
 
 import motet
 from motet import to_humanoid
@@ -35,12 +36,10 @@ from motet_train.models.kinematics import tree_of
 from motet_train.models.matching import Matching, MatchingConfig
 from motet_train.recipes.matching import take
 
-CLIPS = CMU_FOLDER
-
 
 @pytest.fixture(scope="module")
 def walk() -> Motion:
-    return to_humanoid(read_motion(CLIPS / "39_14.amc")).motion.resample(30.0)
+    return to_humanoid(read_motion(CMU_FOLDER / "39_14.amc")).motion.resample(30.0)
 
 
 @pytest.fixture(scope="module")
@@ -212,12 +211,7 @@ def test_a_tick_plays_the_row_and_follows_the_springs(net: Matching, matcher: Ma
 
 
 def test_a_net_is_built_from_its_manifest(net: Matching) -> None:
-    import json
-    from dataclasses import asdict
-
-    again = Matching.from_config(json.loads(json.dumps(asdict(net.config))))
-    assert again.config == net.config
-    again.load_state_dict(net.state_dict())
+    assert rebuilt("motion-matching", net).config == net.config
 
 
 def test_the_table_of_gaits() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from test_predict_model import stirred
 
 from motet.representation.contract import Z_LIMIT, MotionContract
 from motet_train.models.motion_to_language import MotionToLanguage, MotionToLanguageConfig
@@ -39,11 +40,7 @@ def test_a_finger_that_never_moved_in_training_changes_no_description(finger: fl
 
 
 def test_a_predictor_sees_no_further_either() -> None:
-    torch.manual_seed(0)
-    net = Predictor(PredictorConfig(4, (0, 1, 2, 3))).eval()
-    with torch.no_grad():
-        for parameter in net.parameters():
-            parameter.add_(0.05 * torch.randn_like(parameter))
+    net = stirred(Predictor, PredictorConfig(4, (0, 1, 2, 3)))
     frames = torch.randn(2, 10, 4)
     frames[0, 4, 1] = 2 * Z_LIMIT
     further = frames.clone()

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 import torch
-from click.testing import CliRunner, Result
 from test_predict_data import write_files
+from trainings import done, refused
 
-from motet.cli import main
 from motet_train.run_folder import has_bfloat16
 from motet_train.settings import read_settings
 
@@ -39,24 +38,18 @@ def test_what_torch_does_not_answer_is_a_no(monkeypatch: pytest.MonkeyPatch) -> 
     assert not has_bfloat16("cpu")
 
 
-def trained(out: Path, files: Path, *more: object) -> Result:
-    small = ("--steps", 2, "--config", files.parent / "small.toml")
-    given = ("train", "predict", "--data", files, *small, "--precision", "bfloat16", "--out", out, *more)
-    return CliRunner().invoke(main, [str(argument) for argument in given])
-
-
 @pytest.mark.parametrize(("has", "used"), [(False, "float32"), (True, "bfloat16")])
 def test_a_run_says_and_records_what_it_is_trained_in(
     has: bool, used: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files, out = write_files(tmp_path / "files", actions=("walking",)), tmp_path / "run"
     (tmp_path / "small.toml").write_text("[model]\nhidden = 8\n")
+    settings = ("--steps", 2, "--config", tmp_path / "small.toml", "--precision", "bfloat16")
+    command = ("train", "predict", "--data", files, *settings, "--out", out)
     monkeypatch.setattr("motet_train.run_folder.has_bfloat16", lambda device: has)
-    result = trained(out, files)
-    assert result.exit_code == 0, result.output
+    result = done(*command)
     assert result.output.count("cpu has no products in bfloat16: training in float32") == (not has)
     assert json.loads((out / "run.json").read_text())["training"]["recipe"]["precision"] == used
     assert read_settings(out / "run.toml")[1]["training"]["precision"] == used
     monkeypatch.setattr("motet_train.run_folder.has_bfloat16", lambda device: not has)
-    other = trained(out, files, "--resume")
-    assert (other.exit_code, "other settings, so cannot be resumed: precision" in other.output) == (2, True)
+    refused("other settings, so cannot be resumed: precision", *command, "--resume")

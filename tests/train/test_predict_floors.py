@@ -11,7 +11,6 @@ from test_predict_data import write_files
 
 from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import read_motion
-from motet.motion.kinematics import chained, local_rotations, local_translations, positions
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
@@ -106,13 +105,6 @@ def test_decays_do_not_look_at_test_files(tmp_path: Path) -> None:
 def walk_windows(frames: int = 5) -> Windows:
     walk = read_motion(CMU_FOLDER / "39_14.amc").scaled(0.01)[::4]
     return Windows.of([walk[start : start + frames + 10] for start in (0, 20, 40)], frames)
-
-
-def test_places_in_the_world_are_those_of_the_motion() -> None:
-    walk = read_motion(CMU_FOLDER / "39_14.amc")[:9]
-    assert walk.skeleton is not None
-    _, found = chained(walk.skeleton, local_rotations(walk), local_translations(walk))
-    np.testing.assert_array_equal(found, positions(walk))
 
 
 def test_floors_of_recorded_motions_go_on_as_their_names_say() -> None:

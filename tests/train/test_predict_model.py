@@ -3,17 +3,16 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner, Result
 from test_predict_data import write_files
+from torch import nn
+from trainings import done, log_of, refused
 
-from motet.bundle.manifest import Manifest
-from motet.cli import main
 from motet.formats import read_motion, write_motion
-from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.predict.floors import ZERO
 from motet_train.models.figure_predictor import (
@@ -37,19 +36,14 @@ ACTIONS = tuple(CMU_LAYOUT.test)
 def job(folder: Path, seed: int = 0, **training: float) -> Job:
     """A job by the recipe with other settings, in a new folder."""
     folder.mkdir()
-    assert DEFAULT.training is not None
     recipe = replace(DEFAULT, training=replace(DEFAULT.training, **training))  # type: ignore[arg-type]
     return Job(recipe, About("small", "motet train predict", seed), folder)
 
 
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
-def stirred(config: PredictorConfig) -> Predictor:
+def stirred(kind: type[nn.Module], config: object) -> Any:
     """A net whose weights are not those it starts with."""
     torch.manual_seed(0)
-    net = Predictor(config)
+    net = kind(config)
     with torch.no_grad():
         for parameter in net.parameters():
             parameter.add_(0.05 * torch.randn_like(parameter))
@@ -68,7 +62,7 @@ def test_before_training_it_predicts_zero_velocity() -> None:
 
 
 def test_held_and_constant_channels_stay_and_the_place_does_not_matter() -> None:
-    net, frames = stirred(PredictorConfig(9, (0, 1, 2, 5, 6, 7), held=3)), torch.randn(4, 10, 9)
+    net, frames = stirred(Predictor, PredictorConfig(9, (0, 1, 2, 5, 6, 7), held=3)), torch.randn(4, 10, 9)
     found = net(frames)
     torch.testing.assert_close(found[..., [0, 1, 2, 3, 4, 8]], frames[:, -1:, [0, 1, 2, 3, 4, 8]].expand(-1, 25, -1))
     assert (found[..., 5:8] - frames[:, -1:, 5:8]).abs().min() > 0
@@ -77,7 +71,8 @@ def test_held_and_constant_channels_stay_and_the_place_does_not_matter() -> None
 
 
 def test_the_mirror_image_of_a_seed_gives_the_mirror_image() -> None:
-    net = stirred(PredictorConfig(6, tuple(range(6)), mirrored=(3, 4, 5, 0, 1, 2), signs=(1.0, -1.0, -1.0) * 2))
+    config = PredictorConfig(6, tuple(range(6)), mirrored=(3, 4, 5, 0, 1, 2), signs=(1.0, -1.0, -1.0) * 2)
+    net = stirred(Predictor, config)
     frames = torch.randn(4, 10, 6)
     torch.testing.assert_close(net(net.mirror(frames)), net.mirror(net(frames)))
 
@@ -88,34 +83,29 @@ def test_training_learns_and_repeats_itself(tmp_path: Path) -> None:
     runs = [train_predict(material, job(tmp_path / name, 3, **settings)) for name in ("a", "b")]
     for one, other in zip(runs[0].model.parameters(), runs[1].model.parameters(), strict=True):
         torch.testing.assert_close(one, other, atol=0, rtol=0)
-    loaded = Run.load(tmp_path / "a")
-    models = {"a": PredictModel(Manifest.from_json(loaded.manifest), loaded.torch_graphs())}
+    models = {"a": Run.load(tmp_path / "a").bundle_model()}
     corpus = read_expmap(tmp_path / "data")
     errors = protocol_results(models, corpus).errors
     assert complete(corpus) == ["running", "walking"]  # none is, so all count
     for action in ("walking", "running"):
         assert errors["a"][FEW, action].mean() < 0.9 * errors[ZERO][FEW, action].mean()
-    lines = [json.loads(line) for line in (tmp_path / "a" / "log.jsonl").read_text().splitlines()]
-    assert [line["step"] for line in lines] == [60]
+    assert [line["step"] for line in log_of(tmp_path / "a")] == [60]
 
 
 def test_train_and_evaluate_from_the_command_line(tmp_path: Path) -> None:
     data, out = write_files(tmp_path / "data"), tmp_path / "run"
-    split = run("train", "predict", "--data", data, "--out", out, "--split", "trial")
-    assert "has its own test files" in split.stderr
-    trained = run("train", "predict", "--data", data, "--out", out, "--steps", 3, "--seed", 1)
-    assert trained.exit_code == 0, trained.output
+    refused("has its own test files", "train", "predict", "--data", data, "--out", out, "--split", "trial")
+    trained = done("train", "predict", "--data", data, "--out", out, "--steps", 3, "--seed", 1)
     lacking = [line for line in trained.stderr.splitlines() if "lacks" in line]
     assert len(lacking) == 11  # a line for each of ten files, and how many more there are
     assert lacking[0].endswith("lacks train/basketball/basketball_1.txt")
     assert lacking[-1].endswith("lacks 32 files more")
-    shown = run("evaluate", out, "--data", data, "--plots", tmp_path / "plots")
-    assert shown.exit_code == 0, shown.output
+    shown = done("evaluate", out, "--data", data, "--plots", tmp_path / "plots")
     assert "true 33 67 133 167 233 417" in " ".join(shown.stdout.split())
     assert "label them 80 160 320 400 560 1000" in " ".join(shown.stdout.split())
-    assert f"published: {'ConvSeq2Seq (Li 2018)'}" in shown.stdout
+    assert "published: ConvSeq2Seq (Li 2018)" in shown.stdout
     assert (tmp_path / "plots" / "predict-error.png").stat().st_size > 1000
-    found = json.loads(run("evaluate", out, "--data", data, "--json", "--save").stdout)
+    found = json.loads(done("evaluate", out, "--data", data, "--json", "--save").stdout)
     floors = {"zero_velocity", "constant_velocity", "damped_velocity"}
     assert set(found) == {"windows_8", "windows_256", "rotation", *floors}
     assert list(found["windows_8"]["walking"]) == [f"frame_{n}" for n in (1, 3, 7, 9, 13, 24)]
@@ -135,27 +125,23 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
     walk = read_motion(CMU_FOLDER / "39_14.amc").scaled(0.01)
     for n in range(10):
         write_motion(data / file.format(n), walk[10 * n : 10 * n + 160])
-    given = ("--data", data, *unit)
-    refused = run("train", "predict", *given, *options, "-o", out)
-    assert (refused.exit_code, "train with --preset files" in refused.stderr) == (2, True), refused.output
-    settings = ("--preset", "files", "--steps", 3, "--data-licence", "free")
-    trained = run("train", "predict", *given, *options, "-o", out, *settings)
-    assert trained.exit_code == 0, trained.output
+    command = ("train", "predict", "--data", data, *unit, *options, "-o", out)
+    refused("train with --preset files", *command)
+    done(*command, "--preset", "files", "--steps", 3, "--data-licence", "free")
     manifest = Run.load(out).manifest
     assert (manifest["licence"]["data"], len(manifest["training"]["data"]["test"])) == ("free", 1)
     recipe = manifest["training"]["recipe"]
     assert (recipe["warp"], recipe["reverse"], recipe["mirror"]) == (0.0, 0.0, 0.5)
     net = Run.load(out).model
     assert isinstance(net, FigurePredictor)
-    assert net.doubt is not None
     assert (net.doubt.bias != 0).all()
-    model = PredictModel(Manifest.from_json(manifest), Run.load(out).torch_graphs())
+    model = Run.load(out).bundle_model()
     expected = model.expected_errors([walk, walk[:200]])
     assert expected.shape == (2, 25)
     assert (expected > 0).all()
     np.testing.assert_allclose(expected[1], model.expected_errors(walk[:200]), rtol=1e-3)
     store = tmp_path / "run-store"
-    found = json.loads(run("evaluate", out, "--data", data, "--json", "--plots", tmp_path / "plots").stdout)
+    found = json.loads(done("evaluate", out, "--data", data, "--json", "--plots", tmp_path / "plots").stdout)
     still = found["zero_velocity"]["place_cm"]
     assert 60 < still["frame_24"] < 130  # a walk at 1.4 m/s, after .83 s
     assert still["frame_1"] < still["frame_24"]
@@ -165,7 +151,7 @@ def test_motion_files_are_trained_on_and_measured_in_centimetres(
     assert found["kinds"]["everything else"]["place_cm"] == found["place_cm"]  # nothing is said of these files
     names = sorted(path.name for path in (tmp_path / "plots").iterdir())
     assert names == sorted(["predict-distance.png", f"predict-{manifest['training']['data']['test'][0]}.png"])
-    shown = run("evaluate", out, "--data", store).stdout
+    shown = done("evaluate", out, "--data", store).stdout
     assert "milliseconds 67 133 267 333 467 833" in " ".join(shown.split())
 
 
@@ -198,8 +184,7 @@ def test_bad_input_is_refused(tmp_path: Path, arguments: list[str], said: str) -
     places["empty"].mkdir()
     write_files(places["data"])
     train_predict(expmap_material(read_expmap(places["data"])), job(places["run"], steps=1))
-    result = run(*(argument.format(**places) for argument in arguments))
-    assert (result.exit_code, said in result.stderr) == (2, True), result.output
+    refused(said, *(argument.format(**places) for argument in arguments))
     assert not places["out"].exists()
 
 
@@ -248,16 +233,6 @@ SIGNS = torch.tensor((1.0, -1.0, -1.0, 1.0, 1.0, -1.0) + (1.0, -1.0, -1.0) * 2)
 """What mirrors its frames."""
 
 
-def stirred_figure() -> FigurePredictor:
-    """A net of a small figure whose weights are not those it starts with."""
-    torch.manual_seed(0)
-    net = FigurePredictor(SIDES)
-    with torch.no_grad():
-        for parameter in net.parameters():
-            parameter.add_(0.05 * torch.randn_like(parameter))
-    return net.eval()
-
-
 def test_before_training_a_figure_stands_still() -> None:
     frames = torch.randn(3, 10, 12)
     after = FigurePredictor(SIDES).eval()(frames)
@@ -266,7 +241,7 @@ def test_before_training_a_figure_stands_still() -> None:
 
 
 def test_a_figures_mirror_image_goes_on_as_its_mirror_image() -> None:
-    net = stirred_figure()
+    net = stirred(FigurePredictor, SIDES)
     frames = 0.3 * torch.randn(4, 10, 12)
     mirrored = net(frames[..., MIRRORED] * SIGNS)
     torch.testing.assert_close(mirrored, net(frames)[..., MIRRORED] * SIGNS, atol=1e-4, rtol=1e-4)

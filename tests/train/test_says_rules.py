@@ -12,6 +12,7 @@ from motet.figures.humanoid.bones import HUMANOID
 from motet.figures.humanoid.retarget import to_humanoid
 from motet.formats import read_motion
 from motet.motion.mirroring import mirror
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, RULE_BY_NAME, actions, holds
 from motet_train.evaluate.text_adherence.track import RATE, Track, calm, longest, spells, swings, track_of
@@ -230,8 +231,8 @@ def test_a_track_is_of_the_humanoid() -> None:
 
 @pytest.fixture(scope="module")
 def recorded() -> dict[str, Track]:
-    folder = Path(__file__).parents[2] / "train/motet_train/data/cmu"
-    motions = {name: to_humanoid(read_motion(folder / f"{name}.amc")).motion for name in ("39_14", "09_07", "02_06")}
+    names = ("39_14", "09_07", "02_06")
+    motions = {name: to_humanoid(read_motion(CMU_FOLDER / f"{name}.amc")).motion for name in names}
     found = {name: track_of(motion) for name, motion in motions.items()}
     return found | {f"{name} mirrored": track_of(mirror(motion)) for name, motion in motions.items()}
 
@@ -258,7 +259,7 @@ def test_mirrored_trials_do_the_same_on_the_other_side(recorded: dict[str, Track
 
 
 def test_a_motion_is_seen_the_same_at_any_frame_rate() -> None:
-    motion = read_motion(Path(__file__).parents[2] / "train/motet_train/data/cmu/39_14.amc")
+    motion = read_motion(CMU_FOLDER / "39_14.amc")
     whole, slower = track_of(motion), track_of(motion.resample(30))
     assert motion.fps == 120
     assert len(whole) == len(slower)

@@ -4,15 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from language_models import WholeMotions
 from numpy.typing import NDArray
 from scipy.linalg import sqrtm
-from test_says_table import CMU, LEFT, LYING, STILL, ZOMBIE, Half, gliding, only
+from test_says_table import LEFT, LYING, STILL, ZOMBIE, Half, gliding, only
 
 import motet
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion.motion import Motion
-from motet.search.model import IndexSettings
+from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.text_adherence import table
 from motet_train.evaluate.text_adherence.prompts import EVERYDAY_PROMPTS, Trial
 from motet_train.evaluate.text_adherence.table import (
@@ -35,16 +36,10 @@ TRIALS = (
 )
 
 
-class Known:
+class Known(WholeMotions):
     """A space of three directions: whoever lies, whoever stands, and anything else that is asked for."""
 
     sizes = {"E": 3}  # noqa: RUF012
-
-    def settings(self, kind: type[IndexSettings]) -> IndexSettings:
-        return kind()
-
-    def windows(self, motion: Motion, longest: float) -> list[tuple[float, Motion]]:
-        return [(0.0, motion)]
 
     def embed(self, motions: Sequence[Motion]) -> NDArray[np.float32]:
         return np.eye(3, dtype=np.float32)[[int(np.ptp(motion.values[0, 3:6]) < 1) for motion in motions]]
@@ -137,7 +132,7 @@ def test_who_does_what_is_asked_is_found_and_near(monkeypatch: pytest.MonkeyPatc
 
 
 def test_what_is_too_short_has_no_vector() -> None:
-    model, walk = motet.load("search"), read_motion(CMU / "39_14.amc")
+    model, walk = motet.load("search"), read_motion(CMU_FOLDER / "39_14.amc")
     found = embedded(model, [walk[:100], walk[:30]])
     np.testing.assert_allclose(found[0], model.embed(walk[:100]), atol=1e-6)
     assert np.isnan(found[1]).all()

@@ -7,16 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from says_figures import HIPS, led, shifted, standing, stepping, times, walking
+from trainings import done, refused
 
 import motet
 import motet.keyed
-from motet.cli import main
 from motet.errors import TextError, TextWarning
 from motet.figures.humanoid.bones import HUMANOID
 from motet.figures.humanoid.retarget import on_humanoid
-from motet.generate.model import CodesModel
 from motet.motion.motion import Motion
 from motet.representation.root_block import to_root_block
 from motet_train.data.cmu_trials import CMU_FOLDER
@@ -46,9 +44,6 @@ from motet_train.evaluate.text_adherence.table import (
     spread,
 )
 from motet_train.evaluate.text_adherence.track import RATE, Track, track_of
-
-CMU = Path(__file__).parents[2] / "train/motet_train/data/cmu"
-
 
 STILL, LYING, LEFT, ZOMBIE = (
     "a person just stands there",
@@ -223,7 +218,7 @@ def test_poses_differ_by_what_a_figure_does_alone() -> None:
 @pytest.fixture
 def corpus(tmp_path: Path) -> Path:
     """The three trials that motet carries, with sentences."""
-    for file in CMU.iterdir():
+    for file in CMU_FOLDER.iterdir():
         if file.suffix in (".amc", ".asf"):
             (tmp_path / file.name).symlink_to(file)
     rows = ["clip\tsentence", "39_14\tshe walks", "09_07\tsomebody runs", "02_06\tsomeone picks something up"]
@@ -233,11 +228,8 @@ def corpus(tmp_path: Path) -> Path:
 
 def test_trials_of_a_folder(corpus: Path) -> None:
     found = {trial.name: trial for trial in read_trials(corpus)}
-    assert {name: trial.action for name, trial in found.items()} == {
-        "02_06": "bend over, scoop up, rise, lift arm",
-        "09_07": "run",
-        "39_14": "walk",
-    }
+    actions = {name: trial.action for name, trial in found.items()}
+    assert actions == {"02_06": "bend over, scoop up, rise, lift arm", "09_07": "run", "39_14": "walk"}
     assert found["09_07"].sentences == ("somebody runs",)
     assert np.median(found["09_07"].track.pace) > 3
 
@@ -245,8 +237,7 @@ def test_trials_of_a_folder(corpus: Path) -> None:
 def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = "a person runs straight forward"
     monkeypatch.setattr(table, "EVERYDAY_PROMPTS", only(run))
-    result = CliRunner().invoke(main, ["evaluate", "language-to-motion", "--says", "--data", str(corpus), "--json"])
-    assert result.exit_code == 0, result.output
+    result = done("evaluate", "language-to-motion", "--says", "--data", corpus, "--json")
     report = json.loads(result.stdout)
     assert report["prompt"] == report["prompt_real"] == report["prompt_lookup"] == {run: 1.0}
     assert report["says"] == {"all": 1.0, "locomotion": 1.0, "rest": None, "known": 1.0}
@@ -256,15 +247,11 @@ def test_the_command_asks_a_bundle(corpus: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_command_says_what_does_not_go_together(tmp_path: Path) -> None:
-    for arguments, said in (
-        (["language-to-motion", "--save"], "drop --save"),
-        (["describe"], "not describe"),
-        (["language-to-motion", "--search", "describe"], "need one for 'search'"),
-        (["language-to-motion", "--data", str(tmp_path)], "no motion files"),
-    ):
-        result = CliRunner().invoke(main, ["evaluate", "--says", *arguments])
-        assert result.exit_code != 0
-        assert said in str(result.output) + str(result.exception)
+    command = ("evaluate", "--says")
+    refused("drop --save", *command, "language-to-motion", "--save")
+    refused("not describe", *command, "describe")
+    refused("need one for 'search'", *command, "language-to-motion", "--search", "describe")
+    refused("no motion files", *command, "language-to-motion", "--data", tmp_path)
 
 
 class Walks:
@@ -299,7 +286,6 @@ def test_prompts_are_drawn_that_are_done_and_those_passed_over_are_counted(tmp_p
 
 def test_what_no_recording_shows_is_said_to_be_outside() -> None:
     model = motet.load("generate")
-    assert isinstance(model, CodesModel)
     keyed = {act.says[0] for act in motet.keyed.ours().values()}
     others = []
     for sentence in OUTSIDE:

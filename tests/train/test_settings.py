@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
-from click.testing import CliRunner, Result
 from language_data import small_store
 from test_predict_data import write_files
+from trainings import done, motet, refused, same
 
-from motet.cli import main
 from motet.formats import read_motion, write_motion
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
@@ -23,11 +21,6 @@ from motet_train.recipes import codec, codes, language, predict
 from motet_train.runs import Run
 from motet_train.settings import SettingsError, changed, read_settings, to_toml
 
-
-def motet(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 RECIPES = [
     *language.RECIPES.values(),
     *predict.RECIPES.values(),
@@ -36,9 +29,10 @@ RECIPES = [
     *CONTROL.values(),
     *(recipe for presets in SYSTEMS.values() for recipe in presets.values()),
 ]
+recipes = pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.model)
 
 
-@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.model)
+@recipes
 def test_what_is_written_reads_back_as_the_same_recipe(recipe, tmp_path: Path) -> None:
     options = {"name": 'a "b" \\ é 🙂', "seed": 3, "no": None, "data": Path("some/where"), "all-files": False}
     path = tmp_path / "run.toml"
@@ -50,7 +44,7 @@ def test_what_is_written_reads_back_as_the_same_recipe(recipe, tmp_path: Path) -
     assert changed(plain, tables, {}) == recipe
 
 
-@pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.model)
+@recipes
 def test_a_setting_is_of_the_training_or_of_the_visits(recipe) -> None:
     """An option changes every field of its name, and the manifest has one value for each."""
     parts = [{field.name for field in fields(part)} for part in (recipe.training, recipe.visits) if part is not None]
@@ -127,16 +121,13 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[object, ..
 def test_the_file_of_a_run_repeats_it(model: str, data: dict[str, tuple[object, ...]], tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL[model])
     command = ("train", model, "--out")
-    first = motet(*command, tmp_path / "a", *data[model], "--config", tmp_path / "small.toml", "--licence", "CC0-1.0")
-    assert first.exit_code == 0, first.output
-    again = motet(*command, tmp_path / "b", "--config", tmp_path / "a" / "run.toml")
-    assert again.exit_code == 0, again.output
-    one, other = (Run.load(tmp_path / name) for name in "ab")
-    states = one.model.state_dict(), other.model.state_dict()
-    assert all(torch.equal(value, states[1][name]) for name, value in states[0].items())
-    assert one.manifest["config"] == other.manifest["config"]
-    assert one.manifest["licence"] == other.manifest["licence"]
-    assert other.manifest["licence"]["weights"] == "CC0-1.0"
+    done(*command, tmp_path / "a", *data[model], "--config", tmp_path / "small.toml", "--licence", "CC0-1.0")
+    done(*command, tmp_path / "b", "--config", tmp_path / "a" / "run.toml")
+    first, again = (Run.load(tmp_path / name) for name in "ab")
+    assert same(first.model.state_dict(), again.model.state_dict())
+    assert first.manifest["config"] == again.manifest["config"]
+    assert first.manifest["licence"] == again.manifest["licence"]
+    assert again.manifest["licence"]["weights"] == "CC0-1.0"
     files = [(tmp_path / name / "run.toml").read_text() for name in "ab"]
     assert files[0] == files[1]
 
@@ -144,9 +135,8 @@ def test_the_file_of_a_run_repeats_it(model: str, data: dict[str, tuple[object, 
 def test_each_chunk_is_told_once_unless_asked_to_be_quiet(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL["crbm"])
     command = ("train", "crbm", "--config", tmp_path / "small.toml", "--out")
-    loud, quiet = motet(*command, tmp_path / "a"), motet("--quiet", *command, tmp_path / "b")
-    assert (loud.exit_code, quiet.exit_code) == (0, 0)
-    assert [line.count("epoch 3 of 3: loss") for line in (loud.output, quiet.output)] == [1, 0]
+    assert done(*command, tmp_path / "a").output.count("epoch 3 of 3: loss") == 1
+    assert done("--quiet", *command, tmp_path / "b").output.count("epoch 3 of 3: loss") == 0
 
 
 def test_a_line_comes_soon_where_a_chunk_is_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,12 +148,9 @@ def test_a_line_comes_soon_where_a_chunk_is_long(tmp_path: Path, monkeypatch: py
 
 def test_the_command_line_wins_over_the_file(data: dict[str, tuple[object, ...]], tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL["predict"] + "batch = 3\n")
-    out = tmp_path / "a"
-    result = motet(
-        "train", "predict", *data["predict"], "--config", tmp_path / "small.toml", "--steps", 3, "--out", out
-    )
-    assert result.exit_code == 0, result.output
-    recipe = Run.load(out).manifest["training"]["recipe"]
+    config = ("--config", tmp_path / "small.toml", "--steps", 3)
+    done("train", "predict", *data["predict"], *config, "--out", tmp_path / "a")
+    recipe = Run.load(tmp_path / "a").manifest["training"]["recipe"]
     assert (recipe["steps"], recipe["batch"], recipe["learning_rate"]) == (3, 3, 1e-2)
 
 
@@ -181,8 +168,7 @@ def test_a_bad_file_is_refused_and_nothing_written(
     text: str, said: str, data: dict[str, tuple[object, ...]], tmp_path: Path
 ) -> None:
     (tmp_path / "bad.toml").write_text(text)
-    result = motet("train", "predict", *data["predict"], "--config", tmp_path / "bad.toml", "--out", tmp_path / "out")
-    assert (result.exit_code, said in result.output) == (2, True), result.output
+    refused(said, "train", "predict", *data["predict"], "--config", tmp_path / "bad.toml", "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -193,17 +179,15 @@ def test_these_resume_from_the_command_line_too(
     monkeypatch.setattr("motet_train.papers.tdbn.recipe.EPOCHS_A_CHUNK", 2)
     (tmp_path / "small.toml").write_text(SMALL[model])
     command = ("train", model, *data[model], "--config", tmp_path / "small.toml", "--out")
-    assert motet(*command, tmp_path / "whole").exit_code == 0
+    done(*command, tmp_path / "whole")
     with monkeypatch.context() as patched:
         steps = iter([None] * 3)
         patched.setattr("motet_train.progress.Shown.step", lambda *_: next(steps, KeyboardInterrupt) and stop())
         stopped = motet(*command, tmp_path / "parts")
     assert (stopped.exit_code, "--resume continues" in stopped.output) == (130, True)
-    assert "it exists" in motet(*command, tmp_path / "parts").output
-    resumed = motet(*command, tmp_path / "parts", "--resume")
-    assert resumed.exit_code == 0, resumed.output
-    states = [Run.load(tmp_path / name).model.state_dict() for name in ("whole", "parts")]
-    assert all(torch.equal(value, states[1][name]) for name, value in states[0].items())
+    refused("it exists", *command, tmp_path / "parts")
+    done(*command, tmp_path / "parts", "--resume")
+    assert same(*(Run.load(tmp_path / name).model.state_dict() for name in ("whole", "parts")))
 
 
 def stop() -> None:
@@ -221,25 +205,11 @@ def test_a_unit_that_files_do_not_say_is_asked_for_and_taken(tmp_path: Path) -> 
     prepared = motet(*own)
     assert (prepared.exit_code, "--unit-in" in prepared.output, "skipped" in prepared.output) == (2, True, False)
     for command in ((*own, "--unit-in", "inch"), ("prepare", folder, "--out", tmp_path / "humanoid")):
-        prepared = motet(*command)
-        assert (prepared.exit_code, "0 skipped" in prepared.output) == (0, True), prepared.output
-    command = (
-        "train",
-        "predict",
-        "--preset",
-        "files",
-        "--figure",
-        "own",
-        "--data",
-        folder,
-        "--steps",
-        1,
-        "--out",
-        tmp_path / "run",
-    )
+        assert "0 skipped" in done(*command).output
+    options = ("--preset", "files", "--figure", "own", "--data", folder, "--steps", 1)
+    command = ("train", "predict", *options, "--out", tmp_path / "run")
     assert motet(*command).exit_code == 2
-    trained = motet(*command, "--unit-in", "inch")
-    assert trained.exit_code == 0, trained.output
+    done(*command, "--unit-in", "inch")
     assert np.isfinite(Run.load(tmp_path / "run").model.scale.numpy()).all()
 
 
@@ -254,6 +224,6 @@ def test_tensorboard_is_asked_for_where_it_is_missing(
     data: dict[str, tuple[object, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
-    result = motet("train", "predict", *data["predict"], "--steps", 1, "--tensorboard", "--out", tmp_path / "run")
-    assert (result.exit_code, "pip install 'motet[tensorboard]'" in result.output) == (2, True)
+    options = ("--steps", 1, "--tensorboard", "--out", tmp_path / "run")
+    refused("pip install 'motet[tensorboard]'", "train", "predict", *data["predict"], *options)
     assert not (tmp_path / "run").exists()

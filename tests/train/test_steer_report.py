@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from codes_data import PREPARATION, trained
+from codes_data import PREPARATION
 from stores import prepare
+from trainings import done, refused, trained
 
 from motet import to_humanoid
 from motet.bench.cases import cases
 from motet.bench.measure import compared
-from motet.bundle.manifest import Manifest
-from motet.cli import main
 from motet.figures.humanoid.bones import HUMANOID, sole_points
 from motet.formats import read_motion
 from motet.models.load import build
@@ -63,8 +61,7 @@ def folder(store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def model(folder: Path) -> SteerModel:
-    run = Run.load(folder / "run")
-    found = build(Manifest.from_json(run.manifest), {}, run.model.tables())
+    found = Run.load(folder / "run").bundle_model()
     assert isinstance(found, SteerModel)
     return found
 
@@ -149,22 +146,18 @@ def test_what_does_not_fit_is_refused(model: SteerModel, store: Store, folder: P
         Recorded.of(replace(store, representation="angles"))
     recorded = Recorded.of(store)
     other = build(replace(model.manifest, config={**model.manifest.config, "gaits": ["walk", "hop"]}), {}, model.tables)
-    assert isinstance(other, SteerModel)
     with pytest.raises(DataError, match="has no 'run'"):
         steer_report(other, recorded)
-    result = CliRunner().invoke(main, ["evaluate", str(folder / "run"), "--plots", str(folder / "p")])
-    assert (result.exit_code, "--plots is not available" in result.output) == (2, True)
+    refused("--plots is not available", "evaluate", folder / "run", "--plots", folder / "p")
 
 
 def test_the_command_prints_and_saves(folder: Path, monkeypatch: pytest.MonkeyPatch, report: Any) -> None:
     monkeypatch.setattr("motet_train.cli.suites.steer_report", lambda model, recorded: report)
-    asked = ["evaluate", str(folder / "run"), "--data", str(folder / "store")]
-    result = CliRunner().invoke(main, [*asked, "--json", "--save"])
-    assert result.exit_code == 0, result.output
+    result = done("evaluate", folder / "run", "--data", folder / "store", "--json", "--save")
     found = json.loads(result.stdout)
     assert found["random"]["broken"] == report["random"]["broken"]
     assert Run.load(folder / "run").manifest["quality"] == found
-    result = CliRunner().invoke(main, asked[:2])  # the store that it was trained on is found
+    result = done("evaluate", folder / "run")  # the store that it was trained on is found
     assert "seldom searched" in result.stdout
     assert "walk.slide_cm" in result.stdout
 

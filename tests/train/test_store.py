@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from kit_zip import JOINTS, write_kit_zip
 from language_data import walker
 from stores import prepare
+from trainings import done, refused
 
-from motet.cli import main
 from motet.errors import OutputError
 from motet.figures.humanoid import on_humanoid
 from motet.figures.humanoid.bones import HUMANOID, MIXAMO
@@ -88,7 +87,6 @@ def test_kits_angles_are_stored_in_radians_without_the_root(tmp_path: Path) -> N
     contract = found.contract(range(4))
     assert (found.channels, set(found.units), found.skeleton) == (JOINTS, {"rad"}, None)
     for number, item in enumerate(corpus):
-        assert isinstance(item, Record)
         assert len(found.records[number].spans) == 10
         for offset in (0, 9):
             expected = contract.frames(item.motion[offset:])
@@ -143,7 +141,6 @@ def test_everybody_keeps_their_own_bones(tmp_path: Path) -> None:
     for number, record in enumerate(people):
         own = record.motion.skeleton
         features = found.motion(number)
-        assert own is not None
         assert features.skeleton == own.scaled(1.0)
         # metres of this person's root go with this person's legs
         expected = record.motion.continuous().resample(10)
@@ -174,7 +171,6 @@ def test_lengths_of_all_joints_are_scaled_with_the_skeleton(tmp_path: Path) -> N
 def test_joints_about_other_axes_are_brought_to_the_first_ones(tmp_path: Path) -> None:
     record = cmu()
     skeleton = record.motion.skeleton
-    assert skeleton is not None
     place = skeleton.index("lfemur")
     turned = replace(skeleton.joints[place], order="xyz", axis=(0.0, 30.0, 0.0))
     rotations = local_rotations(record.motion, [place])[:, 0]
@@ -297,14 +293,11 @@ def test_trimming_never_moves_a_joint() -> None:
 def test_the_command_prepares_and_names_what_it_skips(tmp_path: Path) -> None:
     path = write_kit_zip(tmp_path / "kit.zip", 3)
     out = tmp_path / "stores" / "store"
-    result = CliRunner().invoke(main, ["prepare", str(path), "--out", str(out)])
-    assert result.exit_code == 0, result.output
-    assert "3 motions of" in result.output
-    assert "6 sentences, 44 channels at 10 fps; 0 skipped" in result.output
+    output = done("prepare", path, "--out", out).output
+    assert "3 motions of" in output
+    assert "6 sentences, 44 channels at 10 fps; 0 skipped" in output
     assert len(Store.open(out).records) == 3
-    again = CliRunner().invoke(main, ["prepare", str(path), "--out", str(out)])
-    assert again.exit_code == 2
-    assert "it exists" in again.output
+    refused("it exists", "prepare", path, "--out", out)
     assert json.loads((out / "store.json").read_text())["channels"] == list(JOINTS)
     assert [path.name for path in out.parent.iterdir()] == ["store"]
 
@@ -314,8 +307,8 @@ def test_when_most_motions_do_not_fit_the_first_it_is_named(tmp_path: Path) -> N
         motion = cmu().motion
         write_motion(tmp_path / f"{name}.npz", motion.select(motion.channels[:channels]))
     (tmp_path / "said.tsv").write_text("clip\tsentence\n" + "".join(f"{name}\tA person runs.\n" for name in "abc"))
-    result = CliRunner().invoke(main, ["prepare", str(tmp_path), "--figure", "own", "--out", str(tmp_path / "store")])
-    assert (result.exit_code, "2 skipped" in result.stdout) == (0, True)
+    result = done("prepare", tmp_path, "--figure", "own", "--out", tmp_path / "store")
+    assert "2 skipped" in result.stdout
     assert "channels and axes are taken from the first, a" in result.stderr
 
 
@@ -335,12 +328,8 @@ def test_a_long_motion_is_cut_into_pieces_that_share_what_is_said(tmp_path: Path
     record = Record("bends", "02", long, ("A person bends.",), ("Somebody bows.",))
     found = prepare([record, cmu()], tmp_path / "store", replace(PLAIN, cut=True))
     assert [entry.name for entry in found.records] == ["bends.1", "bends.2", "bends.3", "09_07"]
-    assert [(entry.take, entry.ends) for entry in found.records] == [
-        ("bends", False),
-        ("bends", False),
-        ("bends", True),
-        ("09_07", True),
-    ]
+    takes = [("bends", False), ("bends", False), ("bends", True), ("09_07", True)]
+    assert [(entry.take, entry.ends) for entry in found.records] == takes
     assert {(entry.sentences, entry.unseen) for entry in found.records[:3]} == {(record.sentences, record.unseen)}
     lengths = [stop - start for entry in found.records[:3] for start, stop in entry.spans]
     assert (sum(lengths), max(lengths) - min(lengths)) == (len(long), 1)

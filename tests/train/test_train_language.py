@@ -1,18 +1,17 @@
-import json
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner, Result
 from language_data import records, small_store
+from trainings import check_resumed, done, log_of, motet, refused, same
 
 from motet.bundle.fields import Fields
 from motet.bundle.manifest import read_contract
-from motet.cli import main
 from motet.formats import write_motion
 from motet_train.data.store import Store
 from motet_train.descent import Training
@@ -49,21 +48,15 @@ def small_nets(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(module.RECIPES, "default", recipe)
 
 
-def motet(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
-
 def trained(verb: str, store: Path, out: Path, *options: object) -> Run:
-    result = motet("train", verb, "--data", store, "--out", out, *options)
-    assert result.exit_code == 0, result.output
+    done("train", verb, "--data", store, "--out", out, *options)
     return Run.load(out)
 
 
 @pytest.mark.parametrize(("command", "verb"), COMMANDS.items())
 def test_the_manifest_says_all(command: str, verb: str, store: Path, tmp_path: Path) -> None:
-    run = trained(
-        command, store, tmp_path / "run", "--name", "mine", "--data-licence", "free", "--seed", 3, "--no-mirror"
-    )
+    options = ("--name", "mine", "--data-licence", "free", "--seed", 3, "--no-mirror")
+    run = trained(command, store, tmp_path / "run", *options)
     manifest, training = run.manifest, run.manifest["training"]
     found = divided(Store.open(store), mirror=False)
     assert (manifest["name"], manifest["verb"]) == ("mine", verb)
@@ -78,14 +71,8 @@ def test_the_manifest_says_all(command: str, verb: str, store: Path, tmp_path: P
     assert training["split"]["test"] == [f"{i:02}" for i in found.parts.test]
     assert training["split"]["validation"] == [f"{i:02}" for i in found.parts.validation]
     assert (training["seed"], training["epochs"], training["recipe"]["mirror"]) == (3, 3, False)
-    assert training["data"] == {
-        "name": "store",
-        "motions": 20,
-        "sentences": 60,
-        "skipped": 0,
-        "unusable_sentences": 0,
-    }
-    lines = [json.loads(line) for line in (tmp_path / "run" / LOG).read_text().splitlines()]
+    assert training["data"] == {"name": "store", "motions": 20, "sentences": 60, "skipped": 0, "unusable_sentences": 0}
+    lines = log_of(tmp_path / "run")
     assert [line["epoch"] for line in lines] == [1, 2, 3]
     assert lines[-1]["loss"] < lines[0]["loss"]
     assert training["validation"] == min(line["validation"] for line in lines)
@@ -93,13 +80,7 @@ def test_the_manifest_says_all(command: str, verb: str, store: Path, tmp_path: P
 
 @pytest.mark.parametrize("verb", COMMANDS)
 def test_resumed_training_is_the_same_to_the_bit(verb: str, store: Path, tmp_path: Path) -> None:
-    whole = trained(verb, store, tmp_path / "whole")
-    trained(verb, store, tmp_path / "parts", "--epochs", 1)
-    parts = trained(verb, store, tmp_path / "parts", "--resume")
-    states = whole.model.state_dict(), parts.model.state_dict()
-    assert all(torch.equal(states[0][name], states[1][name]) for name in states[0])
-    other = trained(verb, store, tmp_path / "other", "--seed", 1)
-    assert any(not torch.equal(states[0][name], value) for name, value in other.model.state_dict().items())
+    check_resumed(partial(trained, verb, store), tmp_path, "--epochs", 1)
 
 
 def test_a_stopped_run_says_how_it_goes_on(store: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -135,7 +116,7 @@ def test_a_run_killed_before_its_first_checkpoint_starts_over(store: Path, tmp_p
     for name in (SETTINGS, LOG, "weights.pt", ".run.json.0123"):
         (killed / name).write_bytes(b"half")
     again = trained("describe", store, killed, *options)
-    assert all(torch.equal(value, again.model.state_dict()[name]) for name, value in whole.model.state_dict().items())
+    assert same(whole.model.state_dict(), again.model.state_dict())
 
 
 def test_a_folder_with_anything_else_is_not_touched(store: Path, tmp_path: Path) -> None:
@@ -144,8 +125,8 @@ def test_a_folder_with_anything_else_is_not_touched(store: Path, tmp_path: Path)
     (tmp_path / "mine" / "deep").mkdir(parents=True)
     for name in ("ended", "mine"):
         for options in ((), ("--resume",)):
-            result = motet("train", "describe", "--data", store, "--out", tmp_path / name, *options)
-            assert (result.exit_code, "cannot write the run" in result.output) == (2, True)
+            command = ("train", "describe", "--data", store, "--out", tmp_path / name, *options)
+            refused("cannot write the run", *command)
     assert (tmp_path / "mine" / "deep").is_dir()
     assert Run.load(tmp_path / "ended")
 
@@ -155,18 +136,16 @@ def test_refusals(store: Path, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.txt").write_text("")
-    refused = ("train", "describe", "--data", store)
-    assert "it has no checkpoint.pt" in motet(*refused, "--out", tmp_path / "other", "--resume").output
-    assert "no motion files" in motet("train", "describe", "--data", tmp_path / "empty", "--out", out).output
+    command = ("train", "describe", "--data", store, "--out")
+    refused("it has no checkpoint.pt", *command, tmp_path / "other", "--resume")
+    refused("no motion files", "train", "describe", "--data", tmp_path / "empty", "--out", out)
     trained("describe", store, out, "--epochs", 1)
     before = (out / CHECKPOINT).read_bytes()
-    assert "it exists" in motet(*refused, "--out", out).output
-    result = motet(*refused, "--out", out, "--resume", "--seed", 1, "--batch", 8)
-    assert result.exit_code == 2
-    assert "cannot be resumed: seed, batch" in result.output
+    refused("it exists", *command, out)
+    refused("cannot be resumed: seed, batch", *command, out, "--resume", "--seed", 1, "--batch", 8)
     assert (out / CHECKPOINT).read_bytes() == before
     if not torch.cuda.is_available():
-        assert "no CUDA device" in motet(*refused, "--out", tmp_path / "x", "--device", "cuda").output
+        refused("no CUDA device", *command, tmp_path / "x", "--device", "cuda")
 
 
 def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
@@ -178,17 +157,14 @@ def test_a_corpus_is_prepared_beside_the_run(tmp_path: Path) -> None:
         lines += [f"{record.name}\t{sentence}" for sentence in record.sentences]
     (tmp_path / "said.tsv").write_text("\n".join(lines))
     out = tmp_path / "runs" / "mine"
-    given = ("--sentences", tmp_path / "said.tsv", "--epochs", 1)
-    refused = motet("train", "describe", "--data", folder, "--out", out, *given)
-    assert "figures that are not human need --figure own" in refused.output
-    run = trained("describe", folder, out, "--figure", "own", *given)
-    assert run.manifest["training"]["data"]["motions"] == 12
+    command = ("train", "describe", "--data", folder, "--out", out, "--sentences", tmp_path / "said.tsv", "--epochs", 1)
+    refused("figures that are not human need --figure own", *command)
+    done(*command, "--figure", "own")
+    assert Run.load(out).manifest["training"]["data"]["motions"] == 12
     assert len(Store.open(tmp_path / "runs" / "mine-store").records) == 12
-    again = motet("train", "describe", "--data", folder, "--out", out.with_name("mine"), "--figure", "own", *given)
-    assert "it exists" in again.output
+    refused("it exists", *command, "--figure", "own")
     shutil.rmtree(out)
-    stale = motet("train", "describe", "--data", folder, "--out", out, "--figure", "own", *given)
-    assert f"{out}-store: it exists" in stale.output
+    refused(f"{out}-store: it exists", *command, "--figure", "own")
 
 
 @pytest.mark.parametrize(("representation", "travelled"), [("root_angles", 2), ("angles", 0)])

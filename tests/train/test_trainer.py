@@ -1,11 +1,11 @@
 """The training loop: what is kept, and going on after any stop, for every kind of learner."""
 
-import json
 import logging
 import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor, nn
+from trainings import log_of, same
 
 from motet_train import trainer
 from motet_train.descent import GradientLearner, Term, Terms, Training, rate
@@ -98,12 +99,8 @@ def baseline() -> DivergenceLearner:
     net = AngleCRBM(AngleCRBMConfig(crbm=Learning(epochs=6, rate=1e-3)), 4, 1)
     frames = [[rows(np.random.default_rng(0), 40)[:, :4]]]
     generator = torch.Generator().manual_seed(SEED)
-    return DivergenceLearner(net, *_baseline(net, frames, generator))
-
-
-def _baseline(net: AngleCRBM, frames: list[list[Tensor]], generator: torch.Generator) -> Any:
     stages, others = net.stages(Lessons(frames, [[torch.ones(40, 1)]], (1.0,)), generator)
-    return stages, generator, None, others
+    return DivergenceLearner(net, stages, generator, None, others)
 
 
 LEARNERS: dict[str, Callable[[], Learner]] = {
@@ -128,13 +125,8 @@ def trained(learner: Learner, folder: Path, **options: Any) -> dict[str, Tensor]
     return learner.kept.state_dict()
 
 
-def same(one: Mapping[str, Tensor], other: Mapping[str, Tensor]) -> bool:
-    return one.keys() == other.keys() and all(torch.equal(one[name], other[name]) for name in one)
-
-
 def lines(folder: Path) -> list[dict[str, Any]]:
-    found = [json.loads(line) for line in (folder / LOG).read_text().splitlines()]
-    return [{key: value for key, value in line.items() if "second" not in key} for line in found]
+    return [{key: value for key, value in line.items() if "second" not in key} for line in log_of(folder)]
 
 
 class StopsAt:
@@ -183,20 +175,17 @@ def test_a_crash_before_any_write_of_any_chunk_changes_nothing(
 
     monkeypatch.setattr(trainer, "write_whole", crashing)
     for _ in range(20):
-        try:
+        with suppress(MemoryError):
             again = trained(LEARNERS[family](), tmp_path / "parts")
             break
-        except MemoryError:
-            continue
     assert len(written) > 1 or crash == WEIGHTS
     assert same(whole, again)
     assert lines(tmp_path / "whole") == lines(tmp_path / "parts")
 
 
 def test_chunks_depend_on_the_seed(tmp_path: Path) -> None:
-    (tmp_path / "other").mkdir()
     other = regression(EPOCHS)
-    train(other, SEED + 1, tmp_path / "other")
+    train(other, SEED + 1, tmp_path)
     assert not same(other.kept.state_dict(), trained(regression(EPOCHS), tmp_path / "one"))
 
 
@@ -293,7 +282,6 @@ def test_the_bar_is_full_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = Shown()
     for epoch in (1, 2):
         shown.step(epoch, 2, "epoch", 0.5)
-        assert shown.bar is not None
         assert shown.bar.n == epoch - 1
         shown.chunk({"epoch": epoch, "seconds": 1.0}, 2, "epoch")
     assert shown.bar.n == 2

@@ -4,7 +4,6 @@ Trains a small net to describe for 500 steps by one process, by two that torchru
 batch in four parts, without what is drawn at random, and prints how far their curves and weights are apart.
 """
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -12,8 +11,7 @@ from pathlib import Path
 
 import torch
 from language_data import small_store
-
-from motet_train.trainer import LOG
+from trainings import log_of
 
 SETTINGS = """
 epochs = 50  # of ten batches
@@ -40,8 +38,7 @@ def trained(place: Path, name: str, more: str = "", start: tuple[str, ...] = ())
 
 def curve(run: Path) -> torch.Tensor:
     """The losses and validation losses of all epochs, (epochs, 2)."""
-    lines = map(json.loads, (run / LOG).read_text().splitlines())
-    return torch.tensor([[line["loss"], line["validation"]] for line in lines])
+    return torch.tensor([[line["loss"], line["validation"]] for line in log_of(run)])
 
 
 def compare(name: str, one: Path, other: Path) -> None:

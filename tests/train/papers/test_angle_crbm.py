@@ -9,8 +9,6 @@ import pytest
 import torch
 from control_runs import control_run
 
-from motet.bundle.manifest import Manifest
-from motet.papers.tdbn_control import TdbnModel
 from motet_export.bundles import export_run
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import read_clips
@@ -38,8 +36,7 @@ def train(*labels: str, config: AngleCRBMConfig = SHORT) -> Run:
 
 @pytest.mark.slow
 def test_a_slow_rate_from_the_past_keeps_walking() -> None:
-    run = train("walk", config=replace(AngleCRBMConfig(), iterations=10))
-    study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
+    study = study_of(train("walk", config=replace(AngleCRBMConfig(), iterations=10)).bundle_model(), read_clips())
     assert study.run == ""
     assert set(experiments_of(study)) == {"cycle", "feet", "random", "sync"}
     figures = limit_cycle(study, seconds=30.0)
@@ -52,7 +49,7 @@ def test_a_slow_rate_from_the_past_keeps_walking() -> None:
 def test_with_one_control_unit_running_starts_and_never_ends() -> None:
     config = replace(AngleCRBMConfig(), iterations=10)
     run = train("walk", "run", config=replace(config, crbm=replace(config.crbm, epochs=150)))
-    study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), read_clips())
+    study = study_of(run.bundle_model(), read_clips())
     assert np.isfinite(switch(study, "walk", "run", 4)[0]).all()
     assert not np.isfinite(switch(study, "run", "walk", 4)[0]).any()
 
@@ -69,7 +66,6 @@ def test_the_past_drives_free_units_and_visible_units_are_real() -> None:
     for value in crbm.parameters():
         value.normal_(0, 1, generator=generator)
     visible, past = torch.randn(4, 3, generator=generator), torch.randn(4, 6, generator=generator)
-    assert crbm.free_past_weight is not None
     total = crbm.hidden_bias[1:] + visible @ crbm.hidden_weight[1:].T + past @ crbm.free_past_weight
     torch.testing.assert_close(crbm.free(visible, past, 2.0), torch.sigmoid(total / 2))
     free = torch.rand(4, 2, generator=generator)
@@ -95,7 +91,7 @@ def test_a_run_reads_back_exports_and_iterates_as_its_manifest_says(tmp_path: Pa
     again = Run.load(tmp_path)
     assert AngleCRBM.from_config(again.manifest["config"]).to_config() == tuples(run.manifest["config"])
     export_run(again, tmp_path / "bundle.zip")
-    model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    model = run.bundle_model()
     found, three, one = (model.start(iterations=n).frames(np.eye(2)) for n in (None, 3, 1))
     np.testing.assert_array_equal(found, three)
     assert not np.array_equal(found, one)

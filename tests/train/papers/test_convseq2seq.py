@@ -29,7 +29,6 @@ def small(**changes: Any) -> ConvSeq2Seq:
 
 def test_sizes_are_those_of_the_paper() -> None:
     net = ConvSeq2Seq(Config(70))
-    assert net.long_term is not None
     assert net.long_term.linear.in_features == 6 * 4 * 128  # type: ignore[union-attr]
     assert net.short_term.linear.in_features == 2 * 4 * 128
     assert count(net) == 3_348_806  # "about 3.37 M"
@@ -94,7 +93,6 @@ def test_the_loss_can_be_the_mean_distance_of_frames() -> None:
     assert net.loss(windows, 50).item() == pytest.approx(np.mean(distances), rel=1e-5)
     exact = torch.zeros(1, 5, 45, requires_grad=True)
     net.error(exact, torch.zeros(1, 5, 45)).backward()  # type: ignore[no-untyped-call]
-    assert exact.grad is not None
     assert torch.isfinite(exact.grad).all()
 
 

@@ -13,7 +13,6 @@ from control_runs import control_run
 from numpy.typing import NDArray
 
 from motet.bundle.graph import Arrays, GraphSpec, TensorSpec
-from motet.bundle.manifest import Manifest
 from motet.errors import OutputError
 from motet.models.load import load
 from motet.papers.tdbn_control import TdbnModel
@@ -40,12 +39,7 @@ def clips() -> Clips:
 def test_the_shipped_bundle_reaches_every_goal_and_says_what_is_measured(clips: Clips) -> None:
     model = load("tdbn")
     report = control_report(study_of(model, clips))
-    missed = {
-        name: report[name.split(".")[0]][name.split(".")[1]]
-        for name in GOALS
-        if not reached(GOALS, name, _of(report, name))
-    }
-    assert missed == {}
+    assert {name: _of(report, name) for name in GOALS if not reached(GOALS, name, _of(report, name))} == {}
     assert report["feet"]["slide_walk_recorded"] > 0
     for name in GOALS:
         group, key = name.split(".")
@@ -71,8 +65,7 @@ def test_unclamped_control_units_make_the_state_leap(clips: Clips, clamped: bool
     """The thesis' text unclamps them in the reconstruction; the switch is then a jump in one frame."""
     config = RECIPES["unclamped"].config
     config = replace(config, clamped=clamped, rbm=replace(config.rbm, epochs=300))
-    run = control_run(clips, config)
-    study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
+    study = study_of(control_run(clips, config).bundle_model(), clips)
     assert least < gait_transitions(study, count=8)["jump_ratio"] < most
 
 
@@ -83,8 +76,7 @@ def test_gaits_that_borrow_persist_and_switch_where_pure_ones_rest_between(clips
     quick = []
     for config in (RECIPES["pure"].config, TDBNConfig()):
         alone = replace(config, restarts=1, tries=1, rounds=1, rbm=replace(config.rbm, epochs=300))
-        run = control_run(clips, alone, seed=21)
-        study = study_of(TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs()), clips)
+        study = study_of(control_run(clips, alone, seed=21).bundle_model(), clips)
         widths.append(constant_hysteresis(study)["constant_width"])
         quick.append(gait_transitions(study)["under_half"])
     pure, borrowed = widths

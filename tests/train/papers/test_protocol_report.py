@@ -13,12 +13,10 @@ import pytest
 import torch
 from test_predict_data import write_files
 
-from motet.bundle.manifest import Manifest
 from motet.errors import MotionError
 from motet.formats import read_motion
 from motet.motion.kinematics import heading, local_rotations, positions
 from motet.motion.rotations import axis_to_rotmat, rotmat_to_rotvec, rotvec_to_rotmat
-from motet.predict.model import PredictModel
 from motet_train.cli.suites import Inputs, suite_of
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.evaluate.figures import looks_of, save
@@ -51,7 +49,6 @@ from motet_train.runs import Run
 
 FIVE = ("basketball", "jumping", "running", "soccer", "walking")
 SKELETON = read_motion(CMU_FOLDER / "39_14.amc").skeleton
-assert SKELETON is not None
 
 ERD = "ERD (Fragkiadaki 2015)"
 RRNN = "RRNN (Martinez 2017)"
@@ -167,15 +164,10 @@ def test_published_rows_stand_under_ours() -> None:
 def test_published_rows_of_human36m() -> None:
     text = shown(H36M_LAYOUT, ("walking", "posing"))
     assert line(text, f"published: {ERD}").endswith("   0.93   1.18   1.59   1.78")
-    ours, *papers = text.split("mean of walking, posing\n")[1].splitlines()[:3]
-    assert (ours.split()[:2], papers[0].split()[1], papers[1].split()[1]) == (
-        ["zero", "velocity"],
-        "RRNN",
-        "ConvSeq2Seq",
-    )
-    assert [float(cell) for cell in papers[1].split()[-5:]] == pytest.approx(
-        [0.31, 0.57, 0.90, 1.05, 1.785], abs=0.0051
-    )
+    ours, first, second = (row.split() for row in text.split("mean of walking, posing\n")[1].splitlines()[:3])
+    assert (ours[:2], first[1], second[1]) == (["zero", "velocity"], "RRNN", "ConvSeq2Seq")
+    errors = [float(cell) for cell in second[-5:]]
+    assert errors == pytest.approx([0.31, 0.57, 0.90, 1.05, 1.785], abs=0.0051)
     assert "goal" not in text
 
 
@@ -253,13 +245,8 @@ def saved(folder: Path, data: Path, seed: int, **settings: Any) -> Path:
     material = expmap_material(read_expmap(data))
     torch.manual_seed(seed)
     sizes = Config(len(material.kept), filters=(2, 2, 2), units=4)
-    config = {
-        "channels": 117,
-        "kept": list(material.kept),
-        "seed_frames": 50,
-        "system": asdict(replace(sizes, **settings)),
-    }
-    config = json.loads(json.dumps(config))
+    known = {"channels": 117, "kept": list(material.kept), "seed_frames": 50}
+    config = json.loads(json.dumps({**known, "system": asdict(replace(sizes, **settings))}))
     net = from_config("convseq2seq", config)
     training = {"seed": seed, "recipe": {}, "data": material.about, "parameters": 1, "seconds": 1.0}
     parts = {"name": folder.name, "version": "1", "verb": "predict", "model": "convseq2seq", "loop": "free_run"}
@@ -269,19 +256,13 @@ def saved(folder: Path, data: Path, seed: int, **settings: Any) -> Path:
     return folder
 
 
-def loaded(run: Path) -> PredictModel:
-    found = Run.load(run)
-    return PredictModel(Manifest.from_json(found.manifest), found.torch_graphs())
-
-
 def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
     data = write_files(tmp_path / "data", actions=("running",))
     runs = [saved(tmp_path / f"conv-{n}", data, n) for n in range(2)]
     runs.append(saved(tmp_path / "none-0", data, 0, long_term="none"))
-    models = {str(run): loaded(run) for run in runs}
+    models = {str(run): Run.load(run).bundle_model() for run in runs}
     results = suite_of(models).measure(models, Inputs(dict.fromkeys(models, data)))
     found, text = results.figures, results.text
-    assert results.drawings is not None
     files = save(results.drawings()[""], tmp_path / "plots")
     assert [path.name for path in files] == ["predict-error.png", "predict-running.png"]
     assert line(text, "none-0")
@@ -300,7 +281,8 @@ def test_all_runs_are_evaluated_at_once(tmp_path: Path) -> None:
 def test_strips_are_seed_frames_and_what_follows(tmp_path: Path) -> None:
     data = write_files(tmp_path / "data")
     corpus = read_expmap(data)
-    found = strips({"run": loaded(saved(tmp_path / "run", data, 0))}, corpus, "walking", SKELETON)
+    model = Run.load(saved(tmp_path / "run", data, 0)).bundle_model()
+    found = strips({"run": model}, corpus, "walking", SKELETON)
     window = windows([corpus.test["walking"]["test/walking/walking_1.txt"]])[0]
     assert [points.shape for points in found.values()] == [(SEED_POSES + 13, 38, 3)] * 2
     np.testing.assert_allclose(found["truth"][SEED_POSES - 1], places(window[[50 - FRAMES_APART]], SKELETON)[0])

@@ -76,10 +76,8 @@ def test_the_thesis_procedure_is_one_reconstruction() -> None:
 def test_ascent_has_momentum_and_decay() -> None:
     value = torch.tensor([[1.0, -2.0]])
     ascent = Ascent(value, decay=0.5)
-    data, model = (
-        (torch.tensor([[2.0]]), torch.tensor([[1.0, 3.0]])),
-        (torch.tensor([[1.0]]), torch.tensor([[1.0, 1.0]])),
-    )
+    data = (torch.tensor([[2.0]]), torch.tensor([[1.0, 3.0]]))
+    model = (torch.tensor([[1.0]]), torch.tensor([[1.0, 1.0]]))
     weight, velocity = np.array([1.0, -2.0]), np.zeros(2)
     for momentum in (0.0, 0.9):
         ascent.contrast(data, model, Epoch(0.1, momentum, 1.0, torch.empty(0)))

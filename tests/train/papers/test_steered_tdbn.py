@@ -6,16 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from codes_data import PREPARATION, trained
+from codes_data import PREPARATION
 from stores import prepare
+from trainings import done, trained
 
 from motet import to_humanoid
-from motet.bundle.manifest import Manifest
-from motet.cli import main
 from motet.figures.humanoid.bones import HUMANOID
 from motet.formats import read_motion
-from motet.models.load import build
 from motet.motion.kinematics import positions
 from motet.papers.tdbn_control import TdbnModel
 from motet.representation.contract import named
@@ -73,22 +70,17 @@ def folder(store: Store, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def model(folder: Path) -> TdbnModel:
-    run = Run.load(folder / "run")
-    found = build(Manifest.from_json(run.manifest), run.torch_graphs())
+    found = Run.load(folder / "run").bundle_model()
     assert isinstance(found, TdbnModel)
     return found
 
 
 def test_control_values_are_shares_of_each_way() -> None:
     velocities = np.random.default_rng(0).uniform(-5, 5, (50, 3))
+    ways = (("forward", "backward"), ("left", "right"), ("turn_left", "turn_right"))
     for values, velocity in zip(controls_of(velocities), velocities, strict=True):
         named_values = dict(zip(LABELS, values, strict=True))
-        for (plus, minus), speed, most in zip(
-            (("forward", "backward"), ("left", "right"), ("turn_left", "turn_right")),
-            velocity,
-            FULL_CONTROL,
-            strict=True,
-        ):
+        for (plus, minus), speed, most in zip(ways, velocity, FULL_CONTROL, strict=True):
             assert named_values[plus] == pytest.approx(min(max(speed, 0) / most, 1))
             assert named_values[minus] == pytest.approx(min(max(-speed, 0) / most, 1))
 
@@ -159,7 +151,6 @@ def test_a_figure_is_told_what_turns_it_to_where_it_shall_face(model: TdbnModel)
 
 def test_it_is_measured_as_a_steered_figure_without_a_rival(model: TdbnModel, store: Store) -> None:
     steered = as_steered(model)
-    assert steered is not None
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(following, "PHASES", 1)
         patch.setattr(following, "SETTLE", 0.2)
@@ -186,6 +177,4 @@ def test_a_store_of_angles_is_refused(store: Store, tmp_path: Path) -> None:
 
 def test_the_command_finds_the_store_of_the_run(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("motet_train.cli.suites.steer_report", lambda model, recorded: {"walk": {"slide_cm": 1.5}})
-    result = CliRunner().invoke(main, ["evaluate", str(folder / "run")])
-    assert result.exit_code == 0, result.output
-    assert "walk.slide_cm" in result.output
+    assert "walk.slide_cm" in done("evaluate", folder / "run").output

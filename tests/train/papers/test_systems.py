@@ -1,6 +1,5 @@
 """The published systems from the command line: train, stop and go on, evaluate, export."""
 
-import json
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -8,13 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from click.testing import CliRunner, Result
 from test_predict_data import write_files
+from trainings import done, log_of, motet, refused
 
-from motet.bundle.manifest import Manifest
-from motet.cli import main
 from motet.formats import read_motion, write_motion
-from motet.predict.model import PredictModel
 from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.papers.li2018 import SYSTEMS
 from motet_train.papers.li2018.convseq2seq import Config
@@ -23,11 +19,6 @@ from motet_train.papers.li2018.recipe import RECIPES, sized, validation_error
 from motet_train.recipes.recipe import Recipe, Visits
 from motet_train.runs import Run
 from motet_train.trainer import CHECKPOINT
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(main, [str(argument) for argument in arguments])
-
 
 SETTINGS = shlex.split("--steps 2 --batch 2 --window 16 --loss square --learning-rate 3e-4 --l2 0.002 --adversary 0.01")
 """Of a run that is small and has nothing by default."""
@@ -41,8 +32,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("runs") / "small"
-    found = run("train", "convseq2seq", "--data", data, "--out", out, *SETTINGS)
-    assert found.exit_code == 0, found.output
+    done("train", "convseq2seq", "--data", data, "--out", out, *SETTINGS)
     return out
 
 
@@ -59,18 +49,14 @@ def test_a_run_says_what_it_is(trained: Path) -> None:
 
 
 def test_it_goes_on_by_the_same_command_only(trained: Path, data: Path) -> None:
-    again = run("train", "convseq2seq", "--data", data, "--out", trained, *SETTINGS, "--resume")
-    assert again.exit_code == 0, again.output
-    other = run("train", "convseq2seq", "--data", data, "--out", trained, "--steps", 2, "--batch", 3, "--resume")
-    assert (other.exit_code, "other settings" in other.stderr) == (2, True)
-    none = run("train", "convseq2seq", "--data", data, "--out", trained.parent, "--resume")
-    assert (none.exit_code, CHECKPOINT in none.stderr) == (2, True)
+    command = ("train", "convseq2seq", "--data", data, "--resume", "--out")
+    done(*command, trained, *SETTINGS)
+    refused("other settings", *command, trained, "--steps", 2, "--batch", 3)
+    refused(CHECKPOINT, *command, trained.parent)
 
 
 def test_it_is_evaluated(trained: Path, data: Path) -> None:
-    shown = run("evaluate", trained, "--data", data, "--json")
-    assert shown.exit_code == 0, shown.output
-    assert "frame_24" in shown.stdout
+    assert "frame_24" in done("evaluate", trained, "--data", data, "--json").stdout
 
 
 def test_motion_files_teach_it_to_continue_a_figure(tmp_path: Path) -> None:
@@ -79,22 +65,17 @@ def test_motion_files_teach_it_to_continue_a_figure(tmp_path: Path) -> None:
     walk = read_motion(CMU_FOLDER / "39_14.amc").scaled(0.01)
     for n in range(10):
         write_motion(data / f"{n:02}_01.npz", walk[5 * n : 5 * n + 340])
-    given = ("--data", data, "-o", out, "--steps", 1, "--batch", 2)
-    trained = run("train", "convseq2seq", *given, "--adversary", 0.01)
-    assert trained.exit_code == 0, trained.output
+    settings = ("--steps", 1, "--batch", 2, "--adversary", 0.01)
+    done("train", "convseq2seq", "--data", data, "-o", out, *settings)
     found = Run.load(out)
     assert len(found.manifest["training"]["data"]["test"]) == 1
-    model = PredictModel(Manifest.from_json(found.manifest), found.torch_graphs())
-    after = model.predict(walk, frames=60)
+    after = found.bundle_model().predict(walk, frames=60)
     assert (len(after), after.channels, after.skeleton) == (60, walk.channels, walk.skeleton)
     jump = np.abs(after.values[0, :3] - walk.values[-1, :3]).max()
     assert jump < 10  # centimetres: it goes on from where the walk ends
-    for command, more, said in (
-        ("srnn", (), "exponential-map text files"),
-        ("convseq2seq", ("--all-files",), "--all-files is for text files"),
-    ):
-        refused = run("train", command, "--data", data, "-o", tmp_path / command, "--steps", 1, *more)
-        assert (refused.exit_code, said in refused.stderr) == (2, True)
+    options = ("--data", data, "-o", tmp_path / "other", "--steps", 1)
+    refused("exponential-map text files", "train", "srnn", *options)
+    refused("--all-files is for text files", "train", "convseq2seq", *options, "--all-files")
 
 
 def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None:
@@ -121,39 +102,38 @@ def test_what_is_kept_back_is_not_trained_on_and_is_measured(data: Path) -> None
 
 
 def test_bad_settings_are_named_and_nothing_stays(data: Path, tmp_path: Path) -> None:
-    out = tmp_path / "run"
-    short = run("train", "convseq2seq", "--data", data, "--out", out, "--padding", "valid", "--window", 5)
-    assert (short.exit_code, "padding 'same'" in short.stderr, out.exists()) == (2, True, False)
+    command = ("train", "convseq2seq", "--out", tmp_path / "run", "--data")
+    refused("padding 'same'", *command, data, "--padding", "valid", "--window", 5)
     (tmp_path / "empty").mkdir()
-    empty = run("train", "convseq2seq", "--data", tmp_path / "empty", "--out", out)
-    assert (empty.exit_code, out.exists()) == (2, False)
+    assert motet(*command, tmp_path / "empty").exit_code == 2
+    assert not (tmp_path / "run").exists()
+
+
+LSTM_3LR = 71 * 500 + 4000 * 1501 + 2 * 4000 * 2001 + 1001 * 70
 
 
 @pytest.mark.parametrize(
-    ("name", "preset", "parameters"),
+    ("name", "parameters"),
     [
-        ("convseq2seq", "paper", 3_348_806),
-        ("rrnn", "default", 3_435_590),
-        ("erd", "default", 14_851_670),
-        ("lstm-3lr", "default", 22_117_570),
-        ("lstm-ae", "default", 23_260_140),
+        ("rrnn", 3 * 1024 * (70 + 1024 + 1) + 1025 * 70),
+        ("erd", 71 * 500 + 501 * 500 + 4000 * (500 + 1000 + 1) + 4000 * 2001 + 1001 * 500 + 501 * 100 + 101 * 70),
+        ("lstm-3lr", LSTM_3LR),
+        ("lstm-ae", LSTM_3LR + 71 * 1000 + 1001 * 500 + 501 * 1000 + 1001 * 70),
     ],
 )
-def test_the_recipes_have_the_published_sizes(name: str, preset: str, parameters: int, data: Path) -> None:
+def test_the_recipes_have_the_published_sizes(name: str, parameters: int, data: Path) -> None:
     material = replace(expmap_material(read_expmap(data)), kept=tuple(range(70)))
-    config = sized(RECIPES[name][preset], material)
+    config = sized(RECIPES[name]["default"], material)
     with torch.device("meta"):
         system = SYSTEMS[name][0](config)
     assert sum(parameter.numel() for parameter in system.parameters()) == parameters
 
 
 def test_a_structural_net_needs_the_same_columns_left_and_right(data: Path, tmp_path: Path) -> None:
-    found = run("train", "srnn", "--data", data, "--out", tmp_path / "run")
-    assert (found.exit_code, "are not the same ones" in found.stderr) == (2, True)
+    refused("are not the same ones", "train", "srnn", "--data", data, "--out", tmp_path / "run")
 
 
 def settings(recipe: Recipe) -> tuple[int, float, float]:
-    assert recipe.training is not None
     return recipe.training.batch, recipe.training.learning_rate, recipe.training.l2
 
 
@@ -171,6 +151,6 @@ def test_the_presets_are_the_papers_and_its_codes(data: Path) -> None:
 
 
 def test_log_has_a_line_for_each_validation(trained: Path) -> None:
-    lines = [json.loads(line) for line in (trained / "log.jsonl").read_text().splitlines()]
+    lines = log_of(trained)
     assert [line["step"] for line in lines] == [2]
     assert set(lines[0]) == {"step", "loss", "validation", "seconds", "steps_per_second"}

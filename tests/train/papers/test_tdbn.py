@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 import torch
 from control_runs import control_run
+from trainings import same
 
-from motet.bundle.manifest import Manifest
-from motet.papers.tdbn_control import TdbnModel
 from motet_train.models.net import tuples
 from motet_train.papers.tdbn.clips import body_parts, read_clips
 from motet_train.papers.tdbn.rbm import Learning
@@ -61,7 +60,7 @@ def test_a_round_is_an_rbm_with_nets_on_it_and_the_next_begins_anew() -> None:
 
 def test_training_repeats_by_its_seed() -> None:
     first, again, other = (train(seed=seed).model.state_dict() for seed in (1, 1, 2))
-    assert all(torch.equal(first[name], again[name]) for name in first)
+    assert same(first, again)
     assert not torch.equal(first["crbm.past_weight"], other["crbm.past_weight"])
 
 
@@ -74,16 +73,12 @@ def test_a_run_reads_back_as_it_was(config: TDBNConfig, tmp_path: Path) -> None:
     other = Run.load(tmp_path)
     assert other.manifest == run.manifest
     assert tuples(TDBN.from_config(other.manifest["config"]).to_config()) == tuples(run.manifest["config"])
-    frames = [
-        TdbnModel(Manifest.from_json(r.manifest), r.torch_graphs()).start(seed=1, variety=0.5).frames(np.eye(3))
-        for r in (run, other)
-    ]
+    frames = [made.bundle_model().start(seed=1, variety=0.5).frames(np.eye(3)) for made in (run, other)]
     np.testing.assert_array_equal(*frames)
 
 
 def test_gibbs_iterations_run_where_there_are_free_units() -> None:
-    run = train(replace(SHORT, free_units=8))
-    model = TdbnModel(Manifest.from_json(run.manifest), run.torch_graphs())
+    model = train(replace(SHORT, free_units=8)).bundle_model()
     once, twice = (model.start(variety=1.0, iterations=n).frames(np.eye(3)) for n in (1, 2))
     assert once.shape == twice.shape == (1, 3, 59)
     assert not np.array_equal(once, twice)
