@@ -112,6 +112,8 @@ def test_commands_may_be_misspelt_and_have_a_pace(model: CodesModel) -> None:
     for text, act, pace in (
         ("stands up quickly", "a person stands up", 1.3),
         ("turns around slowly", "a person turns around", 0.75),
+        ("he stands up very slowly", "a person stands up", 0.75),
+        ("a woman quickly steps back", "a person steps back", 1.3),
     ):
         assert model.likeliest(text).action == act
         assert model.quantities(text).amounts["pace"] == pace

@@ -365,6 +365,8 @@ class SentenceModel(GenerateModel):
 
     def _without_own_pace(self, quantities: Quantities) -> Quantities:
         """Quantities without a pace that their likeliest action has already."""
+        if not PACE_PHRASES.search(quantities.text):
+            return quantities
         if "pace" not in quantities.amounts or any(map(PACE_PHRASES.fullmatch, self.lacking(quantities.text))):
             return quantities
         amounts = dict(quantities.amounts)
@@ -373,15 +375,19 @@ class SentenceModel(GenerateModel):
 
     def _paced(self, quantities: Quantities) -> Quantities:
         """Quantities whose text is a command without its pace, unless the likeliest action does what that says: to
-        stand up quickly is not to step aside quickly."""
-        text = PACE_PHRASES.sub("", quantities.text).strip(" ,")
-        if "pace" not in quantities.amounts or self._commands.act(text) is None:
+        stand up quickly is not to step aside quickly. Where a subject is said, any of its sentences may have the verb.
+        """
+        text = " ".join(PACE_PHRASES.sub("", quantities.text).split()).strip(" ,")
+        order = SUBJECT.sub("", text, count=1).lower()
+        if "pace" not in quantities.amounts or self._commands.act(order) is None:
             return quantities
         if self._commands.act(quantities.text) is not None:
             return quantities
-        shown = self._shown_as(quantities.text)
-        verb, verb_shown = (SUBJECT.sub("", sentence).lower().split()[0] for sentence in (text, shown.action))
-        does_it = stem(verb) == stem(verb_shown) and not shown.lacking
+        action = int(self._context(quantities.text).argmax())
+        verb = stem(order.split()[0])
+        verb_shown = stem(SUBJECT.sub("", self._sentences[action]).lower().split()[0])
+        has_verb = verb == verb_shown or (order != text.lower() and verb in self._stems(action))
+        does_it = has_verb and not self.lacking(quantities.text, action)
         return quantities if does_it else replace(quantities, text=text)
 
     def _on_the_spot(self, quantities: Quantities) -> Quantities:

@@ -127,7 +127,8 @@ SIDE_PHRASES = re.compile(
     r"\b(?:(left|anti-?clockwise|counter-?clockwise)|(right|clockwise))\b(?! (?:arm|hand|fist|leg|foot|knee|side of))"
 )
 PACE_PHRASES = re.compile(
-    r"\b(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly|hastily|hurriedly|swiftly))\b"
+    r"\b(?:(?:very|really|so|super|extremely) )?"
+    r"(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly|hastily|hurriedly|swiftly))\b"
 )
 SLOWER = 0.75
 FASTER = 1.3
