@@ -48,7 +48,7 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
         ("walk left four times, then right", ["walk left four times", "walk right four times"]),
         ("walk left twice, then right once", ["walk left twice", "walk right once"]),
         ("jump forward twice and then backwards once", ["jump forward twice", "jump backwards once"]),
-        ("walk left, then right again", ["walk left", "walk right"]),
+        ("walk left, then right again", ["walk left", "walk right again"]),
         ("walk left, then sit down again", ["walk left", "sit down again"]),
         ("carry a heavy box and drop it", ["carry a heavy box", "drop the heavy box"]),
         ("he sits, then stands", ["he sits", "stands up"]),

@@ -61,6 +61,11 @@ FAR_LESS = -100.0
 """What is added to the log-probabilities of actions where a command is meant."""
 
 
+def first_verb(clause: str) -> str:
+    """The stem of the word after the subject of a clause."""
+    return stem(SUBJECT.sub("", clause, count=1).lower().split()[0])
+
+
 class SentenceModel(GenerateModel):
     """A model that knows the words of each action, and commands."""
 
@@ -263,11 +268,8 @@ class SentenceModel(GenerateModel):
             return act
         lacking = self.lacking(text)
         missing = stems_of(word for word in words if self.vocabulary.meant(word) in ("", *lacking))
-        # a word near to a word of the order is not that word: to turn is not to twist
-        order = stems_of(act.sentence.split())
-        missing |= order - self._stems(int(self._context(text).argmax()))
         limit = len(missing) + (not self._understood(text, self._context(text)).confident)
-        limit += not missing.isdisjoint(order)
+        limit += not missing.isdisjoint(stems_of(act.sentence.split()))
         return act if len(act.lacking) < limit else None
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
@@ -323,7 +325,7 @@ class SentenceModel(GenerateModel):
         if whole := self._keyed(sentence):
             acts = [act.act for act in map(self._keyed, parts) if act]
             return not whole.is_other_text and all(act == acts[0] for act in acts)
-        verbs = {stem(SUBJECT.sub("", part).split()[0].lower()) for part in parts}
+        verbs = set(map(first_verb, parts))
         if len(verbs) < len(parts):
             return False
         quantities = self.quantities(sentence)
@@ -365,9 +367,8 @@ class SentenceModel(GenerateModel):
 
     def _without_own_pace(self, quantities: Quantities) -> Quantities:
         """Quantities without a pace that their likeliest action has already."""
-        if not PACE_PHRASES.search(quantities.text):
-            return quantities
-        if "pace" not in quantities.amounts or any(map(PACE_PHRASES.fullmatch, self.lacking(quantities.text))):
+        has_pace = "pace" in quantities.amounts and PACE_PHRASES.search(quantities.text)
+        if not has_pace or any(map(PACE_PHRASES.fullmatch, self.lacking(quantities.text))):
             return quantities
         amounts = dict(quantities.amounts)
         del amounts["pace"]
@@ -377,16 +378,14 @@ class SentenceModel(GenerateModel):
         """Quantities whose text is a command without its pace, unless the likeliest action does what that says: to
         stand up quickly is not to step aside quickly. Where a subject is said, any of its sentences may have the verb.
         """
-        text = " ".join(PACE_PHRASES.sub("", quantities.text).split()).strip(" ,")
-        order = SUBJECT.sub("", text, count=1).lower()
-        if "pace" not in quantities.amounts or self._commands.act(order) is None:
-            return quantities
-        if self._commands.act(quantities.text) is not None:
+        text = PACE_PHRASES.sub("", quantities.text).strip(" ,")
+        order = SUBJECT.sub("", text, count=1)
+        is_command = self._commands.act(order) is not None and self._commands.act(quantities.text) is None
+        if "pace" not in quantities.amounts or not is_command:
             return quantities
         action = int(self._context(quantities.text).argmax())
-        verb = stem(order.split()[0])
-        verb_shown = stem(SUBJECT.sub("", self._sentences[action]).lower().split()[0])
-        has_verb = verb == verb_shown or (order != text.lower() and verb in self._stems(action))
+        verb = first_verb(text)
+        has_verb = verb == first_verb(self._sentences[action]) or (order != text and verb in self._stems(action))
         does_it = has_verb and not self.lacking(quantities.text, action)
         return quantities if does_it else replace(quantities, text=text)
 

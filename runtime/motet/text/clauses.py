@@ -21,7 +21,7 @@ DIRECTION = re.compile(
     r"\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b",
     re.IGNORECASE,
 )
-TIMES = re.compile(r" (?:once|twice|\w+ times)\b", re.IGNORECASE)
+TIMES = re.compile(r" (?:once more|again|once|twice|\w+ times)\b", re.IGNORECASE)
 SIDE_ALONE = re.compile(
     r"(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
 )
@@ -174,9 +174,7 @@ def _in_full(parts: Iterable[str]) -> list[str]:
 def _after(before: str, part: str) -> str:
     """A part in full, by the one before it."""
     directions = list(DIRECTION.finditer(before))
-    once = re.sub(r" (?:again|once more)$", "", part)
-    if directions and DIRECTION.fullmatch(TIMES.sub("", once)):
-        part = once
+    if directions and DIRECTION.fullmatch(TIMES.sub("", part)):
         # as often as it says itself, or as the part before
         following = before[directions[-1].end() :]
         own_times = TIMES.search(part)

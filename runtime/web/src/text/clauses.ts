@@ -5,7 +5,7 @@ const THEN =
   /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
 const DIRECTION =
   /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
-const TIMES = / (?:once|twice|\w+ times)\b/giu;
+const TIMES = / (?:once more|again|once|twice|\w+ times)\b/giu;
 const SIDE_ALONE =
   /^(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const OBJECT =
@@ -77,12 +77,11 @@ function inFull(parts: string[]): string[] {
 
 function after(before: string, part: string): string {
   const direction = [...before.matchAll(DIRECTION)].at(-1);
-  const once = part.replace(/ (?:again|once more)$/u, "");
-  const direct = once.replace(TIMES, "");
+  const direct = part.replace(TIMES, "");
   if (direction && direct.match(DIRECTION)?.[0] === direct) {
     const following = before.slice(direction.index + direction[0].length);
     return (
-      before.slice(0, direction.index) + once + (direct === once ? following : following.replace(TIMES, ""))
+      before.slice(0, direction.index) + part + (direct === part ? following : following.replace(TIMES, ""))
     );
   }
   const side = SIDE_ALONE.exec(part);
