@@ -16,7 +16,7 @@ SENTENCES = {
     "a person walks to the window": ("window",),
     "he plays slowly while kicking a ball": ("slowly",),
     "a person turns 90 degrees left": (),
-    "a person waves and then he kicks a ball slowly": ("slowly",),
+    "a person waves and then he kicks a ball happily": ("happily",),
 }
 """Sentences with the words that are left out."""
 

@@ -144,13 +144,13 @@ class Writer:
         self.age = self.age.copy()
         self.done = self.done.copy()
 
-        # Steps of some rows are remembered ones, and all of commands, and all that begin an action to show the most of
-        # it; -1 marks parts that are still to be drawn.
+        # Steps of some rows are remembered ones, and all of commands that end by themselves, and all that begin an action
+        # to show the most of it; -1 marks parts that are still to be drawn.
         memory = self.source.memory
         is_command = self.source.written[actions] != actions
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
         share = self.drawing.memory
-        continues = (uniform[:, 0] < share) | ((is_command | (steps > 0)) & (share > 0))
+        continues = (uniform[:, 0] < share) | (((is_command & ends) | (steps > 0)) & (share > 0))
         for row in np.flatnonzero(continues).tolist():
             action = int(actions[row])
             if action in memory.rows:

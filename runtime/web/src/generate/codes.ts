@@ -252,7 +252,7 @@ export class Writer {
     const { age, done, recent } = this.now;
     const share = this.drawing.memory;
     const isCommand = written[action] !== action;
-    const continues = uniform[0]! < share || ((isCommand || steps > 0) && share > 0);
+    const continues = uniform[0]! < share || (((isCommand && ends) || steps > 0) && share > 0);
     if (!continues || !memory.knows(action)) return undefined;
     if (steps) return memory.busiest(action, recent[row]!, steps, uniform[1]!);
     return memory.next(action, recent[row]!, age[row]!, ends, uniform[1]!, done[row]!, whole);
