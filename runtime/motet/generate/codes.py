@@ -144,8 +144,8 @@ class Writer:
         self.age = self.age.copy()
         self.done = self.done.copy()
 
-        # Steps of some rows are remembered ones, and all of commands that end by themselves, and all that begin an action
-        # to show the most of it; -1 marks parts that are still to be drawn.
+        # Steps of some rows are remembered ones, and all of commands that end by themselves, and all that begin an
+        # action to show the most of it; -1 marks parts that are still to be drawn.
         memory = self.source.memory
         is_command = self.source.written[actions] != actions
         codes = np.full((len(actions), self.source.parts), -1, dtype=np.int64)
