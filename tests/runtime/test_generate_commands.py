@@ -119,6 +119,10 @@ def test_commands_may_be_misspelt_and_have_a_pace(model: CodesModel) -> None:
         assert model.quantities(text).amounts["pace"] == pace
 
 
+def test_a_pace_between_words_leaves_no_gap(model: CodesModel) -> None:
+    assert model.quantities("a boxer quickly ducks").text == "a boxer ducks"
+
+
 def test_a_turn_on_the_spot_is_the_command(model: CodesModel) -> None:
     assert model.likeliest("a person turns around on the spot") == model.likeliest("turn around")
 

@@ -378,7 +378,7 @@ class SentenceModel(GenerateModel):
         """Quantities whose text is a command without its pace, unless the likeliest action does what that says: to
         stand up quickly is not to step aside quickly. Where a subject is said, any of its sentences may have the verb.
         """
-        text = PACE_PHRASES.sub("", quantities.text).strip(" ,")
+        text = re.sub(" +", " ", PACE_PHRASES.sub("", quantities.text)).strip(" ,")
         order = SUBJECT.sub("", text, count=1)
         is_command = self._commands.act(order) is not None and self._commands.act(quantities.text) is None
         if "pace" not in quantities.amounts or not is_command:
