@@ -279,7 +279,9 @@ def test_an_act_of_the_hands_is_done_over_one_of_the_legs(model: motet.CodesMode
     assert np.linalg.norm(hands, axis=1).min() < 0.2
 
 
-@pytest.mark.parametrize("text", ["yawn", "a woman sneezes", "yawn and curtsy", "walk and yawn"])
+@pytest.mark.parametrize(
+    "text", ["yawn", "a woman sneezes", "yawn and curtsy", "walk and yawn", "swoon. curtsy.", "swoon, curtsy"]
+)
 def test_words_that_only_acts_have_are_known_to_the_command(text: str, tmp_path: Path) -> None:
     result = run("generate", text, "-o", tmp_path / "out.bvh")
     assert result.exit_code == 0
@@ -337,6 +339,36 @@ def test_who_kneels_does_an_act_of_the_hands_kneeling(model: motet.CodesModel) -
     _, pray, _ = story.passages
     hips = global_transforms(story.motion)[1][round(30 * pray.start) : round(30 * pray.stop), 0, 1]
     assert hips.max() < 0.75
+
+
+def test_who_sits_crosses_the_legs_sitting(model: motet.CodesModel) -> None:
+    story = model.story("She sits down on a chair and crosses her legs.")
+    frames = slice(round(30 * story.passages[1].start), round(30 * story.passages[1].stop))
+    places = global_transforms(story.motion)[1][frames]
+    assert places[:, 0, 1].max() < 0.75
+    left, right, knee = (places[:, HUMANOID.index(name), ::2] for name in ("leftFoot", "rightFoot", "leftLowerLeg"))
+    apart = ((left - right) * (knee[:1] - places[:1, HUMANOID.index("rightLowerLeg"), ::2])).sum(axis=1)
+    assert apart[0] > 0
+    assert apart.min() < 0
+
+
+@pytest.mark.parametrize(
+    ("sentence", "actions"),
+    [
+        ("spin on the right heel", ["a person spins around"]),
+        ("he turned on his heel", ["a person turns around"]),
+        ("rotate the torso to the right", ["twist right"]),
+        ("twist left", ["twist left"]),
+        ("turn your body to the left", ["a person turns left"]),
+        ("jump up, then land", ["a person jumps up"]),
+        ("crouch, jump and land", ["a person crouches down", "a person jumps up", "land"]),
+        ("run up", ["a person runs forward"]),
+        ("walk up and kick", ["a person walks forward", "a person kicks forward"]),
+        ("sit on a chair with your legs crossed", ["a person sits down", "cross the legs"]),
+    ],
+)
+def test_no_other_act_is_shown(model: motet.CodesModel, sentence: str, actions: list[str]) -> None:
+    assert [model.likeliest(part).action for part in model.parts(sentence)] == actions
 
 
 def test_a_participle_is_done_at_the_same_time(model: motet.CodesModel) -> None:

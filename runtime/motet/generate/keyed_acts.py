@@ -67,6 +67,8 @@ LONGEST_SUBJECT = 3
 MOST_HURRIED = 2.0
 """How many times as fast an act is played at most."""
 
+LEGS = ("hips", "left_foot", "right_foot")
+
 BOTH_SIDES = frozenset(("left", "right"))
 
 
@@ -102,11 +104,10 @@ class NamedAct:
         """Whether it is laid over anything but a figure that stands."""
         return self.base != STANDS
 
-    @property
-    def leaves_legs(self) -> bool:
-        """Whether hips and feet are as below, so that the act can be laid over anything."""
-        lower = {"hips", "left_foot", "right_foot"}
-        return not self.goes and all(key.numbers.keys().isdisjoint(lower) for key in self.act.keys)
+    def leaves(self, *parts: str) -> bool:
+        """Whether parts of the body are as below. If these are hips and feet, the act can be laid over anything; if
+        these are the hips, over who sits, kneels or lies."""
+        return not self.goes and all(key.numbers.keys().isdisjoint(parts) for key in self.act.keys)
 
     @property
     def confidence(self) -> float:
@@ -223,14 +224,14 @@ def _orders_in(words: Sequence[str], stems: Iterable[str]) -> Iterator[Order]:
 def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedAct:
     """The act of an order on the side that some stems name, as often as it is to be done."""
     act = shipped(order.name)
+    count = int(times or 0)
     sides = stems & BOTH_SIDES - order.stems
     for side in sides:
         if len(sides) == 1 and f"{order.name} {side}" in says():  # point left is not to point with the left hand
-            return NamedAct(shipped(f"{order.name} {side}"), order.sentence, int(times or 0))
+            return NamedAct(shipped(f"{order.name} {side}"), order.sentence, count)
     # acts of either hand are written for the right one
     if act.mirrored and len(sides) == 1:
         act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
-    count = int(times or 0)
     if count and act.repeat:
         act = replace(act, repeat=replace(act.repeat, times=(count, count)))
     return NamedAct(act, order.sentence, count)

@@ -173,11 +173,10 @@ class CodesModel(SentenceModel):
     def results(self, sentence: str, samples: Sequence[Sample]) -> list[Generated]:
         """See :meth:`GenerateModel.results`."""
         shown: dict[int | None, Shown] = {}
-        for sample in samples:
-            if sample.action not in shown:
-                shown[sample.action] = self._warned(sentence, self._shown_as(sentence, sample.action))
         motions = []
         for motion, sample in zip(super().results(sentence, samples), samples, strict=True):
+            if sample.action not in shown:
+                shown[sample.action] = self._warned(sentence, self._shown_as(sentence, sample.action))
             motions.append(replace(motion, **shown[sample.action]._asdict()))
         return motions
 

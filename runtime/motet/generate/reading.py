@@ -24,6 +24,7 @@ from motet.generate.keyed_acts import (
     BOTH_SIDES,
     HAND_NAMED,
     HELD,
+    LEGS,
     LIMB_STEMS,
     STANDING,
     TOGETHER,
@@ -82,8 +83,9 @@ class SentenceModel(GenerateModel):
 
     def unknown(self, sentence: str) -> list[str]:
         """See :meth:`motet.models.language.LanguageModel.unknown`; none where an act by key poses is named, whose words
-        the vocabulary need not have."""
-        return [] if self._keyed(sentence) else super().unknown(sentence)
+        the vocabulary need not have, or in each of its parts."""
+        is_keyed = self._keyed(sentence) or (self._knows_none(sentence) and self.parts(sentence))
+        return [] if is_keyed else super().unknown(sentence)
 
     def contexts(self, sequences: Sequence[NDArray[Any]], role: str = "encoder") -> Floats:
         """See :meth:`motet.models.language.LanguageModel.contexts`; one by one, since padding changes the rounding."""
@@ -105,10 +107,9 @@ class SentenceModel(GenerateModel):
         where it has one."""
         act = self._command(text, context)
         meant = np.full(self._commands.first + len(self._commands.acts), NEVER, dtype=np.float32)
-        if act is None:
-            meant[: len(context)] = context
-        else:
-            meant[: len(context)] = context + np.float32(FAR_LESS)
+        meant[: len(context)] = context
+        if act is not None:
+            meant[: len(context)] += np.float32(FAR_LESS)
             meant[act] = 0.0
         return meant
 
@@ -164,9 +165,9 @@ class SentenceModel(GenerateModel):
         sentence is a command or a recorded action has all its words, those of the act in its own sentence, and shows no
         more. A sentence may say more than the act, where the likeliest recorded action leaves out more of it."""
         check_length(sentence)
+        if len(self.vocabulary.rules.words(sentence)) > MAX_WORDS:
+            self.vocabulary.encode(sentence)  # refuses it
         if self.contract.skeleton != HUMANOID or sentence in self._sentences:
-            return None
-        if len(self.vocabulary.rules.words(sentence)) > MAX_WORDS:  # it will be refused
             return None
         text, amounts = counted(sentence)
         if amounts.keys() != {"seconds"}:
@@ -238,13 +239,13 @@ class SentenceModel(GenerateModel):
         """An act over what a clause says; None where it cannot be, or the clause says nothing that is known."""
         if STANDING.fullmatch(below):
             return act
-        if not act.leaves_legs:
+        if not act.leaves(*LEGS):
             return None
         words = below.split()
         if SUBJECT.sub("", below).split()[0] in ARTICLES:  # "wakes up with a start"
             return None
         legs = act_named(without_subject(words))
-        if legs and not (legs.leaves_legs or legs.is_other_text):
+        if legs and not (legs.leaves(*LEGS) or legs.is_other_text):
             return replace(act, legs=legs)
         is_limb = stems_of(words) <= BOTH_SIDES | LIMB_STEMS
         has_verb = not is_limb and any(stem(word) in self._verbs for word in words)
@@ -264,13 +265,17 @@ class SentenceModel(GenerateModel):
         act = act_within(words, amounts.get("times")) if words else None
         if act is None or act.is_other_text:
             return None
-        if not any(map(self.vocabulary.meant, words)):
+        if self._knows_none(text):
             return act
         lacking = self.lacking(text)
         missing = stems_of(word for word in words if self.vocabulary.meant(word) in ("", *lacking))
         limit = len(missing) + (not self._understood(text, self._context(text)).confident)
         limit += not missing.isdisjoint(stems_of(act.sentence.split()))
         return act if len(act.lacking) < limit else None
+
+    def _knows_none(self, sentence: str) -> bool:
+        """Whether all words of a sentence are unknown."""
+        return not any(map(self.vocabulary.meant, self.vocabulary.rules.words(sentence)))
 
     def _keyed_counted(self, sentence: str) -> NamedAct | None:
         """The act that a sentence names beside how often: "nods three times"."""
@@ -292,11 +297,11 @@ class SentenceModel(GenerateModel):
         act = self._keyed(sentence)
         if act and act.is_other_text:
             return max(1, act.times) * self._pieces(act.base)
-        if act is None:
-            self.vocabulary.encode(sentence)
         pieces = self._pieces(sentence)
         if len(pieces) > 1:
             return list(chain.from_iterable(map(self.parts, pieces)))
+        if act is None:
+            self.vocabulary.encode(sentence)
         if act and act.times and not (act.act.repeat or act.lacking):
             return act.times * [counted(sentence)[0]]
         return [sentence]
@@ -306,7 +311,7 @@ class SentenceModel(GenerateModel):
         pieces = []
         for whole in sentences_of(sentence):
             parts = self._parts_of(whole)
-            at_once = len(parts) > 1 and self._shown_at_once(whole, parts)
+            at_once = len(parts) > 1 and not self._knows_none(whole) and self._shown_at_once(whole, parts)
             pieces += [whole] if at_once else parts
         return pieces
 
@@ -393,8 +398,7 @@ class SentenceModel(GenerateModel):
         """Quantities whose text is a turn on the spot, where that is a command, whoever turns; else as they are."""
         if "degrees" not in quantities.amounts:
             return quantities
-        opening = SUBJECT.match(quantities.spot)
-        for spot in (quantities.spot, quantities.spot[opening.end() :] if opening else ""):
+        for spot in (quantities.spot, SUBJECT.sub("", quantities.spot, count=1)):
             turn = PACE_PHRASES.sub("", spot).strip()
             if self._commands.act(turn) is not None:
                 return replace(quantities, text=turn)
@@ -434,17 +438,12 @@ class SentenceModel(GenerateModel):
 
     def _understood(self, sentence: str, context: Floats) -> Understood:
         order = np.argsort(-context, kind="stable")
-        nearest: dict[str, None] = {}
-        for action in order.tolist():
-            if self._sentences[action]:
-                nearest[self._sentences[action]] = None
-            if len(nearest) == 3:
-                break
+        nearest = dict.fromkeys(filter(None, map(self._sentences.__getitem__, order.tolist())))
         likeliest = float(context[order[0]])
         if likeliest > 0.01:  # more than rounding
             raise BundleError(f"graph encoder: its context holds {likeliest:g}, which is no log-probability")
         confidence = self._share_known(sentence, int(order[0])) * math.exp(likeliest) ** self._familiar.doubt
-        return Understood(confidence, tuple(nearest), confidence >= self._familiar.confident)
+        return Understood(confidence, tuple(nearest)[:3], confidence >= self._familiar.confident)
 
     def _share_known(self, sentence: str, action: int) -> float:
         """The share of a sentence in words of actions, rare words weighing more; 1 where its action is a command that

@@ -265,7 +265,7 @@ class Teller:
         """What an act is laid over: as many steps of an action, or the last frame of who sits, kneels or lies."""
         frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
         height = self.contract.channels.index("root.height")
-        if context is None or not act.leaves_legs or context.frames[-1, height] >= LOW_HIPS:
+        if context is None or not act.leaves("hips") or context.frames[-1, height] >= LOW_HIPS:
             return frames
         held = np.repeat(context.frames[-1:], len(frames), axis=0)
         held[:, :height] = 0
