@@ -26,7 +26,7 @@ from motet_train.data.corpus import Record
 from motet_train.data.errors import DataError
 from motet_train.data.recorded import gaits_of, recordings
 from motet_train.data.store import Store
-from motet_train.evaluate.steer import commands, crowds, edges, following, ground, limbs, players
+from motet_train.evaluate.steer import commands, crowds, edges, following, ground, limbs, paths, players
 from motet_train.evaluate.steer.report import Recorded, seldom, steer_report, steer_text
 from motet_train.evaluate.tables import report_table
 from motet_train.runs import Run
@@ -78,9 +78,12 @@ def report(model: SteerModel, store: Store) -> Any:
         patch.setattr(limbs, "STARTING_DISTANCE", 0.2)
         patch.setattr(limbs, "REACHED_POINTS", 3)
         patch.setattr(players, "STEERED_SECONDS", 1.0)
+        patch.setattr(edges, "SETTLE", 0.5)
         patch.setattr(edges, "SLOW_SECONDS", 1.0)
         patch.setattr(edges, "WILD_SECONDS", 1.0)
         patch.setattr(edges, "WATCHED_SECONDS", 1.0)
+        patch.setattr(paths, "PATH_SECONDS", 1.0)
+        patch.setattr(paths, "BATCH", 2)
         patch.setattr(ground, "SETTLE", 0.2)
         patch.setattr(ground, "GROUND_SECONDS", 0.5)
         patch.setattr(crowds, "CROWD_SEEDS", (1,))
