@@ -1,6 +1,6 @@
 """From a bundle back to a training run with the weights of its graphs, to continue training."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ def restored(bundle: Bundle) -> Run:
 
     The exporter transposes some weights and renames some. To know which, a net of the same sizes with random weights is
     exported, too: a tensor of that graph with the numbers of a weight tells where the weight is. The bundle's graph has
-    it in the tensor of the same name, or, if another version exported it, at the same place among tensors of its shape.
+    it as the same input of the same operation, or, if it has other operations, in the tensor of the same name.
     ExportError for 8-bit weights, if a graph lacks a weight, and if the run does not compute the bundle's golden
     vectors.
     """
@@ -39,9 +39,11 @@ def restored(bundle: Bundle) -> Run:
     _copy_arrays(state, bundle)
     weight_names = _randomised(other)
     for role, (module, spec) in other.graphs().items():
-        stored = _renamed(_tensors(bundle.model(role)), net)
-        random = _tensors(export_graph(module, spec, {}))
-        _restore(state, other.state_dict(), stored, random, weight_names)
+        stored_graph = onnx.load_from_string(bundle.model(role)).graph
+        random_graph = onnx.load_from_string(export_graph(module, spec, {})).graph
+        tensors = _tensors(stored_graph)
+        stored = _renamed(tensors, net) | _in_their_places(stored_graph, random_graph, tensors)
+        _restore(state, other.state_dict(), stored, _tensors(random_graph), weight_names)
     # it must compute what the bundle does
     run = Run(manifest.source, net.eval())
     _check(run, bundle)
@@ -83,16 +85,18 @@ def _restore(
     for tensor, value in random.items():
         if value.tobytes() in weight_names:
             names[tensor] = weight_names[value.tobytes()]
-    pairs = _paired({tensor: random[tensor] for tensor in names}, stored, [*state])
-    for tensor, value in pairs.items():
-        name = names[tensor]
-        weight = torch.tensor(value)
+    for tensor, name in names.items():
+        if tensor not in stored or stored[tensor].shape != random[tensor].shape:
+            raise ExportError(f"the bundle's graph has no tensor {tensor} of shape {random[tensor].shape}")
+        weight = torch.tensor(stored[tensor])
         like = random_state[name]
         if weight.numel() > like.numel():
             # a bias followed by zeros
             weight = weight[:, None, : like.shape[-1]]
-        elif not np.array_equal(random[tensor], like.numpy()):
-            weight = weight.mT
+        elif np.array_equal(random[tensor].ravel(), like.numpy().ravel()):
+            weight = weight.reshape(like.shape)
+        else:
+            weight = weight.reshape(like.mT.shape).mT
         # a scale of 0 is stored as the infinity by which the exporter divides
         state[name].copy_(torch.where(weight.isinf(), 0, weight))
 
@@ -128,32 +132,32 @@ def _randomised(net: Net) -> dict[bytes, str]:
     return names
 
 
-def _paired(random: Tensors, stored: Tensors, weights: Iterable[str]) -> Tensors:
-    """For each weight in a new graph the tensor of a bundle's graph; ExportError if the bundle lacks it."""
-    if all(name in stored and stored[name].shape == value.shape for name, value in random.items()):
-        return {name: stored[name] for name in random}
-    # names that the exporter made up are numbered, and differ between versions: pair these in order, by shape
-    suffixes = tuple(weights)
-    kept_names = set()
-    for name in random:
-        if any(weight.endswith(name.removeprefix("net.")) for weight in suffixes):
-            kept_names.add(name)
-    others = [name for name in stored if name not in kept_names]
-    pairs = {}
-    for name, value in random.items():
-        match = name
-        if name not in kept_names:
-            match = next((other for other in others if stored[other].shape == value.shape), name)
-        if match not in stored:
-            raise ExportError(f"the bundle's graph has no tensor {name}")
-        pairs[name] = stored[match]
-        others = [other for other in others if other != match]
-    return pairs
+def _in_their_places(stored_graph: onnx.GraphProto, random_graph: onnx.GraphProto, stored: Tensors) -> Tensors:
+    """By the name of each input of a random graph the tensor that the bundle's graph has in its place; none if their
+    operations differ. Equal tensors are stored once, so that some weights are not there by their own names."""
+    stored_inputs = list(_inputs(stored_graph))
+    random_inputs = list(_inputs(random_graph))
+    if [operation for operation, _ in stored_inputs] != [operation for operation, _ in random_inputs]:
+        return {}
+    places: Tensors = {}
+    for (_, stored_name), (_, random_name) in zip(stored_inputs, random_inputs, strict=True):
+        if stored_name in stored:
+            places[random_name] = stored[stored_name]
+    return places
 
 
-def _tensors(data: bytes) -> Tensors:
+def _inputs(graph: onnx.GraphProto) -> Iterator[tuple[str, str]]:
+    """The operation and the name of each input in a graph and in the graphs within it, but for the inputs of casts,
+    which weights of 16 bits have."""
+    for node in graph.node:
+        if node.op_type != "Cast":
+            yield from ((node.op_type, name) for name in node.input)
+        for attribute in node.attribute:
+            yield from _inputs(attribute.g)
+
+
+def _tensors(graph: onnx.GraphProto) -> Tensors:
     """The float and int8 tensors of a graph by name; a tensor stored in 16 bits by the name of its cast to 32."""
-    graph = onnx.load_from_string(data).graph
     cast_names = {node.input[0]: node.output[0] for node in graph.node if node.op_type == "Cast"}
     floats: Tensors = {}
     bytes_: Tensors = {}
