@@ -1,10 +1,12 @@
 """Export a torch module to an ONNX graph that keeps a contract, with weights in 32, 16 or 8 bits."""
 
+import gc
 import logging
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -44,8 +46,9 @@ def export_graph(module: nn.Module, spec: GraphSpec, metadata: Mapping[str, str]
     rng = np.random.default_rng(0)
     # a batch of 2: torch would take an axis of size 1 for a constant
     example = {tensor.name: torch.from_numpy(tensor.example(rng, batch=2)) for tensor in spec.inputs}
+    _sources_read_once()
     # gradients off: torch does not export a scan over weights that ask for them
-    with warnings.catch_warnings(action="ignore"), _log_silenced(), torch.no_grad():
+    with warnings.catch_warnings(action="ignore"), _log_silenced(), _no_collection(), torch.no_grad():
         program = torch.onnx.export(
             module.eval(),
             (),
@@ -85,6 +88,29 @@ def _log_silenced() -> Iterator[None]:
     finally:
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
+
+
+@cache
+def _sources_read_once() -> None:
+    """Keep what is read of the sources of torch's 500 functions in ONNX: that takes a second, for every graph anew."""
+    from onnxscript.values import TracedOnnxFunction
+
+    functions: Any = TracedOnnxFunction
+    read = getattr(functions.function_ir, "fget", None)
+    if read is not None:
+        functions.function_ir = property(cache(read))
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Without Python's search for garbage: an export makes millions of small objects that are needed to its end."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def self_contained(model: onnx.ModelProto, metadata: Mapping[str, str]) -> bytes:
