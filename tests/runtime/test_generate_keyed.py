@@ -365,6 +365,18 @@ def test_who_sits_crosses_the_legs_sitting(model: motet.CodesModel) -> None:
         ("run up", ["a person runs forward"]),
         ("walk up and kick", ["a person walks forward", "a person kicks forward"]),
         ("sit on a chair with your legs crossed", ["a person sits down", "cross the legs"]),
+        ("put the cup on the table", ["put on a table"]),
+        ("she puts the vase down on the table", ["put on a table"]),
+        ("come closer", ["a person walks forward"]),
+        ("open the door and step inside", ["open a door", "a person walks forward"]),
+        ("stand at the window", ["a person stands still"]),
+        ("move the chair", ["a person pushes something heavy forward"]),
+        # commands that leave out no more than an action that shows something else
+        ("he walks in", ["a person walks forward"]),
+        ("run after him", ["a person runs forward"]),
+        ("sit by the fire", ["a person sits down"]),
+        ("walk over to the window", ["a person walks forward"]),
+        ("jump as high as you can", ["a human leaps up to a great height"]),
     ],
 )
 def test_no_other_act_is_shown(model: motet.CodesModel, sentence: str, actions: list[str]) -> None:

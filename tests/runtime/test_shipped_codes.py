@@ -319,8 +319,8 @@ def test_the_action_taken_is_told(model: CodesModel, tmp_path: Path) -> None:
         (circle,) = model.generate("a person walks in a circle", numbers=False)
     assert {one.filename for one in said} == {__file__}
     assert circle.lacking == ("circle",)
-    action = next(e for e in model.manifest.source["actions"] if e["sentence"] == circle.action)
-    assert "circle" not in action["words"]
+    command = next(e for e in model.manifest.source["commands"] if e["sentence"] == circle.action)
+    assert "circle" not in " ".join(command["texts"])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         (walk,) = model.generate(WALK)

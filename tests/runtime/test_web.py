@@ -100,6 +100,8 @@ def taken(model: CodesModel) -> dict[str, Any]:
         "he plays slowly while kicking a ball",
         "she jumps over a wall and then waves",
         "walk to the chair, sit down, stand up again",
+        "run after him",
+        "step out of the car",
     ]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", TextWarning)

@@ -256,14 +256,13 @@ def without_subject(words: Sequence[str]) -> list[str]:
     them is a word of acts. A manner is an adverb that is neither a pace nor a word of acts.
     """
     of_acts = _stems_of_acts()
-    kept = list(words)
     for count in range(1, min(LONGEST_SUBJECT, len(words) - 1) + 1):
         is_subject = words[0] in ARTICLES or stems_of(words[:count]).isdisjoint(of_acts)
         is_verb = stem(words[count]) in verbs() | FILLER_VERBS and words[count].endswith(("s", "ing"))
         if is_subject and is_verb:
-            kept = kept[count:]
+            words = words[count:]
             break
-    return [word for word in kept if not word.endswith("ly") or PACE_PHRASES.search(word) or stem(word) in of_acts]
+    return [word for word in words if not word.endswith("ly") or PACE_PHRASES.search(word) or stem(word) in of_acts]
 
 
 @cache

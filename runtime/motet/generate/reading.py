@@ -115,8 +115,8 @@ class SentenceModel(GenerateModel):
 
     def _command(self, text: str, context: Floats) -> int | None:
         """The command that a text is but for its subject, unless it is the sentence of an action or the command is not
-        recorded; or the nearest one where it leaves out less than the likeliest action. For this a word more counts
-        where it is not confident, and another one where it lacks a word of the command."""
+        recorded; or the nearest one where it leaves out the same as the likeliest action, or less. For this a word more
+        counts where it is not confident, and two more where it lacks a word of the command."""
         is_recorded = text in self._sentences[: self.sizes["A"]]
         order = text if is_recorded else SUBJECT.sub("", text, count=1)
         act = self._commands.act(order)
@@ -126,10 +126,11 @@ class SentenceModel(GenerateModel):
         if nearest is None:
             return None
         lacking = self.lacking(text, int(context.argmax()))
-        limit = len(lacking) + (not self._understood(text, context).confident)
-        limit += not nearest.isdisjoint(map(stem, lacking))
         command = self._commands.action(nearest)
-        return command if len(self.lacking(text, command)) < limit else None
+        lacked = self.lacking(text, command)
+        limit = len(lacking) + (not self._understood(text, context).confident)
+        limit += 2 * (not nearest.isdisjoint(map(stem, lacking)))
+        return command if lacked == lacking or len(lacked) < limit else None
 
     def _is_obeyed(self, order: str, context: Floats) -> bool:
         """Whether a command whose subject is said is shown, and not the likeliest action: unless nobody recorded it,

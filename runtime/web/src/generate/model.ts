@@ -312,7 +312,7 @@ export class GenerateModel extends LanguageModel {
     return this.commands.acts.length ? this.meant(text, context) : context;
   }
 
-  /** That of a command alone, or of the nearest one where it leaves out less than the likeliest action. */
+  /** That of a command alone, or of the nearest one where it leaves out the same as the likeliest action, or less. */
   private meant(text: string, context: Float32Array): Float32Array {
     const isRecorded = this.manifest.actions!.some(({ sentence }) => sentence === text);
     const order = isRecorded ? text : text.replace(SUBJECT, "");
@@ -320,12 +320,14 @@ export class GenerateModel extends LanguageModel {
     let act = isInstead ? undefined : this.commands.act(order);
     const nearest = act === undefined ? this.commands.nearest(order) : undefined;
     if (nearest !== undefined) {
-      // a word more where the likeliest action is not confident, and where it lacks a word of the command
+      // a word more where the likeliest action is not confident, and two where it lacks a word of the command
       const lacking = this.lacking(text, context.indexOf(Math.max(...context)));
       const doubtful = this.known(text, context).confident ? 0 : 1;
-      const lacksCommand = lacking.some((word) => nearest.includes(stem(word))) ? 1 : 0;
+      const lacksCommand = lacking.some((word) => nearest.includes(stem(word))) ? 2 : 0;
       const command = this.commands.action(nearest.join(" "));
-      if (this.lacking(text, command).length < lacking.length + doubtful + lacksCommand) act = command;
+      const lacked = this.lacking(text, command);
+      const isSame = lacked.join(" ") === lacking.join(" ");
+      if (isSame || lacked.length < lacking.length + doubtful + lacksCommand) act = command;
     }
     const meant = new Float32Array(this.commands.first + this.commands.acts.length).fill(READING.NEVER);
     meant.set(act === undefined ? context : context.map((value) => value + READING.FAR_LESS));
