@@ -242,7 +242,7 @@ def test_a_turn_is_that_of_the_hips_from_first_to_last(sentence: str, model: Cod
     [
         ("stands still while running", "only one can be shown"),
         ("walks while sitting", "only one can be shown"),
-        ("cross your fingers", "has no action"),
+        ("circling your foot", "has no action"),
     ],
 )
 def test_what_does_not_fit_is_told(sentence: str, warned: str, model: CodesModel) -> None:
