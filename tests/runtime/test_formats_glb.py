@@ -5,7 +5,8 @@ import pytest
 from figures import walker
 from gltf_player import Played
 
-from motet.formats import write_motion
+from motet.figures.humanoid import HUMANOID
+from motet.formats import read_motion, write_motion
 from motet.motion.kinematics import positions
 from motet.motion.motion import Motion
 from motet.motion.skeleton import Joint, Skeleton
@@ -24,6 +25,16 @@ def test_a_viewer_gets_the_positions(tmp_path, unit, factor):
     assert file.names == [*motion.skeleton.names, "body"]
     assert np.abs(file.places(*motion.skeleton.names) - factor * positions(motion)).max() < 1e-5
     assert file.document["asset"]["extras"]["length_unit"] == ("m" if unit else "unknown")
+
+
+def test_a_human_figure_of_unknown_unit_is_written_in_metres(tmp_path):
+    channels = tuple(f"hips.t{axis}" for axis in "xyz")
+    places = np.array([[0.0, 0.98, 0.1], [0.1, 0.98, 0.2]])
+    centimetres = Motion(places, channels, ("length",) * 3, 30.0, HUMANOID).scaled(0.01)
+    write_motion(tmp_path / "motion.bvh", centimetres)
+    file = written(tmp_path, read_motion(tmp_path / "motion.bvh"))
+    assert np.abs(file.places(*centimetres.skeleton.names) - 0.01 * positions(centimetres)).max() < 1e-5
+    assert file.document["asset"]["extras"]["length_unit"] == "m"
 
 
 def test_parts_and_arrays_are_what_they_are_declared_as(tmp_path):

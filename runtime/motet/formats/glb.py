@@ -1,9 +1,9 @@
 """Write a motion as binary glTF 2.0: one node per joint, an animation, and a simple body skinned to the joints.
 
-Axes are glTF's and motet's own: y up, right-handed. Lengths are metres if the skeleton states its unit, else its own
-unit. Times are seconds from 0. A joint is animated if it turns or moves, the root always. The rest pose of the file is
-the skeleton's (every angle 0). The body makes the file visible in any viewer and puts the joints in a skin, so that
-viewers and Blender recognize them as bones.
+Axes are glTF's and motet's own: y up, right-handed. Lengths are metres if the skeleton states its unit or a human's
+legs suggest it, else its own unit. Times are seconds from 0. A joint is animated if it turns or moves, the root always.
+The rest pose of the file is the skeleton's (every angle 0). The body makes the file visible in any viewer and puts the
+joints in a skin, so that viewers and Blender recognize them as bones.
 
 VRM Animation (.vrma) is a GLB whose nodes are the humanoid in a VRM T-pose, with the extension VRMC_vrm_animation 1.0.
 Every bone has a rotation, only the hips a translation; players adapt both to their avatar's rest pose and scale the
@@ -24,7 +24,17 @@ from motet.draw.figure import Body
 from motet.draw.mesh import Mesh
 from motet.draw.skinned import mesh_of_bones
 from motet.errors import MotionError
-from motet.figures.humanoid import BONES, FINGERS, HUMANOID, SIDES, grounded, on_humanoid, relaxed, sided
+from motet.figures.humanoid import (
+    BONES,
+    FINGERS,
+    HUMANOID,
+    SIDES,
+    grounded,
+    on_humanoid,
+    relaxed,
+    sided,
+    with_unit_by_legs,
+)
 from motet.files import File, Json, write_whole
 from motet.formats.gltf_data import COMPONENTS
 from motet.motion.kinematics import local_rotations, local_translations, skeleton_of
@@ -95,7 +105,9 @@ class Buffer:
 
 def write(file: File, motion: Motion) -> None:
     """Write a motion; MotionError for one without skeleton or frames, OutputError if the file cannot be written."""
-    # glTF's unit is the metre; a skeleton without a unit keeps its own
+    # glTF's unit is the metre; a skeleton whose unit is not known keeps its own
+    if skeleton_of(motion).metres_per_unit is None:
+        motion = with_unit_by_legs(motion)
     if skeleton_of(motion).metres_per_unit is not None:
         motion = motion.scaled(1.0)
     buffer = Buffer()

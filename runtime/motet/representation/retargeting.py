@@ -15,7 +15,7 @@ from motet.figures.humanoid import (
     is_mmm,
     map_of,
     on_humanoid,
-    unit_by_legs,
+    with_unit_by_legs,
 )
 from motet.motion.kinematics import (
     by_name,
@@ -120,12 +120,7 @@ def in_known_unit(motion: Motion, figure: Skeleton) -> Motion:
         if float(np.abs(offsets - figure_offsets).max()) < 1e-5 * figure.height:  # files round lengths
             return motion.with_unit(figure.metres_per_unit)
     # else the unit that gives the legs a human length
-    try:
-        unit = unit_by_legs(motion)
-    except MotionError:  # it is not human
-        return motion
-    log.info("%s", unit.note)
-    return motion if unit.metres is None else motion.with_unit(unit.metres)
+    return with_unit_by_legs(motion)
 
 
 def to_model_figure(motion: Motion, pose: Motion, reason: str, figure: Figure | None = None) -> Motion:

@@ -30,7 +30,7 @@ from motet.figures.humanoid.bones import (
 )
 from motet.figures.humanoid.joint_map import JointMap, check_map, read_map
 from motet.figures.humanoid.joint_tree import map_of
-from motet.figures.humanoid.measure import LENGTH_UNITS, unit_by_legs
+from motet.figures.humanoid.measure import LENGTH_UNITS, with_unit_by_legs
 from motet.figures.humanoid.retarget import (
     SURE_OF_JOINTS,
     Figure,
@@ -78,6 +78,6 @@ __all__ = [
     "sided",
     "sole_points",
     "to_humanoid",
-    "unit_by_legs",
     "with_figure",
+    "with_unit_by_legs",
 ]

@@ -3,6 +3,7 @@
 From its rest pose, from a T-pose in the first frame, or from its frames; and what is no human's is refused.
 """
 
+import logging
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -41,6 +42,8 @@ from motet.motion.kinematics import skeleton_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import UP, Array, identities, rotated, swing, unit
 from motet.motion.skeleton import Names, Skeleton
+
+log = logging.getLogger(__name__)
 
 LENGTH_UNITS = {
     "metres": 1.0,
@@ -292,10 +295,16 @@ def unit_of(skeleton: Skeleton, leg: float) -> Unit:
     )
 
 
-def unit_by_legs(motion: Motion) -> Unit:
-    """The unit of a skeleton by the length of its legs at rest; MotionError as :func:`unit_of`, and for no human's."""
+def with_unit_by_legs(motion: Motion) -> Motion:
+    """A motion whose file does not state its length unit, with the one that its legs at rest suggest, which is logged;
+    as it is where they suggest none, and for no human figure."""
     skeleton = skeleton_of(motion)
-    return unit_of(skeleton, leg_of(Body(skeleton, map_of(motion)), skeleton.rest_positions))
+    try:
+        unit = unit_of(skeleton, leg_of(Body(skeleton, map_of(motion)), skeleton.rest_positions))
+    except MotionError:  # it is not human
+        return motion
+    log.info("%s", unit.note)
+    return motion if unit.metres is None else motion.with_unit(unit.metres)
 
 
 def height_of(fitted: Fitted) -> float:
