@@ -80,6 +80,16 @@ def test_an_act_that_is_not_counted_is_not_drawn_for_ever(model: CodesModel) -> 
     assert any("cannot be counted" in str(message) for message in messages)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_steps_of_a_run_are_counted_though_its_feet_never_rest(seed: int, model: CodesModel) -> None:
+    (run,) = model.generate("she runs six steps", seed=seed)
+    feet = positions(run.motion)[:, [HUMANOID.index("leftFoot"), HUMANOID.index("rightFoot")], 1]
+    lifted = feet > feet.min(axis=0) + 0.2
+    lifts = np.count_nonzero(lifted[1:] & ~lifted[:-1])
+    assert lifts == pytest.approx(6, abs=1)
+    assert run.measured["steps"] == pytest.approx(lifts, abs=1)
+
+
 @pytest.mark.parametrize("sentence", ["-3 jumps", "10^9 steps", "0 steps", "walk -2 metres", "jump 1.5 times", "5 km"])
 def test_numbers_that_make_no_sense_are_refused(sentence: str, model: CodesModel) -> None:
     with pytest.raises(TextError, match="cannot be shown"):

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -290,9 +291,7 @@ def stems_of(words: Iterable[str]) -> frozenset[str]:
 @cache
 def verbs() -> frozenset[str]:
     """The stems of the first words of all orders, which say what is done."""
-    first_words = []
-    for sentences in says().values():
-        first_words += [sentence.split()[0] for sentence in sentences]
+    first_words = [sentence.split()[0] for sentence in chain.from_iterable(says().values())]
     return stems_of(first_words) - BODY_STEMS
 
 

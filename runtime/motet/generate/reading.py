@@ -473,8 +473,9 @@ class SentenceModel(GenerateModel):
         if understood.confident:
             return
         nearest = ", ".join(f"'{near}'" for near in understood.nearest)
-        confidence = f"confidence {understood.confidence:.2f}"
-        message = f"{sentence!r} is outside the training data ({confidence}); nearest: {nearest}"
+        message = (
+            f"{sentence!r} is outside the training data (confidence {understood.confidence:.2f}); nearest: {nearest}"
+        )
         if strict:
             raise TextError(message)
         warn(message, TextWarning)
