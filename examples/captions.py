@@ -1,4 +1,4 @@
-"""A sentence for each motion file of a folder: python examples/captions.py FOLDER > captions.csv"""
+"""A sentence for each BVH file of a folder: python examples/captions.py FOLDER > captions.csv"""
 
 import csv
 import sys
@@ -7,6 +7,8 @@ from pathlib import Path
 import motet
 from motet.errors import MotetError
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 model = motet.load("describe")
 table = csv.writer(sys.stdout)
 for path in sorted(Path(sys.argv[1]).rglob("*.bvh")):

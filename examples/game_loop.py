@@ -12,6 +12,8 @@ import motet
 
 PICTURES = 60.0  # a second
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 model = motet.load("control")
 player, friend = model.start("walk"), model.start("walk", places=[-2.0, 0.0, 90.0])
 before = after = player.tick()

@@ -15,6 +15,8 @@ RATE, AHEAD = 100.0, 0.5  # Hz; seconds that the robot looks ahead
 STOP, SLOW = 0.5, 2.0  # metres between the person and the robot's hand
 HAND = np.array([0.0, 1.0, 2.5])  # of the robot, in the world
 
+if len(sys.argv) != 2:
+    sys.exit(__doc__)
 camera = to_humanoid(motet.read(sys.argv[1])).motion.resample(RATE)
 session = motet.load("predict").stream(camera[:0])
 speeds, busy = [], []
