@@ -251,7 +251,8 @@ def _sensible(kind: Kind, value: float, sentence: str) -> float:
     if not least <= value <= LARGEST_NUMBERS[kind] or value == 0 or (kind in ("steps", "times") and value % 1):
         whole = "a whole number" if kind in ("steps", "times") else "a number"
         raise TextError(
-            f"{value:g} {kind} cannot be shown (in {sentence!r}): give {whole} up to {LARGEST_NUMBERS[kind]:g}, not 0"
+            f"{value:g} {kind} cannot be shown (in {sentence!r}): "
+            f"give {whole} other than 0, at most {LARGEST_NUMBERS[kind]:g}"
         )
     return value
 
