@@ -16,6 +16,7 @@ from motet_train.data.cmu_trials import CMU_FOLDER
 from motet_train.data.errors import DataError
 from motet_train.data.table import read_gaits
 from motet_train.papers.li2018.recipe import RECIPES as SYSTEMS
+from motet_train.papers.tdbn import experiments
 from motet_train.papers.tdbn.recipe import RECIPES as CONTROL
 from motet_train.recipes import codec, codes, language, predict
 from motet_train.runs import Run
@@ -117,6 +118,14 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[object, ..
     return {name: ("--data", where[name]) if name in where else () for name in SMALL}
 
 
+@pytest.fixture
+def quick_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A control model is chosen from its candidates by one experiment of the many."""
+    quick = {"cycle": [experiments.limit_cycle]}
+    monkeypatch.setattr("motet_train.papers.tdbn.report.experiments_of", lambda study: quick)
+
+
+@pytest.mark.usefixtures("quick_choice")
 @pytest.mark.parametrize("model", SMALL)
 def test_the_file_of_a_run_repeats_it(model: str, data: dict[str, tuple[object, ...]], tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL[model])
@@ -172,6 +181,7 @@ def test_a_bad_file_is_refused_and_nothing_written(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("quick_choice")
 @pytest.mark.parametrize("model", ["predict", "tdbn"])
 def test_these_resume_from_the_command_line_too(
     model: str, data: dict[str, tuple[object, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
