@@ -371,8 +371,8 @@ def test_who_sits_crosses_the_legs_sitting(model: motet.CodesModel) -> None:
         ("open the door and step inside", ["open a door", "a person walks forward"]),
         ("stand at the window", ["a person stands still"]),
         ("move the chair", ["a person pushes something heavy forward"]),
-        # commands that leave out no more than an action that shows something else
         ("he walks in", ["a person walks forward"]),
+        # commands that leave out no more than an action that shows something else
         ("run after him", ["a person runs forward"]),
         ("sit by the fire", ["a person sits down"]),
         ("walk over to the window", ["a person walks forward"]),

@@ -99,14 +99,12 @@ class Commands:
     def nearest(self, text: str) -> Key | None:
         """The longest command in a text that begins with a command's verb; None without one."""
         words = self.rules.words(text)
-        if not words or stem(words[0]) not in self.verbs:
+        first = stem(words[0]) if words else ""
+        if first not in self.verbs:
             return None
         key = key_of(words)
-        within = [known for known in self.numbers if known <= key and known not in self._act(known).instead]
-        inside = [known for known in within if stem(words[0]) in known]
-        if not inside:
-            return None
-        return max(inside, key=lambda known: (len(known), sorted(known)))
+        inside = (known for known in self.numbers if first in known <= key and known not in self._act(known).instead)
+        return max(inside, key=lambda known: (len(known), sorted(known)), default=None)
 
     def _act(self, key: Key) -> Command:
         return self.acts[self.numbers[key]]

@@ -115,8 +115,9 @@ class SentenceModel(GenerateModel):
 
     def _command(self, text: str, context: Floats) -> int | None:
         """The command that a text is but for its subject, unless it is the sentence of an action or the command is not
-        recorded; or the nearest one where it leaves out the same as the likeliest action, or less. For this a word more
-        counts where it is not confident, and two more where it lacks a word of the command."""
+        recorded; or the nearest one where it leaves out less than the likeliest action, or the same and that does
+        something else. Less: a word more counts where that is not confident, and two where it lacks one of the command.
+        """
         is_recorded = text in self._sentences[: self.sizes["A"]]
         order = text if is_recorded else SUBJECT.sub("", text, count=1)
         act = self._commands.act(order)
@@ -125,12 +126,18 @@ class SentenceModel(GenerateModel):
         nearest = self._commands.nearest(order)
         if nearest is None:
             return None
-        lacking = self.lacking(text, int(context.argmax()))
+        likeliest = int(context.argmax())
+        lacking = self.lacking(text, likeliest)
         command = self._commands.action(nearest)
         lacked = self.lacking(text, command)
-        limit = len(lacking) + (not self._understood(text, context).confident)
-        limit += 2 * (not nearest.isdisjoint(map(stem, lacking)))
-        return command if lacked == lacking or len(lacked) < limit else None
+        limit = (
+            len(lacking)
+            + (not self._understood(text, context).confident)
+            + 2 * (not nearest.isdisjoint(map(stem, lacking)))
+        )
+        if lacked == lacking and first_verb(text) != first_verb(self._sentences[likeliest]):
+            limit += 1
+        return command if len(lacked) < limit else None
 
     def _is_obeyed(self, order: str, context: Floats) -> bool:
         """Whether a command whose subject is said is shown, and not the likeliest action: unless nobody recorded it,
@@ -255,7 +262,7 @@ class SentenceModel(GenerateModel):
     def _leaves_out(self, sentence: str) -> bool:
         """Whether a sentence has an unknown word, or its likeliest action or command leaves out a word."""
         words = self.vocabulary.rules.words(sentence)
-        return not all(map(self.vocabulary.meant, words)) or bool(self.lacking(sentence))
+        return "" in map(self.vocabulary.meant, words) or bool(self.lacking(sentence))
 
     def _keyed_within(self, sentence: str) -> NamedAct | None:
         """The act whose order a sentence without its subject holds beside other words, unless the likeliest recorded

@@ -109,6 +109,11 @@ function leftOut(sentence: string, { action, lacking }: Shown): string {
   return `'${sentence}' is read as '${action}', which leaves out ${lacking.map((word) => `'${word}'`).join(", ")}`;
 }
 
+/** The stem of the word after the subject of a clause. */
+function firstVerb(clause: string): string {
+  return stem(clause.replace(SUBJECT, "").toLowerCase().trim().split(/\s+/)[0]!);
+}
+
 /** Motions for a sentence, drawn as codes. */
 export class GenerateModel extends LanguageModel {
   private readonly familiarity = this.tuned("familiarity", familiaritySettings);
@@ -312,7 +317,8 @@ export class GenerateModel extends LanguageModel {
     return this.commands.acts.length ? this.meant(text, context) : context;
   }
 
-  /** That of a command alone, or of the nearest one where it leaves out the same as the likeliest action, or less. */
+  /** That of a command alone, or of the nearest one where it leaves out less than the likeliest action, or the same and
+   * that does something else. */
   private meant(text: string, context: Float32Array): Float32Array {
     const isRecorded = this.manifest.actions!.some(({ sentence }) => sentence === text);
     const order = isRecorded ? text : text.replace(SUBJECT, "");
@@ -321,13 +327,15 @@ export class GenerateModel extends LanguageModel {
     const nearest = act === undefined ? this.commands.nearest(order) : undefined;
     if (nearest !== undefined) {
       // a word more where the likeliest action is not confident, and two where it lacks a word of the command
-      const lacking = this.lacking(text, context.indexOf(Math.max(...context)));
+      const likeliest = context.indexOf(Math.max(...context));
+      const lacking = this.lacking(text, likeliest);
       const doubtful = this.known(text, context).confident ? 0 : 1;
       const lacksCommand = lacking.some((word) => nearest.includes(stem(word))) ? 2 : 0;
       const command = this.commands.action(nearest.join(" "));
       const lacked = this.lacking(text, command);
+      const isOther = firstVerb(text) !== firstVerb(this.named(likeliest));
       const isSame = lacked.join(" ") === lacking.join(" ");
-      if (isSame || lacked.length < lacking.length + doubtful + lacksCommand) act = command;
+      if ((isOther && isSame) || lacked.length < lacking.length + doubtful + lacksCommand) act = command;
     }
     const meant = new Float32Array(this.commands.first + this.commands.acts.length).fill(READING.NEVER);
     meant.set(act === undefined ? context : context.map((value) => value + READING.FAR_LESS));
