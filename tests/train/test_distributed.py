@@ -9,7 +9,7 @@ import pytest
 import torch
 from language_data import small_store
 from test_trainer import EPOCHS, adversarial, regression
-from trainings import log_of
+from trainings import done, log_of
 
 from motet_train import distributed
 from motet_train.trainer import train
@@ -30,8 +30,8 @@ NETS = {
 
 def torchrun(*arguments: object) -> None:
     start = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
-    done = subprocess.run([*start, *map(str, arguments)], check=False, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
+    ended = subprocess.run([*start, *map(str, arguments)], check=False, capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 0, ended.stderr
 
 
 def nearly_same(one: Path, other: Path) -> None:
@@ -50,11 +50,11 @@ def test_the_command_gives_the_same_run(verb: str, more: str, parts: int, tmp_pa
     small_store(tmp_path)
     settings = tmp_path / "small.toml"
     settings.write_text(SMALL + NETS[verb] + more)
-    command = ("-m", "motet", "train", verb, "--data", tmp_path / "store", "--config", settings, "--out")
-    subprocess.run([sys.executable, *map(str, command), str(tmp_path / "one")], check=True, capture_output=True)
+    command = ("train", verb, "--data", tmp_path / "store", "--config", settings, "--out")
+    done(*command, tmp_path / "one")
     if parts > 1:
         settings.write_text(f"{settings.read_text()}\n[training]\naccumulate = {parts}\n")
-    torchrun(*command, tmp_path / "two")
+    torchrun("-m", "motet", *command, tmp_path / "two")
     nearly_same(tmp_path / "one", tmp_path / "two")
     training = json.loads((tmp_path / "two" / "run.json").read_text())["training"]
     assert (training["processes"], training["recipe"]["batch"]) == (2, 5)
