@@ -1,7 +1,12 @@
+import os
 import zipfile
 from pathlib import Path
 
 import pytest
+
+# before torch is imported: two threads in each of two test processes on two cores wait for each other, which takes a
+# test of many small products from 4 s to 70
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 
