@@ -36,6 +36,8 @@ model.embedding = 6
 visits.views = 1
 [predict]
 {SHORT}model.hidden = 8
+model.members = 1
+model.blocks = 1
 [actions]
 {SHORT}model.embedding = 6
 model.hidden = 5
