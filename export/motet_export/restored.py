@@ -88,17 +88,21 @@ def _restore(
     for tensor, name in names.items():
         if tensor not in stored or stored[tensor].shape != random[tensor].shape:
             raise ExportError(f"the bundle's graph has no tensor {tensor} of shape {random[tensor].shape}")
-        weight = torch.tensor(stored[tensor])
-        like = random_state[name]
-        if weight.numel() > like.numel():
-            # a bias followed by zeros
-            weight = weight[:, None, : like.shape[-1]]
-        elif np.array_equal(random[tensor].ravel(), like.numpy().ravel()):
-            weight = weight.reshape(like.shape)
-        else:
-            weight = weight.reshape(like.mT.shape).mT
+        weight = _as_in_net(stored[tensor], random[tensor], random_state[name])
         # a scale of 0 is stored as the infinity by which the exporter divides
         state[name].copy_(torch.where(weight.isinf(), 0, weight))
+
+
+def _as_in_net(tensor: NDArray[Any], random: NDArray[Any], like: torch.Tensor) -> torch.Tensor:
+    """A tensor of a bundle's graph in the form of a net's weight. like: that weight, where it is random; random: what
+    the exporter makes of it."""
+    weight = torch.tensor(tensor)
+    if weight.numel() > like.numel():
+        # a bias followed by zeros
+        return weight[:, None, : like.shape[-1]]
+    if np.array_equal(random.ravel(), like.numpy().ravel()):
+        return weight.reshape(like.shape)
+    return weight.reshape(like.mT.shape).mT
 
 
 def _check(run: Run, bundle: Bundle) -> None:
