@@ -92,12 +92,15 @@ def _log_silenced() -> Iterator[None]:
 
 @cache
 def _sources_read_once() -> None:
-    """Keep what is read of the sources of torch's 500 functions in ONNX: that takes a second, for every graph anew."""
-    from onnxscript.values import TracedOnnxFunction
+    """Keep what is read of the sources of torch's 500 functions in ONNX: that takes a second, for every graph anew.
 
-    functions: Any = TracedOnnxFunction
-    read = getattr(functions.function_ir, "fget", None)
-    if read is not None:
+    Exports are the same without it, as they are with a version of onnxscript that has no such class.
+    """
+    from onnxscript import values
+
+    functions = getattr(values, "TracedOnnxFunction", None)
+    read = getattr(getattr(functions, "function_ir", None), "fget", None)
+    if functions is not None and read is not None:
         functions.function_ir = property(cache(read))
 
 
