@@ -243,6 +243,7 @@ def test_no_act_lasts_longer_than_it_may(model: motet.CodesModel) -> None:
         ("turn left, walk two metres, turn left again", ["turn left", "walk two metres", "turn left again"]),
         ("draw a bow and release the arrow", ["draw a bow and release the arrow"]),
         ("salute twice", ["salute", "salute"]),  # its keys cannot be repeated
+        ("jump three times on the left foot", ["hop on the left leg 3 times"]),  # a command that counts
         ("He punches left and right. Then he bows.", ["punch left", "punch right", "he bows"]),
         ("a right jab and a left cross", ["punch right", "punch left"]),
         ("walk and look around", ["walk", "look around"]),  # a recording that glances around does not say that it walks

@@ -304,6 +304,10 @@ class SentenceModel(GenerateModel):
         sentence = ADDRESSEE.sub("", sentence)
         act = self._keyed(sentence)
         if act and act.is_other_text:
+            # a command that counts what it does is given the number
+            often = f"{act.base} {act.times} times"
+            if act.times and self._commands.act(act.base) is not None and quantities_of(often).act:
+                return [often]
             return max(1, act.times) * self._pieces(act.base)
         pieces = self._pieces(sentence)
         if len(pieces) > 1:
