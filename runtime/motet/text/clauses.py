@@ -117,7 +117,8 @@ def stem(word: str) -> str:
     for ending, rest in ENDINGS:
         shorter = ending.sub(rest, word)
         # the ing of "sing" is no ending
-        word = shorter if re.search("[aeiouy]", shorter) else word
+        if shorter != word and re.search("[aeiouy]", shorter):
+            word = shorter
     return word
 
 
