@@ -69,6 +69,7 @@ MOST_HURRIED = 2.0
 """How many times as fast an act is played at most."""
 
 LEGS = ("hips", "left_foot", "right_foot")
+"""The parts by which an act by key poses moves the legs."""
 
 BOTH_SIDES = frozenset(("left", "right"))
 

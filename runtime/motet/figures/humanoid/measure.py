@@ -303,8 +303,10 @@ def with_unit_by_legs(motion: Motion) -> Motion:
         unit = unit_of(skeleton, leg_of(Body(skeleton, map_of(motion)), skeleton.rest_positions))
     except MotionError:  # it is not human
         return motion
+    if unit.metres is None:
+        return motion
     log.info("%s", unit.note)
-    return motion if unit.metres is None else motion.with_unit(unit.metres)
+    return motion.with_unit(unit.metres)
 
 
 def height_of(fitted: Fitted) -> float:
