@@ -23,6 +23,12 @@ from motet.text.vocabulary import NUMBER_WORDS
 STANDS = "a person stands still"
 """The sentence of a figure that stands."""
 
+RESTS = (STANDS, "a person waits")
+"""The sentences of a figure that does nothing, standing."""
+
+STAYS = "stay as you are"
+"""The act of a figure that does nothing, sitting, kneeling or lying."""
+
 BASE_SENTENCES = {"stand": STANDS, "walk": "a person walks forward"}
 """The sentences of what acts are laid over."""
 

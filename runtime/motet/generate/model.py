@@ -31,7 +31,9 @@ from motet.generate.codec import Codec, Context, ReceptiveField, StreamingDecode
 from motet.generate.codes import LOOPS, CodesSettings, Source, Writer, draw_codes, drawn_actions
 from motet.generate.continue_codes import ContinuationSettings
 from motet.generate.keyed_acts import (
+    RESTS,
     STANDS,
+    stems_of,
 )
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
@@ -158,6 +160,8 @@ class CodesModel(SentenceModel):
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
         if (act := self._keyed(text)) and quantities.text == act.base and not act.is_other_text:
             return replace(request, keyed=act)
+        if self._sentences[int(context.argmax())] in RESTS and "stand" not in stems_of(text.split()):
+            request = replace(request, rests=True)
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
     def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:

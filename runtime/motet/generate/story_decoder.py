@@ -12,8 +12,9 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
-from motet.generate.keyed_acts import NamedAct
+from motet.generate.keyed_acts import STAYS, NamedAct
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
+from motet.keyed.shipped import shipped
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.numeric_phrases import Kind, Quantities
@@ -53,10 +54,18 @@ class Request:
     keyed: NamedAct | None = None
     """The act by key poses that is laid over the text that is shown."""
 
+    rests: bool = False
+    """Whether nothing is to be done: who sits, kneels or lies stays so."""
+
     @property
     def to_measure(self) -> bool:
         """Whether it is drawn until its numbers are reached; a length alone is kept by the decoder."""
         return bool(self.quantities.amounts.keys() - {"seconds"}) or self.pace != 1 or self.keyed is not None
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether it is not drawn together with its neighbours: its numbers, or the pose before it, say how."""
+        return self.to_measure or self.rests
 
     @property
     def exactly(self) -> bool:
@@ -186,6 +195,8 @@ class Teller:
 
     def _pieces_of(self, run: Sequence[tuple[int, Request]], context: Context | None) -> Iterator[Piece]:
         number, request = run[0]
+        if request.rests and self._is_low(context):
+            return self._keyed(number, request, NamedAct(shipped(STAYS), STAYS), context)
         if not request.to_measure:
             return self._flowing(run, context)
         if request.keyed is not None:
@@ -264,12 +275,20 @@ class Teller:
     def _below(self, act: NamedAct, action: Ids, steps: int, context: Context | None) -> Array:
         """What an act is laid over: as many steps of an action, or the last frame of who sits, kneels or lies."""
         frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
-        height = self.contract.channels.index("root.height")
-        if context is None or not act.leaves("hips") or context.frames[-1, height] >= LOW_HIPS:
+        if context is None or not act.leaves("hips") or not self._is_low(context):
             return frames
         held = np.repeat(context.frames[-1:], len(frames), axis=0)
-        held[:, :height] = 0
+        held[:, : self._height] = 0
         return held
+
+    @property
+    def _height(self) -> int:
+        """The channel of the height of the hips, after those of how they move."""
+        return self.contract.channels.index("root.height")
+
+    def _is_low(self, context: Context | None) -> bool:
+        """Whether the figure sits, kneels or lies."""
+        return context is not None and bool(context.frames[-1, self._height] < LOW_HIPS)
 
     def _drawn(self, action: Ids, steps: int, context: Context | None) -> Ids:
         """As many steps of an action (N, P)."""
@@ -336,7 +355,7 @@ def _runs(requests: Sequence[Request]) -> list[list[tuple[int, Request]]]:
     runs: list[list[tuple[int, Request]]] = []
     for numbered in enumerate(requests):
         _, request = numbered
-        if not runs or request.to_measure or runs[-1][-1][1].to_measure:
+        if not runs or request.is_alone or runs[-1][-1][1].is_alone:
             runs.append([])
         runs[-1].append(numbered)
     return runs

@@ -23,7 +23,9 @@ DIRECTION = re.compile(
 )
 TIMES = re.compile(r" (?:once more|again|once|twice|\w+ times)\b", re.IGNORECASE)
 SIDE_ALONE = re.compile(
-    r"(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
+    r"(?:with |on |(?:switch(?:es)?|changes?|swaps?) to )?(?:the |your |his |her |their )?"
+    r"(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?",
+    re.IGNORECASE,
 )
 OBJECT = re.compile(
     r"\b(?:an?|the) (\w+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|\d|\w+ly\b)\w+)?)",

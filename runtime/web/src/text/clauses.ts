@@ -7,7 +7,7 @@ const DIRECTION =
   /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
 const TIMES = / (?:once more|again|once|twice|\w+ times)\b/giu;
 const SIDE_ALONE =
-  /^(?:with )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
+  /^(?:with |on |(?:switch(?:es)?|changes?|swaps?) to )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const OBJECT =
   /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
 const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
