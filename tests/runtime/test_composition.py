@@ -45,6 +45,7 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
     [
         ("look up, then down", ["look up", "look down"]),
         ("kick with the left foot, then with the right", ["kick with the left foot", "kick with the right foot"]),
+        ("kick with the left foot, then switch to the right", ["kick with the left foot", "kick with the right foot"]),
         ("walk left four times, then right", ["walk left four times", "walk right four times"]),
         ("walk left twice, then right once", ["walk left twice", "walk right once"]),
         ("jump forward twice and then backwards once", ["jump forward twice", "jump backwards once"]),
@@ -52,6 +53,7 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
         ("walk left, then sit down again", ["walk left", "sit down again"]),
         ("carry a heavy box and drop it", ["carry a heavy box", "drop the heavy box"]),
         ("he sits, then stands", ["he sits", "stands up"]),
+        ("bend down, then stand back up", ["bend down", "stands still"]),
         ("turn around, then walk back", ["turn around", "walk forward"]),
         ("walk, then back", ["walk", "back"]),  # no direction that it could take the place of
         ("wave, then drop it", ["wave", "drop it"]),

@@ -296,7 +296,7 @@ def test_long_sentences_are_refused_before_they_are_read(model: motet.CodesModel
             read(sentence)
 
 
-@pytest.mark.parametrize(("sentence", "pace"), [("slowly salute", 0.75), ("clap quickly", 1.3), ("salute", 1.0)])
+@pytest.mark.parametrize(("sentence", "pace"), [("slowly salute", 0.75**2), ("clap quickly", 1.3**2), ("salute", 1.0)])
 def test_an_act_is_done_in_the_pace_of_the_sentence(model: motet.CodesModel, sentence: str, pace: float) -> None:
     named = model._keyed(sentence)
     assert named is not None
@@ -340,6 +340,20 @@ def test_who_kneels_does_an_act_of_the_hands_kneeling(model: motet.CodesModel) -
     _, pray, _ = story.passages
     hips = global_transforms(story.motion)[1][round(30 * pray.start) : round(30 * pray.stop), 0, 1]
     assert hips.max() < 0.75
+
+
+@pytest.mark.parametrize("sentence", ["sit down and rest", "kneel, wait for 3 seconds", "lie down and do nothing"])
+def test_who_sits_kneels_or_lies_stays_so_where_nothing_is_to_be_done(model: motet.CodesModel, sentence: str) -> None:
+    story = model.story(sentence)
+    rest = story.passages[-1]
+    hips = global_transforms(story.motion)[1][round(30 * rest.start) : round(30 * rest.stop), 0, 1]
+    assert rest.stop - rest.start > 2.9
+    assert hips.max() < 0.75
+
+
+def test_who_sits_and_is_to_stand_still_stands(model: motet.CodesModel) -> None:
+    story = model.story(["sit down", "stand still"])
+    assert global_transforms(story.motion)[1][-1, 0, 1] > 0.85
 
 
 def test_who_sits_crosses_the_legs_sitting(model: motet.CodesModel) -> None:

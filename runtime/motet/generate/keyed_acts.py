@@ -23,8 +23,11 @@ from motet.text.vocabulary import NUMBER_WORDS
 STANDS = "a person stands still"
 """The sentence of a figure that stands."""
 
-RESTS = (STANDS, "a person waits")
-"""The sentences of a figure that does nothing, standing."""
+LOW_HIPS = 0.7
+"""Metres of the hips of a figure that sits, kneels or lies, whose standing hips are about 0.95 m high."""
+
+RESTS = {STANDS: LOW_HIPS, "a person waits": LOW_HIPS, "a person lies down": 0.35}
+"""Sentence -> metres of the hips below which nothing is to be done for it: who sits waits, and who lies lies."""
 
 STAYS = "stay as you are"
 """The act of a figure that does nothing, sitting, kneeling or lying."""
@@ -40,7 +43,7 @@ TOGETHER = re.compile(
 )
 """Words between an act and what the figure does below it; a participle needs none: "walks backwards, waving"."""
 
-FILLER_VERBS = frozenset(map(stem, ("does", "makes", "gives")))
+FILLER_VERBS = frozenset(map(stem, ("does", "makes", "gives", "has", "have")))
 """Stems of verbs that name no act."""
 
 # fmt: off

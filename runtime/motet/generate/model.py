@@ -160,8 +160,8 @@ class CodesModel(SentenceModel):
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
         if (act := self._keyed(text)) and quantities.text == act.base and not act.is_other_text:
             return replace(request, keyed=act)
-        if self._sentences[int(context.argmax())] in RESTS and "stand" not in stems_of(text.split()):
-            request = replace(request, rests=True)
+        if "stand" not in stems_of(text.split()):
+            request = replace(request, rests=RESTS.get(self._sentences[int(context.argmax())], 0.0))
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
     def composed(self, sentence: str, seed: int, strict: bool, settings: Mapping[str, Any]) -> list[Generated]:

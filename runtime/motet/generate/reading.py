@@ -193,7 +193,8 @@ class SentenceModel(GenerateModel):
         plain = self._keyed_by_hand(PACE_PHRASES.sub("", sentence).strip(" ,"))
         if plain is None or plain.lacking or plain.is_other_text:
             return act
-        return plain.at_pace(quantities_of(sentence).amounts.get("pace", 1.0))
+        pace = quantities_of(sentence).amounts.get("pace", 1.0)
+        return plain.at_pace(pace * pace)  # acts are short: less is not seen
 
     def _keyed_by_hand(self, sentence: str) -> NamedAct | None:
         """The act of a sentence that does not say how long it lasts, done with the hand that it names, if it is one of
@@ -393,7 +394,8 @@ class SentenceModel(GenerateModel):
 
     def _paced(self, quantities: Quantities) -> Quantities:
         """Quantities whose text is a command without its pace, unless the likeliest action does what that says: to
-        stand up quickly is not to step aside quickly. Where a subject is said, any of its sentences may have the verb.
+        stand up quickly is not to step aside quickly. Where a subject is said, any of its sentences may have the verb,
+        but the pace is to be in the one that it is shown by: a few of many are no sign.
         """
         text = re.sub(" +", " ", PACE_PHRASES.sub("", quantities.text)).strip(" ,")
         order = SUBJECT.sub("", text, count=1)
@@ -402,8 +404,9 @@ class SentenceModel(GenerateModel):
             return quantities
         action = int(self._context(quantities.text).argmax())
         verb = first_verb(text)
-        has_verb = verb == first_verb(self._sentences[action]) or (order != text and verb in self._stems(action))
-        does_it = has_verb and not self.lacking(quantities.text, action)
+        shown = self._sentences[action]
+        has_verb = verb == first_verb(shown) or (order != text and verb in self._stems(action))
+        does_it = has_verb and PACE_PHRASES.search(shown) and not self.lacking(quantities.text, action)
         return quantities if does_it else replace(quantities, text=text)
 
     def _on_the_spot(self, quantities: Quantities) -> Quantities:

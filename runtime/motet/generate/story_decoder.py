@@ -12,7 +12,7 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
-from motet.generate.keyed_acts import STAYS, NamedAct
+from motet.generate.keyed_acts import LOW_HIPS, STAYS, NamedAct
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
 from motet.keyed.shipped import shipped
 from motet.motion.rotations import Array
@@ -24,9 +24,6 @@ LONGEST_REQUEST = 300.0
 
 STRETCH_SECONDS = 20.0
 """Seconds, at most, of the stretches in which a request is drawn whose length comes first."""
-
-LOW_HIPS = 0.7
-"""Metres of the hips of a figure that sits, kneels or lies, whose standing hips are about 0.95 m high."""
 
 LEAST_PROGRESS: Mapping[Kind, float] = {"degrees": 20.0, "metres": 0.3, "steps": 0.5, "times": 0.1}
 """Least progress per second, after ten seconds of grace: a motion that is slower is not continued."""
@@ -54,8 +51,8 @@ class Request:
     keyed: NamedAct | None = None
     """The act by key poses that is laid over the text that is shown."""
 
-    rests: bool = False
-    """Whether nothing is to be done: who sits, kneels or lies stays so."""
+    rests: float = 0.0
+    """Metres of the hips below which nothing is to be done (:data:`motet.generate.keyed_acts.RESTS`)."""
 
     @property
     def to_measure(self) -> bool:
@@ -65,7 +62,7 @@ class Request:
     @property
     def is_alone(self) -> bool:
         """Whether it is not drawn together with its neighbours: its numbers, or the pose before it, say how."""
-        return self.to_measure or self.rests
+        return self.to_measure or self.rests > 0
 
     @property
     def exactly(self) -> bool:
@@ -195,7 +192,7 @@ class Teller:
 
     def _pieces_of(self, run: Sequence[tuple[int, Request]], context: Context | None) -> Iterator[Piece]:
         number, request = run[0]
-        if request.rests and self._is_low(context):
+        if self._is_below(request.rests, context):
             return self._keyed(number, request, NamedAct(shipped(STAYS), STAYS), context)
         if not request.to_measure:
             return self._flowing(run, context)
@@ -275,7 +272,7 @@ class Teller:
     def _below(self, act: NamedAct, action: Ids, steps: int, context: Context | None) -> Array:
         """What an act is laid over: as many steps of an action, or the last frame of who sits, kneels or lies."""
         frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
-        if context is None or not act.leaves("hips") or not self._is_low(context):
+        if context is None or not act.leaves("hips") or not self._is_below(LOW_HIPS, context):
             return frames
         held = np.repeat(context.frames[-1:], len(frames), axis=0)
         held[:, : self._height] = 0
@@ -286,9 +283,9 @@ class Teller:
         """The channel of the height of the hips, after those of how they move."""
         return self.contract.channels.index("root.height")
 
-    def _is_low(self, context: Context | None) -> bool:
-        """Whether the figure sits, kneels or lies."""
-        return context is not None and bool(context.frames[-1, self._height] < LOW_HIPS)
+    def _is_below(self, height: float, context: Context | None) -> bool:
+        """Whether the figure's hips are below a height in metres."""
+        return context is not None and bool(context.frames[-1, self._height] < height)
 
     def _drawn(self, action: Ids, steps: int, context: Context | None) -> Ids:
         """As many steps of an action (N, P)."""

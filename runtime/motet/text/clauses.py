@@ -32,6 +32,8 @@ OBJECT = re.compile(
     re.IGNORECASE,
 )
 LOW = re.compile(r"\b(?:sit|kneel|lie|lay|crouch|squat|knee)\w*", re.IGNORECASE)
+BENT = re.compile(r"\b(?:bend|bow|stoop|touch|tie|tying|pick)", re.IGNORECASE)
+UPRIGHT = re.compile(r"(?:stand|straighten|get|come)s? (?:back )?up(?: again| straight)?", re.IGNORECASE)
 AROUND = re.compile(r"\b(?:turn\w* (?:a?round|180)|half turn)", re.IGNORECASE)
 ADDRESSEE = re.compile(
     r"^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+", re.IGNORECASE
@@ -188,11 +190,16 @@ def _after(before: str, part: str) -> str:
     thing = OBJECT.search(SUBJECT.sub("", before, count=1))
     if thing and re.match(r"\w+ it\b", part):
         return re.sub(r"\bit\b", f"the {thing[1]}", part, count=1)
-    if re.fullmatch(r"stands?", part) and LOW.search(before):
-        return f"{part} up"
     if AROUND.search(before):
         return re.sub(r"^(walks?|goe?s?) back\b", r"\1 forward", part)
-    return part
+    return _upright(before, part)
+
+
+def _upright(before: str, part: str) -> str:
+    """A part that stands up after one that sits, and stands still after one that only bends."""
+    if LOW.search(before):
+        return f"{part} up" if re.fullmatch(r"stands?", part) else part
+    return "stands still" if UPRIGHT.fullmatch(part) and BENT.search(before) else part
 
 
 def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:

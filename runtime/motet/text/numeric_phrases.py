@@ -70,7 +70,7 @@ REWORDED_NUMBERS: tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...] =
     (r"\b(?:an? )?half(?: an?)?(?=[ -])", "0.5"),
     (rf"\b(?:an? )?(?:full|whole|complete) (?={WHOLE_TURN}\b)", "1 "),
     (r"\bin an? ((?:counter-?|anti-?)?clockwise) circle\b", r"\1 1 circle"),
-    (r"\bin circles?\b|\bin an? circle\b", "1 circle"),
+    (r"\bin (?:an? )?(?:(?:big|small|large|wide|tight|full|complete|whole) )?circles?\b", "1 circle"),
     (rf"\ban? (?=(?:{MEASURES})\b)", "1 "),
     (r"\b(?:does|do) an? (45|90|135|180|270|360|540|720)\b(?! deg)", r"turn \1"),
     (r"\b(turn\w*|rotat\w*|spin\w*|pivot\w*) (45|90|135|180|270|360|540|720)\b(?! deg)", r"\1 \2 deg"),
@@ -128,7 +128,8 @@ SIDE_PHRASES = re.compile(
 )
 PACE_PHRASES = re.compile(
     r"\b(?:(?:very|really|so|super|extremely) )?"
-    r"(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly|hastily|hurriedly|swiftly))\b"
+    r"(?:(slow(?:ly|er)?)|(?:fast(?:er)?|quick(?:ly|er)?|rapidly|briskly|hastily|hurriedly|swiftly"
+    r"|as fast as (?:possible|(?:you|he|she|it|they|one) can)))\b"
 )
 SLOWER = 0.75
 FASTER = 1.3

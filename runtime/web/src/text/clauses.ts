@@ -11,6 +11,8 @@ const SIDE_ALONE =
 const OBJECT =
   /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
 const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
+const BENT = /\b(?:bend|bow|stoop|touch|tie|tying|pick)/iu;
+const UPRIGHT = /^(?:stand|straighten|get|come)s? (?:back )?up(?: again| straight)?$/iu;
 const AROUND = /\b(?:turn\w* (?:a?round|180)|half turn)/iu;
 export const ADDRESSEE =
   /^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+/iu;
@@ -88,9 +90,14 @@ function after(before: string, part: string): string {
   if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
   const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
-  if (/^stands?$/u.test(part) && LOW.test(before)) return `${part} up`;
   if (AROUND.test(before)) return part.replace(/^(walks?|goe?s?) back\b/u, "$1 forward");
-  return part;
+  return upright(before, part);
+}
+
+/** A part that stands up after one that sits, and stands still after one that only bends. */
+function upright(before: string, part: string): string {
+  if (LOW.test(before)) return /^stands?$/u.test(part) ? `${part} up` : part;
+  return UPRIGHT.test(part) && BENT.test(before) ? "stands still" : part;
 }
 
 /** A text cut at each comma and "and" that a verb follows, if one came before. */
