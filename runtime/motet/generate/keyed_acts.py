@@ -106,6 +106,11 @@ class NamedAct:
         return self.below or BASE_SENTENCES.get(self.act.over, self.act.over)
 
     @property
+    def pace(self) -> float:
+        """How fast what it is laid over is played."""
+        return self.legs.pace if self.legs is not None else self.act.pace
+
+    @property
     def is_other_text(self) -> bool:
         """Whether it is no act by key poses, but a text that is shown instead."""
         return not self.act.keys
@@ -164,7 +169,11 @@ class NamedAct:
     def laid_over(self, frames: Array, contract: MotionContract, seed: int) -> Array:
         """Frames (T, D) of what is below the act, in the contract's channels, that do the act, too."""
         if self.legs is not None:
-            frames = self.legs.lasting(len(frames) / contract.fps, seed).laid_over(frames, contract, seed)
+            seconds = len(frames) / contract.fps
+            legs = self.legs.lasting(seconds, seed)
+            if legs.act.seconds(seed) > seconds:  # repeated once too often
+                legs = legs.lasting(seconds, seed)
+            frames = legs.laid_over(frames, contract, seed)
         base = contract.motion(frames, plant=False)
         acted = self.act.motion(base, seed, strict=False)
         shown = frames.copy()

@@ -12,7 +12,7 @@ from motet.bundle.graph import Floats
 from motet.decode.loop import Ids, Noise
 from motet.generate.codec import Codec, Context, StreamingDecoder
 from motet.generate.codes import CodesSettings, Source, Writer, drawn_actions, drawn_steps
-from motet.generate.keyed_acts import LOW_HIPS, STAYS, NamedAct
+from motet.generate.keyed_acts import LOW_HIPS, STAYS, WALKED_SECONDS, NamedAct
 from motet.generate.motion_measures import Seen, enough, fitted, played, turn_to_make, turned
 from motet.keyed.shipped import shipped
 from motet.motion.rotations import Array
@@ -262,8 +262,9 @@ class Teller:
         # as many steps as the act has, or more; what lasts longer than it may is begun, and cut off
         seconds = act.act.seconds(seed)
         limit = seconds if act.times else min(seconds, self.settings["max_seconds"])
-        last = max(1, round((request.seconds or limit) * self.contract.fps))
-        steps = self.codec.steps(max(seconds, request.seconds) * act.act.pace) + 1
+        length = request.seconds or (max(limit, WALKED_SECONDS) if act.legs or act.below else limit)
+        last = max(1, round(length * self.contract.fps))
+        steps = self.codec.steps(max(seconds, length) * act.pace) + 1
         action = self._action(request)
         frames = self._below(act, action, steps, context)
         shown = act.laid_over(frames, self.contract, seed)[:last]
@@ -271,7 +272,7 @@ class Teller:
 
     def _below(self, act: NamedAct, action: Ids, steps: int, context: Context | None) -> Array:
         """What an act is laid over: as many steps of an action, or the last frame of who sits, kneels or lies."""
-        frames = played(self._decoded(self._drawn(action, steps, context), context), act.act.pace)
+        frames = played(self._decoded(self._drawn(action, steps, context), context), act.pace)
         if context is None or not act.leaves("hips") or not self._is_below(LOW_HIPS, context):
             return frames
         held = np.repeat(context.frames[-1:], len(frames), axis=0)

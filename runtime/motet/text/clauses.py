@@ -10,11 +10,13 @@ from typing import NamedTuple
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
     r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|"
-    r"afterwards|finally|next(?!\s+to))\b,?\s*",
+    r"afterwards|finally|next(?!\s+to)|before(?=\s+(?:he|she|they|it|you|\w+ing)\b))\b,?\s*",
     re.IGNORECASE,
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)
-SUBJECT = re.compile(r"^((he|she|they|it|someone|somebody|(an?|the)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE)
+SUBJECT = re.compile(
+    r"^((he|she|they|it|someone|somebody|(an?|the|my|our)\s+\w+|\w+ly)(\s+(is|are))?\s+)+", re.IGNORECASE
+)
 """Words that may stand before the verb of a part: its subject, or an adverb."""
 
 DIRECTION = re.compile(
@@ -27,13 +29,16 @@ SIDE_ALONE = re.compile(
     r"(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?",
     re.IGNORECASE,
 )
+OTHER_SIDE = re.compile(
+    r"(?:with |on )?(?:the |your |his |her |their )?other(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
+)
 OBJECT = re.compile(
     r"\b(?:an?|the) (\w+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|\d|\w+ly\b)\w+)?)",
     re.IGNORECASE,
 )
 LOW = re.compile(r"\b(?:sit|kneel|lie|lay|crouch|squat|knee)\w*", re.IGNORECASE)
-BENT = re.compile(r"\b(?:bend|bow|stoop|touch|tie|tying|pick)", re.IGNORECASE)
-UPRIGHT = re.compile(r"(?:stand|straighten|get|come)s? (?:back )?up(?: again| straight)?", re.IGNORECASE)
+STOOPS = re.compile(r"\b(?:bend|bow|stoop|touch|tie|tying|pick)", re.IGNORECASE)
+RISES = re.compile(r"(?:stand|straighten|get|come)s? (?:back )?up(?: again| straight)?", re.IGNORECASE)
 AROUND = re.compile(r"\b(?:turn\w* (?:a?round|180)|half turn)", re.IGNORECASE)
 ADDRESSEE = re.compile(
     r"^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+", re.IGNORECASE
@@ -41,10 +46,11 @@ ADDRESSEE = re.compile(
 
 # fmt: off
 FUNCTION_WORDS = frozenset((
-    "a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "athlete", "be", "before", "boy", "by",
-    "finally", "first", "for", "from", "girl", "guy", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its",
-    "lady", "man", "my", "next", "of", "on", "or", "person", "she", "someone", "somebody", "that", "the", "their",
-    "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your",
+    "a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "athlete", "avatar", "be", "before",
+    "boy", "by", "character", "child", "finally", "first", "for", "from", "girl", "guy", "he", "her", "him", "his", "i",
+    "in", "into", "is", "it", "its", "kid", "lady", "man", "my", "next", "of", "on", "or", "our", "patient", "person",
+    "player", "she", "someone", "somebody", "student", "that", "the", "their", "them", "then", "they", "this", "to",
+    "up", "while", "who", "with", "woman", "worker", "you", "your",
 ))
 """Words that say little about an action."""
 # fmt: on
@@ -187,6 +193,8 @@ def _after(before: str, part: str) -> str:
     side = SIDE_ALONE.fullmatch(part)
     if side and re.search(r"\b(?:left|right)\b", before):
         return re.sub(r"\b(?:left|right)\b", side[1], before)
+    if OTHER_SIDE.fullmatch(part):
+        return re.sub(r"\b(?:left|right)\b", lambda said: "left" if said[0] == "right" else "right", before)
     thing = OBJECT.search(SUBJECT.sub("", before, count=1))
     if thing and re.match(r"\w+ it\b", part):
         return re.sub(r"\bit\b", f"the {thing[1]}", part, count=1)
@@ -199,7 +207,7 @@ def _upright(before: str, part: str) -> str:
     """A part that stands up after one that sits, and stands still after one that only bends."""
     if LOW.search(before):
         return f"{part} up" if re.fullmatch(r"stands?", part) else part
-    return "stands still" if UPRIGHT.fullmatch(part) and BENT.search(before) else part
+    return "stands still" if RISES.fullmatch(part) and STOOPS.search(before) else part
 
 
 def _before_verbs(text: str, verbs: Set[str]) -> Iterator[str]:

@@ -603,7 +603,7 @@ export const WARPING = {
 
 // motet.text.clauses
 export const CLAUSES = {
-  FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "athlete", "be", "before", "boy", "by", "finally", "first", "for", "from", "girl", "guy", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "lady", "man", "my", "next", "of", "on", "or", "person", "she", "somebody", "someone", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "you", "your"],
+  FUNCTION_WORDS: ["a", "after", "afterwards", "along", "am", "an", "and", "are", "as", "at", "athlete", "avatar", "be", "before", "boy", "by", "character", "child", "finally", "first", "for", "from", "girl", "guy", "he", "her", "him", "his", "i", "in", "into", "is", "it", "its", "kid", "lady", "man", "my", "next", "of", "on", "or", "our", "patient", "person", "player", "she", "somebody", "someone", "student", "that", "the", "their", "them", "then", "they", "this", "to", "up", "while", "who", "with", "woman", "worker", "you", "your"],
   POLITE_WORDS: ["a", "again", "an", "and", "do", "does", "finally", "first", "her", "his", "its", "just", "make", "makes", "my", "next", "now", "please", "take", "takes", "the", "their", "then", "to", "your"],
 } as const;
 

@@ -2,24 +2,26 @@
 import { CLAUSES } from "../generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
 const THEN =
-  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to))\b,?\s*/iu;
+  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to)|before(?=\s+(?:he|she|they|it|you|[\p{L}\p{N}_]+ing)\b))\b,?\s*/iu;
 const DIRECTION =
   /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
 const TIMES = / (?:once more|again|once|twice|\w+ times)\b/giu;
 const SIDE_ALONE =
   /^(?:with |on |(?:switch(?:es)?|changes?|swaps?) to )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
+const OTHER_SIDE =
+  /^(?:with |on )?(?:the |your |his |her |their )?other(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const OBJECT =
   /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
 const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
-const BENT = /\b(?:bend|bow|stoop|touch|tie|tying|pick)/iu;
-const UPRIGHT = /^(?:stand|straighten|get|come)s? (?:back )?up(?: again| straight)?$/iu;
+const STOOPS = /\b(?:bend|bow|stoop|touch|tie|tying|pick)/iu;
+const RISES = /^(?:stand|straighten|get|come)s? (?:back )?up(?: again| straight)?$/iu;
 const AROUND = /\b(?:turn\w* (?:a?round|180)|half turn)/iu;
 export const ADDRESSEE =
   /^(?:(?:hey|ok|okay) )?(?:robot|avatar|character|bot|dude|buddy|computer|guys?|man|boy|girl),\s+/iu;
 const ALSO = /\s*,\s*(?:and\s+)?|\s+and\s+/giu;
 /** Words that may stand before the verb of a part: its subject, or an adverb. */
 export const SUBJECT =
-  /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the)\s+\w+|\w+ly)(?:\s+(?:is|are))?\s+)+/iu;
+  /^(?:(?:he|she|they|it|someone|somebody|(?:an?|the|my|our)\s+\w+|\w+ly)(?:\s+(?:is|are))?\s+)+/iu;
 
 /** Words that say little about what is done. */
 export const FUNCTION_WORDS: ReadonlySet<string> = new Set(CLAUSES.FUNCTION_WORDS);
@@ -88,6 +90,8 @@ function after(before: string, part: string): string {
   }
   const side = SIDE_ALONE.exec(part);
   if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
+  if (OTHER_SIDE.test(part))
+    return before.replace(/\b(?:left|right)\b/gu, (said) => (said === "right" ? "left" : "right"));
   const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
   if (AROUND.test(before)) return part.replace(/^(walks?|goe?s?) back\b/u, "$1 forward");
@@ -97,7 +101,7 @@ function after(before: string, part: string): string {
 /** A part that stands up after one that sits, and stands still after one that only bends. */
 function upright(before: string, part: string): string {
   if (LOW.test(before)) return /^stands?$/u.test(part) ? `${part} up` : part;
-  return UPRIGHT.test(part) && BENT.test(before) ? "stands still" : part;
+  return RISES.test(part) && STOOPS.test(before) ? "stands still" : part;
 }
 
 /** A text cut at each comma and "and" that a verb follows, if one came before. */
