@@ -29,7 +29,7 @@ SIDE_ALONE = re.compile(
     r"(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?",
     re.IGNORECASE,
 )
-OTHER_SIDE = re.compile(
+THE_OTHER = re.compile(
     r"(?:with |on )?(?:the |your |his |her |their )?other(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
 )
 OBJECT = re.compile(
@@ -193,8 +193,8 @@ def _after(before: str, part: str) -> str:
     side = SIDE_ALONE.fullmatch(part)
     if side and re.search(r"\b(?:left|right)\b", before):
         return re.sub(r"\b(?:left|right)\b", side[1], before)
-    if OTHER_SIDE.fullmatch(part):
-        return re.sub(r"\b(?:left|right)\b", lambda said: "left" if said[0] == "right" else "right", before)
+    if THE_OTHER.fullmatch(part):
+        return re.sub(r"\b(?:left|right)\b", lambda side: "left" if side[0] == "right" else "right", before)
     thing = OBJECT.search(SUBJECT.sub("", before, count=1))
     if thing and re.match(r"\w+ it\b", part):
         return re.sub(r"\bit\b", f"the {thing[1]}", part, count=1)

@@ -8,7 +8,7 @@ const DIRECTION =
 const TIMES = / (?:once more|again|once|twice|\w+ times)\b/giu;
 const SIDE_ALONE =
   /^(?:with |on |(?:switch(?:es)?|changes?|swaps?) to )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
-const OTHER_SIDE =
+const THE_OTHER =
   /^(?:with |on )?(?:the |your |his |her |their )?other(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const OBJECT =
   /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
@@ -90,8 +90,8 @@ function after(before: string, part: string): string {
   }
   const side = SIDE_ALONE.exec(part);
   if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
-  if (OTHER_SIDE.test(part))
-    return before.replace(/\b(?:left|right)\b/gu, (said) => (said === "right" ? "left" : "right"));
+  if (THE_OTHER.test(part))
+    return before.replace(/\b(?:left|right)\b/gu, (word) => (word === "right" ? "left" : "right"));
   const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
   if (AROUND.test(before)) return part.replace(/^(walks?|goe?s?) back\b/u, "$1 forward");
