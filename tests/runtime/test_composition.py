@@ -53,6 +53,10 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
         ("walk left, then sit down again", ["walk left", "sit down again"]),
         ("carry a heavy box and drop it", ["carry a heavy box", "drop the heavy box"]),
         ("he sits, then stands", ["he sits", "stands up"]),
+        ("kick with the left foot, then the other one", ["kick with the left foot", "kick with the right foot"]),
+        ("wave before walking", ["wave", "walking"]),
+        ("she waves before she walks", ["she waves", "she walks"]),
+        ("wave before the house", ["wave before the house"]),
         ("bend down, then stand back up", ["bend down", "stands still"]),
         ("turn around, then walk back", ["turn around", "walk forward"]),
         ("walk, then back", ["walk", "back"]),  # no direction that it could take the place of

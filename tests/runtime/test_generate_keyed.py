@@ -306,6 +306,16 @@ def test_an_act_is_done_in_the_pace_of_the_sentence(model: motet.CodesModel, sen
     assert named.act.seconds(3) == pytest.approx(usual.seconds(3) / pace, abs=0.1)
 
 
+def test_a_walk_below_an_act_keeps_its_pace_and_goes_on_after_it(model: motet.CodesModel) -> None:
+    slow = model.generate("walk slowly while waving")[0].motion
+    usual = model.generate("walk while waving")[0].motion
+    speeds = [
+        np.linalg.norm(np.diff(global_transforms(motion)[1][:, 0], axis=0), axis=1).mean() for motion in (slow, usual)
+    ]
+    assert speeds[0] < 0.75 * speeds[1]
+    assert len(model.generate("walk while nodding")[0].motion) >= 4 * 30
+
+
 def test_what_comes_with_an_act_is_not_below_it(model: motet.CodesModel) -> None:
     named = model._keyed("wakes up with a start")
     assert named is not None

@@ -29,6 +29,8 @@ def model() -> CodesModel:
         ("turns clockwise by one hundred and twenty degrees", {"degrees": -120}),
         ("he makes a quarter turn to the right", {"degrees": -90}),
         ("walk in a circle", {"degrees": 360}),
+        ("walks in a big circle to the left", {"degrees": 360}),
+        ("run as fast as you can", {"pace": 1.3}),
         ("spins around twice", {"degrees": 720}),
         ("turn 720°", {"degrees": 720}),
         ("walk 1.5 m", {"metres": 1.5}),
