@@ -203,6 +203,8 @@ class SentenceModel(GenerateModel):
             act = self._keyed_usual(HAND_NAMED.sub("", sentence))
             if act and act.act.mirrored:
                 return act.with_hand(hand[1])
+            if act and BOTH_SIDES - {hand[1]} & stems_of(act.sentence.split()):
+                return replace(act, lacking=(*act.lacking, hand[1], "hand"))  # points left with the right hand
         return self._keyed_usual(sentence)
 
     def _keyed_usual(self, sentence: str) -> NamedAct | None:
