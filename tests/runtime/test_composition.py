@@ -54,6 +54,8 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
         ("carry a heavy box and drop it", ["carry a heavy box", "drop the heavy box"]),
         ("he sits, then stands", ["he sits", "stands up"]),
         ("kick with the left foot, then the other one", ["kick with the left foot", "kick with the right foot"]),
+        ("touch your nose, then your right knee", ["touch your nose", "touch your right knee"]),
+        ("raise your left arm, then your right one", ["raise your left arm", "raise your right arm"]),
         ("wave before walking", ["wave", "walking"]),
         ("she waves before she walks", ["she waves", "she walks"]),
         ("wave before the house", ["wave before the house"]),

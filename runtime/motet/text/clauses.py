@@ -32,6 +32,10 @@ SIDE_ALONE = re.compile(
 THE_OTHER = re.compile(
     r"(?:with |on )?(?:the |your |his |her |their )?other(?: (?:one|foot|hand|leg|arm|knee|side))?", re.IGNORECASE
 )
+TOUCHED = re.compile(r"(\w+) (?:the|your|his|her|their|my) (?:left |right )?\w+", re.IGNORECASE)
+THING_ALONE = re.compile(
+    r"(?:the|your|his|her|their|my) (?:left |right )?(?!left|right|one|other|side)\w+", re.IGNORECASE
+)
 OBJECT = re.compile(
     r"\b(?:an?|the) (\w+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|\d|\w+ly\b)\w+)?)",
     re.IGNORECASE,
@@ -190,17 +194,26 @@ def _after(before: str, part: str) -> str:
         following = before[directions[-1].end() :]
         own_times = TIMES.search(part)
         return before[: directions[-1].start()] + part + (TIMES.sub("", following) if own_times else following)
-    side = SIDE_ALONE.fullmatch(part)
-    if side and re.search(r"\b(?:left|right)\b", before):
-        return re.sub(r"\b(?:left|right)\b", side[1], before)
-    if THE_OTHER.fullmatch(part):
-        return re.sub(r"\b(?:left|right)\b", lambda side: "left" if side[0] == "right" else "right", before)
+    touched = TOUCHED.fullmatch(before)
+    if touched and THING_ALONE.fullmatch(part):
+        return f"{touched[1]} {part}"
+    if side := _side_of(before, part):
+        return re.sub(r"\b(?:left|right)\b", side, before)
     thing = OBJECT.search(SUBJECT.sub("", before, count=1))
     if thing and re.match(r"\w+ it\b", part):
         return re.sub(r"\bit\b", f"the {thing[1]}", part, count=1)
     if AROUND.search(before):
         return re.sub(r"^(walks?|goe?s?) back\b", r"\1 forward", part)
     return _upright(before, part)
+
+
+def _side_of(before: str, part: str) -> str:
+    """The side that a part says and nothing else, or that is not that of the part before it; "" where it says none."""
+    sides = re.findall(r"\b(?:left|right)\b", before)
+    if sides and THE_OTHER.fullmatch(part):
+        return "left" if sides[-1] == "right" else "right"
+    side = SIDE_ALONE.fullmatch(part)
+    return side[1] if sides and side else ""
 
 
 def _upright(before: str, part: str) -> str:

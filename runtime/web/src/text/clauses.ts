@@ -10,6 +10,8 @@ const SIDE_ALONE =
   /^(?:with |on |(?:switch(?:es)?|changes?|swaps?) to )?(?:the |your |his |her |their )?(left|right)(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
 const THE_OTHER =
   /^(?:with |on )?(?:the |your |his |her |their )?other(?: (?:one|foot|hand|leg|arm|knee|side))?$/iu;
+const TOUCHED = /^(\w+) (?:the|your|his|her|their|my) (?:left |right )?\w+$/iu;
+const THING_ALONE = /^(?:the|your|his|her|their|my) (?:left |right )?(?!left|right|one|other|side)\w+$/iu;
 const OBJECT =
   /\b(?:an?|the) ([\p{L}\p{N}_]+(?: (?!from|off|of|on|onto|in|into|with|at|to|and|up|down|over|once|twice|[0-9]|\w+ly\b)[\p{L}\p{N}_]+)?)/iu;
 const LOW = /\b(?:sit|kneel|lie|lay|crouch|squat|knee)/iu;
@@ -88,14 +90,21 @@ function after(before: string, part: string): string {
       before.slice(0, direction.index) + part + (direct === part ? following : following.replace(TIMES, ""))
     );
   }
-  const side = SIDE_ALONE.exec(part);
-  if (side && /\b(?:left|right)\b/u.test(before)) return before.replace(/\b(?:left|right)\b/gu, side[1]!);
-  if (THE_OTHER.test(part))
-    return before.replace(/\b(?:left|right)\b/gu, (word) => (word === "right" ? "left" : "right"));
+  const touched = TOUCHED.exec(before);
+  if (touched && THING_ALONE.test(part)) return `${touched[1]} ${part}`;
+  const side = sideOf(before, part);
+  if (side) return before.replace(/\b(?:left|right)\b/gu, side);
   const thing = OBJECT.exec(before.replace(SUBJECT, ""));
   if (thing && /^[\p{L}\p{N}_]+ it\b/u.test(part)) return part.replace(/\bit\b/u, `the ${thing[1]}`);
   if (AROUND.test(before)) return part.replace(/^(walks?|goe?s?) back\b/u, "$1 forward");
   return upright(before, part);
+}
+
+/** The side that a part says and nothing else, or that is not that of the part before it; "" where it says none. */
+function sideOf(before: string, part: string): string {
+  const sides = before.match(/\b(?:left|right)\b/gu) ?? [];
+  if (sides.length && THE_OTHER.test(part)) return sides.at(-1) === "right" ? "left" : "right";
+  return (sides.length && SIDE_ALONE.exec(part)?.[1]) || "";
 }
 
 /** A part that stands up after one that sits, and stands still after one that only bends. */
