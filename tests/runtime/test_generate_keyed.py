@@ -306,6 +306,11 @@ def test_an_act_is_done_in_the_pace_of_the_sentence(model: motet.CodesModel, sen
     assert named.act.seconds(3) == pytest.approx(usual.seconds(3) / pace, abs=0.1)
 
 
+def test_steps_and_repetitions_are_those_of_a_part(model: motet.CodesModel) -> None:
+    parts = model.parts("she steps to the right twice and then claps her hands")
+    assert parts == ["she steps to the right twice", "claps her hands"]
+
+
 def test_a_walk_below_an_act_keeps_its_pace_and_goes_on_after_it(model: motet.CodesModel) -> None:
     slow = model.generate("walk slowly while waving")[0].motion
     usual = model.generate("walk while waving")[0].motion

@@ -351,6 +351,9 @@ class SentenceModel(GenerateModel):
         quantities = self.quantities(sentence)
         if any(quantities_of(part).amounts not in ({}, quantities.amounts) for part in parts):
             return False
+        # steps and repetitions are those of a part
+        if quantities.amounts.keys() & {"steps", "times"}:
+            return False
         # Several commands are one only where they are known as one.
         if self._is_known(sentence, keyed=False):
             return True
