@@ -348,17 +348,20 @@ class SentenceModel(GenerateModel):
         verbs = set(map(first_verb, parts))
         if len(verbs) < len(parts):
             return False
-        quantities = self.quantities(sentence)
-        if any(quantities_of(part).amounts not in ({}, quantities.amounts) for part in parts):
-            return False
-        # steps and repetitions are those of a part
-        if quantities.amounts.keys() & {"steps", "times"}:
+        if not self._share_numbers(sentence, parts):
             return False
         # Several commands are one only where they are known as one.
         if self._is_known(sentence, keyed=False):
             return True
         says_all = verbs <= stems_of(self.vocabulary.rules.words(shown.action))
         return not all(self._is_known(part, keyed=not says_all) for part in parts)
+
+    def _share_numbers(self, sentence: str, parts: Sequence[str]) -> bool:
+        """Whether the numbers of a sentence may be those of all its parts, as steps and repetitions are not."""
+        amounts = self.quantities(sentence).amounts
+        if {"steps", "times"} & amounts.keys():
+            return False
+        return all(quantities_of(part).amounts in ({}, amounts) for part in parts)
 
     def _is_known(self, part: str, keyed: bool) -> bool:
         """Whether a part is a command or, if ``keyed``, an act by key poses."""
