@@ -362,6 +362,7 @@ def test_who_sits_kneels_or_lies_stays_so_where_nothing_is_to_be_done(model: mot
     story = model.story(sentence)
     rest = story.passages[-1]
     hips = global_transforms(story.motion)[1][round(30 * rest.start) : round(30 * rest.stop), 0, 1]
+    assert rest.action == "stay as you are"
     assert rest.stop - rest.start > 2.9
     assert hips.max() < 0.75
 

@@ -33,12 +33,12 @@ from motet.generate.continue_codes import ContinuationSettings
 from motet.generate.keyed_acts import (
     RESTS,
     STANDS,
-    stems_of,
+    STAYS,
 )
 from motet.generate.memory import Memory, MemorySettings
 from motet.generate.motion_measures import Seen, short
 from motet.generate.reading import NEVER, SentenceModel
-from motet.generate.story_decoder import Piece, Request, Teller, pace_of
+from motet.generate.story_decoder import KEPT, Piece, Request, Teller, pace_of
 from motet.models.language import texts_of
 from motet.motion.motion import Motion
 from motet.motion.rotations import Array
@@ -160,7 +160,7 @@ class CodesModel(SentenceModel):
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
         if (act := self._keyed(text)) and quantities.text == act.base and not act.is_other_text:
             return replace(request, keyed=act)
-        if "stand" not in stems_of(text.split()):
+        if "stand" not in text:
             request = replace(request, rests=RESTS.get(self._sentences[int(context.argmax())], 0.0))
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 
@@ -186,6 +186,8 @@ class CodesModel(SentenceModel):
 
     def _shown(self, request: Request, action: int) -> Shown:
         """How a request is shown; a TextWarning names the words that are left out."""
+        if action == KEPT:
+            return Shown(STAYS, (), 1.0)
         if request.keyed is not None:
             return self._warned(request.text, request.keyed.shown)
         sentence = request.quantities.text

@@ -193,8 +193,8 @@ class SentenceModel(GenerateModel):
         plain = self._keyed_by_hand(PACE_PHRASES.sub("", sentence).strip(" ,"))
         if plain is None or plain.lacking or plain.is_other_text:
             return act
-        pace = quantities_of(sentence).amounts.get("pace", 1.0)
-        return plain.at_pace(pace * pace)  # acts are short: less is not seen
+        # acts are short: less is not seen
+        return plain.at_pace(quantities_of(sentence).amounts.get("pace", 1.0) ** 2)
 
     def _keyed_by_hand(self, sentence: str) -> NamedAct | None:
         """The act of a sentence that does not say how long it lasts, done with the hand that it names, if it is one of

@@ -19,6 +19,9 @@ from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.numeric_phrases import Kind, Quantities
 
+KEPT = -1
+"""The action of a piece in which a figure stays as it is."""
+
 LONGEST_REQUEST = 300.0
 """Seconds that a request with a number lasts at most."""
 
@@ -193,7 +196,8 @@ class Teller:
     def _pieces_of(self, run: Sequence[tuple[int, Request]], context: Context | None) -> Iterator[Piece]:
         number, request = run[0]
         if self._is_below(request.rests, context):
-            return self._keyed(number, request, NamedAct(shipped(STAYS), STAYS), context)
+            kept = self._keyed(number, request, NamedAct(shipped(STAYS), STAYS), context)
+            return (piece._replace(action=KEPT) for piece in kept)
         if not request.to_measure:
             return self._flowing(run, context)
         if request.keyed is not None:
