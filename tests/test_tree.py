@@ -87,7 +87,7 @@ CEILINGS = {
     "motet.draw": 11_250,
     "motet.figures": 32_100,
     "motet.formats": 35_900,
-    "motet.generate": 34_500,
+    "motet.generate": 34_600,
     "motet.keyed": 9_900,
     "motet.live": 4_900,
     "motet.models": 10_300,

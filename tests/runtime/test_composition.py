@@ -56,6 +56,8 @@ def test_a_sentence_is_cut_before_its_verbs(sentence: str, parts: int) -> None:
         ("kick with the left foot, then the other one", ["kick with the left foot", "kick with the right foot"]),
         ("touch your nose, then your right knee", ["touch your nose", "touch your right knee"]),
         ("raise your left arm, then your right one", ["raise your left arm", "raise your right arm"]),
+        ("she stops to wave", ["she stops", "wave"]),
+        ("she stops to the left", ["she stops to the left"]),
         ("wave before walking", ["wave", "walking"]),
         ("she waves before she walks", ["she waves", "she walks"]),
         ("wave before the house", ["wave before the house"]),

@@ -306,6 +306,10 @@ def test_an_act_is_done_in_the_pace_of_the_sentence(model: motet.CodesModel, sen
     assert named.act.seconds(3) == pytest.approx(usual.seconds(3) / pace, abs=0.1)
 
 
+def test_a_text_for_a_command_is_shown_in_the_pace_of_the_sentence(model: motet.CodesModel) -> None:
+    assert model.parts("the patient gets out of bed slowly") == ["get up from the floor slowly"]
+
+
 def test_steps_and_repetitions_are_those_of_a_part(model: motet.CodesModel) -> None:
     parts = model.parts("she steps to the right twice and then claps her hands")
     assert parts == ["she steps to the right twice", "claps her hands"]

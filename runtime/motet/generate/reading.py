@@ -188,11 +188,15 @@ class SentenceModel(GenerateModel):
         """The act of a sentence that does not say how long it lasts; in its pace, if that is no part of the act."""
         act = self._keyed_by_hand(sentence)
         is_composed = re.search(r",| and | then ", sentence)
-        if (act and not act.lacking) or is_composed or not PACE_PHRASES.search(sentence):
+        pace = PACE_PHRASES.search(sentence)
+        if (act and not act.lacking) or is_composed or pace is None:
             return act
         plain = self._keyed_by_hand(PACE_PHRASES.sub("", sentence).strip(" ,"))
-        if plain is None or plain.lacking or plain.is_other_text:
+        if plain is None or plain.lacking:
             return act
+        if plain.is_other_text:
+            is_command = self._commands.act(plain.base) is not None
+            return replace(plain, act=replace(plain.act, over=f"{plain.base} {pace[0]}")) if is_command else act
         # acts are short: less is not seen
         return plain.at_pace(quantities_of(sentence).amounts.get("pace", 1.0) ** 2)
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 STOPS = re.compile(r"(?:[.!?;](?!\d)|\n)\s*")
 THEN = re.compile(
     r",?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|"
-    r"afterwards|finally|next(?!\s+to)|before(?=\s+(?:he|she|they|it|you|\w+ing)\b))\b,?\s*",
+    r"afterwards|finally|next(?!\s+to)|before(?=\s+(?:he|she|they|it|you|\w+ing)\b)|"
+    r"(?:(?<=\bstop )|(?<=\bstops ))to(?=\s+(?!(?:the|an?|his|her|your)\b)))\b,?\s*",
     re.IGNORECASE,
 )
 ALSO = re.compile(r"\s*,\s*(?:and\s+)?|\s+and\s+", re.IGNORECASE)

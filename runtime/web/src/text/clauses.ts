@@ -2,7 +2,7 @@
 import { CLAUSES } from "../generated.js";
 const STOPS = /(?:[.!?;](?![0-9])|\n)\s*/u;
 const THEN =
-  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to)|before(?=\s+(?:he|she|they|it|you|[\p{L}\p{N}_]+ing)\b))\b,?\s*/iu;
+  /,?\s*\b(?:(?:and|but)\s+)?(?:then|after that|(?<=and )after(?! (?:the|an?|this|his|her|their|your|\w+ing)\b)|afterwards|finally|next(?!\s+to)|before(?=\s+(?:he|she|they|it|you|[\p{L}\p{N}_]+ing)\b)|(?<=\bstops? )to(?=\s+(?!(?:the|an?|his|her|your)\b)))\b,?\s*/iu;
 const DIRECTION =
   /\b(?:to (?:the|your|his|her) )?(?:left|right|up|down|forwards?|backwards?|straight(?: ahead)?|ahead)\b/giu;
 const TIMES = / (?:once more|again|once|twice|\w+ times)\b/giu;
