@@ -160,7 +160,7 @@ class CodesModel(SentenceModel):
         request = Request(text, quantities, context, seconds or quantities.amounts.get("seconds", 0.0))
         if (act := self._keyed(text)) and quantities.text == act.base and not act.is_other_text:
             return replace(request, keyed=act)
-        if "stand" not in text:
+        if "stand" not in text:  # who is to stand does not stay as he sits
             request = replace(request, rests=RESTS.get(self._sentences[int(context.argmax())], 0.0))
         return replace(request, pace=pace_of(request, self.source, self.codec)) if paced else request
 

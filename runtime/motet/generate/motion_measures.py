@@ -206,8 +206,10 @@ class Seen:
         return [(i, j) for i, j in strokes(apart, 0.1) if apart[i:j].min() < 0.25]
 
     def _pushups(self) -> Spans:
-        """The chest sinks by 6 cm, as codes keep them of recorded 22, and rises again, over hands on the ground and as
-        low as the hips but for 50 cm."""
+        """The chest sinks by 6 cm and rises again, over hands on the ground and as low as the hips but for 50 cm.
+
+        Recorded push-ups sink by 22 cm, of which codes keep 14 at most.
+        """
         chest = self.joint("chest")[:, 1]
         hands = self.pair("Hand")[..., 1].max(axis=1)
         level = (hands < 0.3) & (np.abs(chest - self.joint("hips")[:, 1]) < 0.5)

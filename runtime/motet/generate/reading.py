@@ -195,8 +195,10 @@ class SentenceModel(GenerateModel):
         if plain is None or plain.lacking:
             return act
         if plain.is_other_text:
-            is_command = self._commands.act(plain.base) is not None
-            return replace(plain, act=replace(plain.act, over=f"{plain.base} {pace[0]}")) if is_command else act
+            if self._commands.act(plain.base) is None:
+                return act
+            paced = replace(plain.act, over=f"{plain.base} {pace[0]}")
+            return replace(plain, act=paced)
         # acts are short: less is not seen
         return plain.at_pace(quantities_of(sentence).amounts.get("pace", 1.0) ** 2)
 
@@ -207,8 +209,10 @@ class SentenceModel(GenerateModel):
             act = self._keyed_usual(HAND_NAMED.sub("", sentence))
             if act and act.act.mirrored:
                 return act.with_hand(hand[1])
-            if act and BOTH_SIDES - {hand[1]} & stems_of(act.sentence.split()):
-                return replace(act, lacking=(*act.lacking, hand[1], "hand"))  # points left with the right hand
+            # who points to the left with the right hand does so with the left one
+            other_side = BOTH_SIDES - {hand[1]}
+            if act and other_side & stems_of(act.sentence.split()):
+                return replace(act, lacking=(*act.lacking, hand[1], "hand"))
         return self._keyed_usual(sentence)
 
     def _keyed_usual(self, sentence: str) -> NamedAct | None:
