@@ -76,9 +76,9 @@ def going(before: Message, after: Message) -> Any:
 
 
 def test_every_message_of_the_page_does_what_it_says() -> None:
-    run, velocity, start, put, push, go, look, act, _, reach = of_a_client()
-    kinds = [message["type"] for message in (run, velocity, start, put, push, go, look, act, reach)]
-    assert kinds == ["control", "control", "start", "put", "push", "go_to", "look_at", "act", "reach"]
+    run, velocity, style, start, put, push, go, look, act, _, reach = of_a_client()
+    kinds = [message["type"] for message in (run, velocity, style, start, put, push, go, look, act, reach)]
+    assert kinds == ["control", "control", "control", "start", "put", "push", "go_to", "look_at", "act", "reach"]
 
     async def scenario(tell: Tell, hello: Message) -> None:
         shown = of_the_server()["hello"]
@@ -86,6 +86,7 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         assert (hello["fps"], hello["gaits"]["walk"]) == (shown["fps"], shown["gaits"]["walk"])
         assert hello["bones"][:2] == shown["bones"]
         assert hello["joints"][0] == shown["joints"][0]
+        assert hello["styles"][:2] == shown["styles"]
 
         await tell(run)
         first, second = await tell(run), await tell(run)
@@ -97,6 +98,12 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         await tell(velocity)
         first, second = await tell(velocity), await tell(velocity)
         np.testing.assert_allclose(going(first, second), velocity["velocity"], atol=0.3)
+
+        sad = await tell(style)
+        np.testing.assert_allclose(going(second, sad), velocity["velocity"], atol=0.3)
+        head = hello["bones"].index("head")
+        down = [frame["characters"][0]["rotations"][head][0] for frame in (second, sad)]
+        assert down[1] > down[0] + 0.1
 
         frame = await tell(start, 0)
         assert len(frame["characters"]) == start["characters"]

@@ -97,7 +97,7 @@ CEILINGS = {
     "motet.representation": 9_350,
     "motet.search": 3_600,
     "motet.serve": 16_800,
-    "motet.steering": 57_800,
+    "motet.steering": 60_500,
     "motet.text": 6_300,
     "motet_export": 12_400,
     "motet_train": 9_300,
@@ -106,7 +106,7 @@ CEILINGS = {
     "motet_train.evaluate": 52_400,
     "motet_train.models": 24_700,
     "motet_train.papers": 39_500,
-    "motet_train.recipes": 16_100,
+    "motet_train.recipes": 17_200,
 }
 """Nodes of the syntax tree by room, docstrings left out: today's, rounded up to hundreds. Lowered whenever a room gets
 smaller; raised only in a commit that says why."""

@@ -1,4 +1,5 @@
-"""Draw the acts by key poses that ship, one strip each: `python docs/results/acts.py`, for docs/acts.md."""
+"""Draw the acts by key poses and the styles that ship, one strip each, for docs/acts.md and docs/steer.md:
+`python docs/results/acts.py`."""
 
 from functools import partial
 from pathlib import Path
@@ -8,6 +9,7 @@ from PIL import Image
 
 import motet
 import motet.keyed
+from motet.steering.styles import STYLES
 from motet_train.evaluate.figures import bodies, panels, save
 
 FOLDER = Path(__file__).parents[1] / "figures"
@@ -18,6 +20,8 @@ SOME = (
 """Those of the picture in the README."""
 
 COLUMNS, PER_SHEET, POSES = 3, 51, 5
+
+STYLE_COLUMNS, STYLE_POSES = 2, 9
 
 
 def sheet(names: list[str], bases: dict[str, motet.Motion]) -> Figure:
@@ -34,6 +38,19 @@ def sheet(names: list[str], bases: dict[str, motet.Motion]) -> Figure:
     return picture
 
 
+def style_sheet(model: motet.SteerModel) -> Figure:
+    """Figures that walk in each style at its pace, two a row: two seconds, once the style has come."""
+    rows = -(-len(STYLES) // STYLE_COLUMNS)
+    picture, axes = panels(rows, STYLE_COLUMNS, (5 * STYLE_COLUMNS, 1.35 * rows))
+    for place in axes:
+        place.axis("off")
+    for name, place in zip(STYLES, axes, strict=False):
+        motion = model.run(f"walk 4s style {name}")
+        place.set_title(name, fontsize=8, loc="left")
+        bodies(place, motion[60:], STYLE_POSES)
+    return picture
+
+
 def main() -> None:
     """Write the sheets."""
     model = motet.load_as(motet.SteerModel, "control")
@@ -43,6 +60,7 @@ def main() -> None:
     for start in range(0, len(names), PER_SHEET):
         sheets[f"acts-{1 + start // PER_SHEET}"] = names[start : start + PER_SHEET]
     drawn = {name: partial(sheet, acts, bases) for name, acts in sheets.items()}
+    drawn["styles"] = partial(style_sheet, model)
     for path in save(drawn, FOLDER):
         Image.open(path).quantize(48).save(path, optimize=True)
 

@@ -76,6 +76,8 @@ MODULES = (
     "motet.steering.settings",
     "motet.steering.spoken",
     "motet.steering.stepping",
+    "motet.steering.style_layer",
+    "motet.steering.styles",
     "motet.steering.targets",
     "motet.steering.terrain",
     "motet.steering.turn_limit",

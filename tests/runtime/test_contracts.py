@@ -286,6 +286,11 @@ def acts(session: Any, numbers: Array) -> None:
         session.act(bend()[120 : 300 + 20 * number], ids=row)
 
 
+def goes_in_styles(session: Any, numbers: Array) -> None:
+    styles = [("limping", "none", "drunk", "tiptoe")[number % 4] for number in numbers]
+    session.control(speed=1.2, direction=50.0 * numbers, style=styles)
+
+
 def goes_to_places(session: Any, numbers: Array) -> None:
     for row, number in enumerate(numbers):
         session.go_to((number - 3.0, 3.0), ids=row)
@@ -303,6 +308,7 @@ SESSIONS = {
     "goes by gait": steered(goes_by_gait),
     "looks and reaches": steered(looks_and_reaches),
     "acts": steered(acts),
+    "goes in styles": steered(goes_in_styles),
     "goes to places": steered(goes_to_places),
     "goes over hills": steered(goes_over_hills),
 }

@@ -35,6 +35,8 @@ def steer(session: SteerSession, number: int) -> None:
     session.look_at((0.0, 1.0 + number, 3.0), ids=session.characters - 1)
     session.reach("left", (0.4, 1.2, 0.5), ids=session.characters - 1)
     session.go_to(ways[number], ids=session.characters - 1)
+    style = ["marching", "none", "drunk", "old", "tiptoe"][number]
+    session.control(style=[*session.styles[:-1], style])
 
 
 @pytest.mark.parametrize("hold_feet", [True, False])

@@ -207,8 +207,8 @@ def test_a_client_ends_an_act(steer_model: SteerModel) -> None:
     assert one.session.acting == [None]
     assert sentences('{"type": "act", "motion": ["wave", null, "bow"]}') == ["wave", "bow"]
     assert sentences('{"type": "put", "places": [0, 0, 0]}') == sentences('{"type": "act"}') == []
-    (note,) = ClientSession(steer_model).handle('{"type": "act", "motion": "tightrope"}')
-    assert note.startswith("'tightrope' is not known. Nearest: ")
+    (note,) = ClientSession(steer_model).handle('{"type": "act", "motion": "trapeze"}')
+    assert note.startswith("'trapeze' is not known. Nearest: ")
 
 
 def test_clients_do_not_touch_each_other(steer_model: SteerModel) -> None:

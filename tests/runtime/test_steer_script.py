@@ -12,10 +12,10 @@ GAITS = ("walk", "run")
 def test_orders_say_what_to_do_in_any_order_of_their_words() -> None:
     script = "walk 3s speed 1.4, turn left 90, walk backwards 2s, run turn right 45 4s, stop"
     assert parse_orders(script, GAITS) == [
-        Order("walk", 1.4, 0.0, 0.0, 3.0, "walk 3s speed 1.4"),
+        Order("walk", 1.4, 0.0, 0.0, 3.0, "walk 3s speed 1.4", style="none"),
         Order(None, -1.0, None, 90.0, 1.5, "turn left 90"),
-        Order("walk", None, 180.0, 0.0, 2.0, "walk backwards 2s"),
-        Order("run", None, 0.0, -45.0, 4.0, "run turn right 45 4s"),
+        Order("walk", None, 180.0, 0.0, 2.0, "walk backwards 2s", style="none"),
+        Order("run", None, 0.0, -45.0, 4.0, "run turn right 45 4s", style="none"),
         Order(None, 0.0, None, 0.0, 1.5, "stop"),
     ]
     assert parse_orders("go to 2 -3.5, go to -.5 0 speed 1.2 facing -90 4s", GAITS) == [

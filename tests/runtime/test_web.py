@@ -318,6 +318,13 @@ STEERED: list[dict[str, Any]] = [
     {"look_at": {"points": [[0.3, 4.0, 0.6], [2.3, 1.5, -1.5]]}, "set_ground": "ridges"},
     {"control": {"gait": "walk", "speed": 1.0, "direction": 0.0}},
     {},
+    # in styles, of which one goes with the steps, and with an act of the arms and of the body
+    {"set_ground": None, "look_at": {"points": None}, "control": {"style": ["marching", "drunk"]}},
+    *[{}] * 2,
+    {"act": {"ids": [0], "upper": True}, "control": {"speed": 0.0, "style": ["marching", "tiptoe"]}},
+    {},
+    {"act": {"ids": [1], "upper": False}, "control": {"style": ["none", "tiptoe"]}},
+    *[{}] * 2,
 ]
 """Calls of two figures' session, one after the other; after each three quarters of a second pass. What is acted is
 :func:`turning_about`, and for "crouch" :func:`crouching`."""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from motet.figures.humanoid import BONES
+from motet.steering.styles import STYLE_NAMES
 
 FIGURES = 12
 
@@ -36,6 +37,10 @@ def speeds(seed: int, high: float) -> list[float]:
 
 def gaits(first: int) -> list[str]:
     return [GAITS[(5 * figure + first) % len(GAITS)] for figure in range(FIGURES)]
+
+
+def styles(first: int) -> list[str]:
+    return list(STYLE_NAMES[first : first + FIGURES])
 
 
 def rounded(values: Any) -> Any:
@@ -165,6 +170,11 @@ CROWD: list[Calls] = [
     *rest(2),
     BEHIND_WALLS,
     *rest(4),
+    # in styles
+    {"keep_apart": None, **control(0, 52, 3, style=styles(1))},
+    {},
+    {"control": {"style": styles(5)}},
+    {},
 ]
 """Calls one after the other; after each three quarters of a second pass."""
 

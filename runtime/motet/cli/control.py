@@ -57,8 +57,8 @@ def control(
     """Run SCRIPT, such as "walk 3s speed 1.4, turn left 90, run 4s, stop", and write the motion.
 
     Orders are separated by commas: a gait, "turn" or "stop", and in any order seconds ("3s"), a speed in m/s ("speed
-    1.4"), a way ("backwards", "left", "right") and a turn in degrees ("turn left 90"). "act jump" does something
-    once, "act 'wave'" as the bundle generate shows it.
+    1.4"), a way ("backwards", "left", "right"), a turn in degrees ("turn left 90") and a style ("style limping").
+    "act jump" does something once, "act 'wave'" as the bundle generate shows it.
     With --bundle tdbn: a label and seconds; a ramp "walk>run 5s"; a mix "walk*.3+run*.7 2s".
     """
     output.check(out)

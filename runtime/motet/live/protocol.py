@@ -29,7 +29,7 @@ CLIENT_FIGURES = 16
 """Of a client."""
 
 KEYS = {
-    "control": ("gait", "speed", "direction", "facing", "velocity"),
+    "control": ("gait", "speed", "direction", "facing", "velocity", "style"),
     "start": ("characters", "gait", "places", "hold_feet", "positions"),
     "put": ("places",),
     "push": ("velocity",),
@@ -127,9 +127,11 @@ class ClientSession:
 
 
 def hello(model: SteerModel) -> str:
-    """The first message: gaits with their speeds in m/s (lowest, usual, highest), the rate, and the figure."""
+    """The first message: gaits with their speeds in m/s (lowest, usual, highest), styles, the rate, and the figure."""
     speeds = {gait: [low, model.usual[gait], high] for gait, (low, high) in model.speeds.items()}
-    return message("hello", fps=model.fps, gaits=speeds, bones=list(BONES), joints=HUMANOID.outline())
+    return message(
+        "hello", fps=model.fps, gaits=speeds, styles=list(model.styles), bones=list(BONES), joints=HUMANOID.outline()
+    )
 
 
 def message(kind: str, **fields: Any) -> str:
@@ -182,9 +184,9 @@ def _unfit(kind: str, name: str, value: Any) -> str | None:
     """What a value should be, where it is not."""
     if name in NUMBER_FIELDS and not _numeric(value, depth=2):
         return f"numbers up to {LARGEST_COMMAND:g}, or lists of them"
-    one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(gait, str) for gait in value)
-    if name == "gait" and not (isinstance(value, str) or one_for_each):
-        return "the name of a gait"
+    one_for_each = kind == "control" and isinstance(value, list) and all(isinstance(part, str) for part in value)
+    if name in ("gait", "style") and not (isinstance(value, str) or one_for_each):
+        return f"the name of a {name}"
     if name == "hand" and value not in LEFT_RIGHT:
         return " or ".join(LEFT_RIGHT)
     if name in ("motion", "text") and not _are_sentences(name, value):

@@ -165,6 +165,11 @@ class ActionLayer:
         return [playing and Done(playing.act.name, playing.age) for playing in self.playing]
 
     @property
+    def plays(self) -> Flags:
+        """Which figures (B,) play an act."""
+        return np.array([playing is not None for playing in self.playing])
+
+    @property
     def whole(self) -> Flags:
         """Which figures (B,) play an act with the whole body."""
         return np.array([playing is not None and playing.whole for playing in self.playing])
@@ -276,8 +281,7 @@ class ActionLayer:
 
     def _active(self) -> Rows:
         """The figures (n,) with an act or an offset."""
-        plays = np.array([playing is not None for playing in self.playing])
-        return np.flatnonzero(plays | (np.abs(self.offset).max(axis=1) > 0))
+        return np.flatnonzero(self.plays | (np.abs(self.offset).max(axis=1) > 0))
 
     def _show(self, shown: Body, velocity: Array) -> None:
         """Remember what is shown in this tick."""

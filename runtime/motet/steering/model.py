@@ -41,6 +41,8 @@ from motet.steering.settings import SteeringSettings
 from motet.steering.spoken import Reading, words_for
 from motet.steering.step import LOOPS, PoseCodes
 from motet.steering.stepping import StepSettings
+from motet.steering.style_layer import StyleSettings
+from motet.steering.styles import STYLE_NAMES
 from motet.steering.tables import FEATURE_STEPS
 from motet.steering.terrain import TerrainSettings
 from motet.steering.turn_limit import TurnSettings
@@ -62,12 +64,16 @@ class SteerModel(ControlModel):
 
     LOOPS = LOOPS
     ROLES = ()
+    styles = STYLE_NAMES
+    """The styles in which figures go, and "none"."""
+
     SETTINGS = (
         SteeringSettings,
         FootLockSettings,
         StepSettings,
         TerrainSettings,
         ActSettings,
+        StyleSettings,
         IdleSettings,
         LookSettings,
         ReachSettings,

@@ -1,7 +1,8 @@
 """The acts that a figure knows by name: ``repertoire.json``, made once by ``motet_train.recipes.repertoire``.
 
 Every other frame is kept, in whole numbers of :data:`STEPS_OF_UNIT` in a unit; each row is the difference from the row
-before. Letters in shapes: T frames, W numbers of a frame (:data:`motet.steering.acts.WIDTH`)."""
+before, whose sign is the lowest bit, so that small numbers have small codes ("zigzag"). Letters in shapes: T frames, W
+numbers of a frame (:data:`motet.steering.acts.WIDTH`)."""
 
 import json
 from collections.abc import Sequence
@@ -80,7 +81,8 @@ def entry_of(act: dict[str, Any]) -> Entry:
 @cache
 def _rows() -> Array:
     """The kept frames (N, W) of all acts."""
-    differences = unpacked(document())["frames"].astype(np.int64)
+    codes = unpacked(document())["frames"].astype(np.int64)
+    differences = (codes >> 1) ^ -(codes & 1)
     rows: Array = np.cumsum(differences, axis=0) / STEPS_OF_UNIT
     return rows
 

@@ -10,6 +10,7 @@ from motet.motion.rotations import Array
 from motet.steering.acts import Act
 from motet.steering.repertoire import entries
 from motet.steering.spoken import Step
+from motet.steering.styles import NO_STYLE, PACES, style_number
 
 if TYPE_CHECKING:
     from motet.steering.model import SteerModel
@@ -106,8 +107,11 @@ def _go(step: Step, session: "SteerSession") -> None:
     speeds = np.hypot(*session.target[:, :2].T)
     if step.name:
         low, high = model.speeds[step.name]
-        pace = min(max(step.pace * model.usual[step.name], low), high)
-        session.control(gait=step.name, speed=pace, direction=direction, facing=facing)
+        style = step.style or NO_STYLE
+        speed = step.pace * PACES[style_number(style)] * model.usual[step.name]
+        session.control(
+            gait=step.name, speed=min(max(speed, low), high), direction=direction, facing=facing, style=style
+        )
     elif step.change == 1:
         session.control(speed=speeds, direction=direction, facing=facing)
     else:

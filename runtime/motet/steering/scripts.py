@@ -3,8 +3,9 @@
 Orders in words: ``walk 3s speed 1.4, turn left 90, run 4s, walk backwards 2s, stop``. An order is a
 gait, ``turn`` or ``stop``, followed in any order by a duration (``3s``; else 2 s, or 1.5 s of a turn or stop), a speed
 (``speed 1.4`` in m/s; else the gait's usual one), a way (``backwards``, ``left``, ``right``, relative to the facing,
-which does not change), and an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``). A turn alone
-keeps gait, speed and way. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s;
+which does not change), an angle in degrees to turn (``turn left 90``, or ``walk 3s turn right 45``), and a style
+(``style limping``, at its own pace where no speed is given; else a gait is as recorded). A turn alone keeps gait,
+speed, way and style. ``act 'wave'`` is a sentence of what to do beside that, with a duration after it or 3 s;
 ``act jump`` is a gait that goes nowhere, done once.
 ``go to 2 -3.5`` goes to x and z in metres and stands there, facing as it comes or ``facing 90``; with a speed, or the
 gait's usual one, until the next order, after its duration or 5 s.
@@ -14,12 +15,15 @@ import re
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from motet.errors import ScriptError
 from motet.models.control import LONGEST_SCRIPT
+from motet.steering.styles import NO_STYLE, STYLE_NAMES
 
 OTHER_VERBS = ("turn", "stop", "act", "go")  # orders besides gaits
 WAY_ANGLES = {"forward": 0.0, "left": 90.0, "backwards": 180.0, "right": -90.0}  # degrees from the facing to the left
+USUAL = {"turn": (None, None, 1.5, None), "stop": (None, None, 1.5, None)}  # gait, way, seconds and style of others
 NUMBER = r"\d+\.?\d*|\.\d+"
 SIGNED = f"-?({NUMBER})"
 
@@ -45,6 +49,8 @@ class Order:
     """x and z in metres to go to."""
     facing: float | None = None
     """The facing there, in degrees, None for any."""
+    style: str | None = None
+    """None for the previous one."""
 
 
 def parse_orders(script: str, gaits: Sequence[str]) -> list[Order]:
@@ -82,15 +88,19 @@ class _Words:
             return self.go()
         if kind not in (*gaits, *OTHER_VERBS):
             raise self.fail(f"unknown order {kind!r}; expected one of {', '.join((*gaits, *OTHER_VERBS))}")
-        # what an order does not say has the usual value
         details = self.details(self.turn() if kind == "turn" else {})
-        turn = details.get("turn", 0.0)
-        seconds = details.get("seconds", 1.5 if kind in ("turn", "stop") else 2.0)
-        if kind == "stop":
-            return Order(None, 0.0, None, turn, seconds, self.caption)
-        if kind == "turn":
-            return Order(None, details.get("speed", -1.0), details.get("way"), turn, seconds, self.caption)
-        return Order(kind, details.get("speed"), details.get("way", 0.0), turn, seconds, self.caption)
+        # what an order does not say has the usual value; a turn or a stop keeps the gait, the way and the style
+        gait, way, seconds, style = USUAL.get(kind, (kind, 0.0, 2.0, NO_STYLE))
+        speed = details.get("speed", -1.0 if kind == "turn" else None)
+        return Order(
+            gait,
+            0.0 if kind == "stop" else speed,
+            way if kind == "stop" else details.get("way", way),
+            details.get("turn", 0.0),
+            details.get("seconds", seconds),
+            self.caption,
+            style=details.get("style", style),
+        )
 
     def act(self) -> Order:
         words = [self.take("what to do, such as 'wave'"), *(word for word, _ in self.left)]
@@ -105,21 +115,21 @@ class _Words:
         if self.take("to") != "to":
             raise self.fail("expected to, such as go to 2 3.5")
         goal = self.number("x in metres", SIGNED), self.number("z in metres", SIGNED)
-        details = dict[str, float]()
+        details = dict[str, Any]()
         while self.left:
             if self.left[0][0] == "facing":
                 self.take("facing")
                 more = {"facing": self.number("degrees", SIGNED)}
             else:
                 more = self.detail()
-            if more.keys() & (details.keys() | {"turn", "way"}):
+            if more.keys() & (details.keys() | {"turn", "way", "style"}):
                 raise self.fail("go to takes seconds, speed and facing, each once")
             details |= more
         seconds = details.get("seconds", 5.0)
         facing = details.get("facing")
         return Order(None, details.get("speed"), None, 0.0, seconds, self.caption, goal=goal, facing=facing)
 
-    def details(self, details: dict[str, float]) -> dict[str, float]:
+    def details(self, details: dict[str, Any]) -> dict[str, Any]:
         """All details of the order, with those that are known."""
         while self.left:
             detail = self.detail()
@@ -128,7 +138,7 @@ class _Words:
             details |= detail
         return details
 
-    def detail(self) -> dict[str, float]:
+    def detail(self) -> dict[str, Any]:
         word = self.take("more")
         if re.fullmatch(f"({NUMBER})s", word):
             return {"seconds": float(word[:-1])}
@@ -138,7 +148,17 @@ class _Words:
             return {"speed": self.number("metres a second")}
         if word == "turn":
             return self.turn()
-        raise self.fail('expected seconds such as "3s", "speed 1.4", "turn left 90", or a way such as "backwards"')
+        if word == "style":
+            return {"style": self.style()}
+        raise self.fail(
+            'expected seconds such as "3s", "speed 1.4", "turn left 90", "style limping", or a way such as "backwards"'
+        )
+
+    def style(self) -> str:
+        name = self.take("a style")
+        if name not in STYLE_NAMES:
+            raise self.fail(f"unknown style {name!r}; expected one of {', '.join(STYLE_NAMES)}")
+        return name
 
     def turn(self) -> dict[str, float]:
         side = self.take("left or right")

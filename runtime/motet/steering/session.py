@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from motet.errors import ControlError, ControlWarning, TextError, needs, warn
 from motet.figures.humanoid import BONES, LEFT_RIGHT
@@ -32,6 +32,8 @@ from motet.steering.scripts import Order, parse_orders
 from motet.steering.spoken import Reading
 from motet.steering.step import tick
 from motet.steering.stepping import Plan, StepSettings, planned
+from motet.steering.style_layer import StyleLayer, StyleSettings
+from motet.steering.styles import PACES, STYLE_NAMES, style_number
 from motet.steering.targets import CharacterIds, checked_path, chosen_ids, numbers_of
 from motet.steering.terrain import GroundHeight, Terrain, TerrainLayer, TerrainSettings
 from motet.steering.turn_limit import TurnLimit, TurnSettings
@@ -51,6 +53,7 @@ class SteerSnapshot:
 
     playback: Playback
     actions: ActionLayer
+    style: StyleLayer
     idle: IdleLayer
     command: Command
     lock: FootLock | None
@@ -109,6 +112,7 @@ class SteerSession:
         self._state = SteerSnapshot(
             playback=playback,
             actions=ActionLayer.none(model.matcher, model.pose_codes, playback),
+            style=StyleLayer.none(characters),
             idle=IdleLayer.none(characters),
             command=Command(np.full(characters, gait), zero, zero, zero, zero > 0),
             lock=FootLock.none(characters) if hold_feet else None,
@@ -135,35 +139,49 @@ class SteerSession:
         direction: ArrayLike | None = None,
         facing: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
+        style: str | Sequence[str] | None = None,
     ) -> None:
-        """Set where the characters go from now on, a number for all or one for each; values not given stay.
+        """Set where and how the characters go from now on, a value for all or one for each; values not given stay.
 
         gait: one of ``model.gaits``. speed: m/s. direction: of travel, in degrees. facing: in degrees; if only the
         direction is given, they face it. velocity: (2,) or (characters, 2) along x and z in m/s, for example from a
-        gamepad's stick, instead of speed and direction; (0, 0) stops, facing as before.
+        gamepad's stick, instead of speed and direction; (0, 0) stops, facing as before. style: one of ``model.styles``,
+        such as "limping", in which they go and stand, at the same speed and on their ways; "none" ends it.
         A speed outside the gait's range is clamped with one warning (ControlWarning), or refused if the session is
         strict; a gait that only goes forward faces the way it goes. ControlError for values that are not numbers or do
         not fit; the control is unchanged then.
         """
-        before = self._state.command
         numbers = self._command_numbers(speed, direction, facing)
         gaits = self._gaits(gait)
-        # a direction is faced until a facing is given
-        faces_way = before.faces_way
-        if direction is not None:
-            faces_way = np.ones_like(faces_way)
-        # a velocity is a speed and a direction; standing figures keep theirs
+        styles = self._styles(style)
         if velocity is not None:
             if speed is not None or direction is not None:
                 raise ControlError("give a velocity, or speed and direction, not both")
-            x, z = self._numbers("a velocity needs x and z", velocity, 2).T
-            numbers["speed"] = np.hypot(x, z)
-            goes = numbers["speed"] > 0
-            numbers["direction"] = np.where(goes, np.arctan2(x, z), before.direction)
-            faces_way = before.faces_way | goes
-        if facing is not None:
-            faces_way = np.zeros_like(faces_way)
-        self._set(replace(before, gait=gaits, faces_way=faces_way, **numbers).turned())
+            numbers |= self._by_velocity(velocity)
+        # a direction is faced until a facing is given
+        if "facing" in numbers:
+            numbers["faces_way"] = np.zeros(self.characters, dtype=bool)
+        elif direction is not None:
+            numbers["faces_way"] = np.ones(self.characters, dtype=bool)
+        # a style alone leaves them on their ways
+        if numbers or gait is not None:
+            self._set(replace(self._state.command, gait=gaits, **numbers).turned())
+        self._state.style = replace(self._state.style, wanted=styles)
+
+    def _by_velocity(self, velocity: ArrayLike) -> dict[str, NDArray[Any]]:
+        """The speed, the direction and what is faced of a velocity; standing figures keep the last two."""
+        before = self._state.command
+        x, z = self._numbers("a velocity needs x and z", velocity, 2).T
+        speed = np.hypot(x, z)
+        goes = speed > 0
+        direction = np.where(goes, np.arctan2(x, z), before.direction)
+        return {"speed": speed, "direction": direction, "faces_way": before.faces_way | goes}
+
+    def _styles(self, names: str | Sequence[str] | None) -> Rows:
+        """The numbers of styles (characters,), None for the present ones."""
+        if names is None:
+            return self._state.style.wanted
+        return np.array([style_number(name) for name in self._for_each("styles", names)])
 
     @property
     def target(self) -> Array:
@@ -181,6 +199,11 @@ class SteerSession:
     def gaits(self) -> list[str]:
         """The gait of each character."""
         return [self.model.gaits[gait] for gait in self._state.command.gait.tolist()]
+
+    @property
+    def styles(self) -> list[str]:
+        """The style of each character, "none" of those that go as recorded."""
+        return [STYLE_NAMES[style] for style in self._state.style.wanted.tolist()]
 
     def say(self, text: str, here: ArrayLike = (0.0, 0.0)) -> Reading:
         """Let all characters do what a sentence says: "wave", "walk slowly, then bow twice", "turn left and run".
@@ -204,9 +227,9 @@ class SteerSession:
 
     def _command_numbers(
         self, speed: ArrayLike | None, direction: ArrayLike | None, facing: ArrayLike | None
-    ) -> dict[str, Array]:
+    ) -> dict[str, NDArray[Any]]:
         """What a command gives of speed, direction and facing, angles in radians."""
-        numbers = dict[str, Array]()
+        numbers = dict[str, NDArray[Any]]()
         for name, value in (("speed", speed), ("direction", direction), ("facing", facing)):
             if value is not None:
                 values = self._numbers(f"{name} needs a number", value)
@@ -234,10 +257,14 @@ class SteerSession:
         """The numbers of gaits (characters,), None for the present ones."""
         if names is None:
             return self._state.command.gait
+        return np.array([self.model.abilities.number(name) for name in self._for_each("gaits", names)])
+
+    def _for_each(self, what: str, names: str | Sequence[str]) -> list[str]:
+        """A name for each character, of one for all or one for each."""
         each = list(names) if isinstance(names, Iterable) and not isinstance(names, str) else [names] * self.characters
         if len(each) != self.characters:
-            raise ControlError(f"{len(each)} gaits do not fit {self.characters} characters")
-        return np.array([self.model.abilities.number(name) for name in each])
+            raise ControlError(f"{len(each)} {what} do not fit {self.characters} characters")
+        return each
 
     def tick(self) -> Pose:
         """The next pose of all characters, 1 / ``model.fps`` seconds later."""
@@ -288,6 +315,10 @@ class SteerSession:
         # actions: acts are laid over the pose, and lead whole bodies
         pose = state.actions.update(pose, playback, root_before, changed, settings(ActSettings), model.fps)
         self._face_as_acted()
+        # style: laid over who moves or stands
+        if state.style.shows:
+            whole = state.actions.whole
+            state.style, pose = state.style.update(pose, whole, state.actions.plays, settings(StyleSettings), seconds)
         # idle, again: breath; foot lock: standing feet stay in place
         if state.lock is not None:
             pose = state.idle.breathe(pose, settings(IdleSettings), seconds)
@@ -550,7 +581,7 @@ class SteerSession:
         """The act that the session's model of words makes of a sentence that is not known by name."""
         if self._words is None:
             reading = self.model.read_said(sentence)
-            order = f"{sentence!r} is no single act: say it, by session.say"
+            order = f"{sentence!r} is no single act: say it, by session.say."
             reason = order if reading.steps else reading.caption.removeprefix("? ")
             raise TextError(f"{reason} Other sentences need start(words=motet.load('generate'))")
         return self._words.shown(sentence, self.strict)
@@ -714,14 +745,14 @@ class SteerSession:
         aside = wrapped(before.direction - facing) if order.way is None else np.radians(order.way)
         # a gait alone means its usual speed; a negative speed keeps the present one
         if order.speed is None:
-            gaits = before.gait if order.gait is None else self._gaits(order.gait)
-            speed = self.model.abilities.speeds[gaits, 1]
+            speed = self.model.abilities.speeds[self._gaits(order.gait), 1] * PACES[self._styles(order.style)]
         elif order.speed >= 0:
             speed = np.full(self.characters, order.speed)
         else:
             speed = before.speed
         degrees = np.degrees(facing) + order.turn
-        self.control(gait=order.gait, speed=speed, direction=degrees + np.degrees(aside), facing=degrees)
+        direction = degrees + np.degrees(aside)
+        self.control(gait=order.gait, speed=speed, direction=direction, facing=degrees, style=order.style)
 
     def frames_of(self, poses: Sequence[Pose]) -> Array:
         """Frames (characters, T, D) in the contract's units of consecutive poses."""

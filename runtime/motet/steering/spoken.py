@@ -13,6 +13,7 @@ from itertools import chain
 from typing import Any
 
 from motet.steering.repertoire import Entry, document, entries
+from motet.steering.styles import NO_STYLE
 from motet.text.clauses import stem
 from motet.text.spelling import corrected
 
@@ -45,9 +46,9 @@ class Step:
 
     kind: "act", "go", "stop", "here" (come here) or "away". name: of the act, or of the gait, "" for the present one.
     side: of the act, "left" or "right", "" for that in which it is shown. tempo: of the act. count: how often it is
-    done. pace: of the gait's usual speed, 0 for the present speed. change: of the present speed. way: degrees to the
-    left of the facing. aside: whether the facing stays. curve: degrees a second to the left. seconds: that it lasts, 0
-    where it stays. together: with the step before it.
+    done. style: in which it goes, "" for as recorded. pace: of the usual speed of that, 0 for the present speed.
+    change: of the present speed. way: degrees to the left of the facing. aside: whether the facing stays. curve:
+    degrees a second to the left. seconds: that it lasts, 0 where it stays. together: with the step before it.
     """
 
     kind: str
@@ -55,6 +56,7 @@ class Step:
     side: str = ""
     tempo: float = 1.0
     count: int = 1
+    style: str = ""
     pace: float = 0.0
     change: float = 1.0
     way: float = 0.0
@@ -87,6 +89,7 @@ class Step:
             side = "left" if self.way > 0 else "right"
             words.append("turn around" if abs(self.way) == 180 else f"turn {side}")
             words += [] if abs(self.way) in (90, 180) else [f"{abs(self.way):g} degrees"]
+        words += [f"({self.style})"] if self.style else []
         return " ".join(words)
 
 
@@ -138,6 +141,7 @@ class Words:
         self.orders = self._keyed(table["phrases"])
         self.still = self._keyed({"stop": table["still"]})
         self.kinds = self._kinds()
+        self.styles = self._styles()
         # words that may be said beside an act or an order, and all that are known
         self.limbs = frozenset(chain.from_iterable(act.limbs for act in acts.values()))
         self.manner = frozenset(chain(*(table[name] for name in ("slow", "fast", "loud", "times", "counts"))))
@@ -150,6 +154,18 @@ class Words:
         for kind, words in self.table["orders"].items():
             kinds |= dict.fromkeys(map(stem, words), kind)
         return kinds | {stem(gait): gait for gait in self.gaits}
+
+    def _styles(self) -> list[tuple[frozenset[str], bool, str]]:
+        """Of each phrase for a style, the longest first, what its words share but for a gait, whether it names one, and
+        the style; without those that mean no more than a pace."""
+        passed = {*self.kinds, *map(stem, (*self.table["slow"], *self.table["fast"]))}
+        styles = list[tuple[frozenset[str], bool, str]]()
+        for key, name in self._keyed(self.table["styles"]).items():
+            roots = frozenset(key.split())
+            gaits = frozenset(root for root in roots if self.kinds.get(root) in self.gaits)
+            if not roots <= passed:
+                styles.append((roots - gaits, bool(gaits), name))
+        return sorted(styles, key=lambda style: -len(style[0]))
 
     def _keyed(self, meanings: Mapping[str, Iterable[str]]) -> dict[str, str]:
         """Key -> meaning, of the phrases of each meaning."""
@@ -167,7 +183,8 @@ class Words:
                 yield from words if isinstance(words, list) else ()
         yield from self.gaits
         phrases = [act.phrases for act in self.acts.values()]
-        for phrase in chain(*phrases, self.table["still"], *self.table["phrases"].values()):
+        orders = (*self.table["phrases"].values(), *self.table["styles"].values())
+        for phrase in chain(*phrases, self.table["still"], *orders):
             yield from words_of(phrase)
 
     def key(self, words: str | Iterable[str]) -> str:
@@ -243,21 +260,15 @@ class Words:
         words = [word for word in all_words if word not in self.idle]
         key = self.key(words)
         order = self.orders.get(key)
-        if order in ("here", "away"):
-            return Step(order)
         if order is not None:
-            return {
-                "around": Step("go", way=180.0),
-                "faster": Step("go", change=FAST_FACTOR),
-                "slower": Step("go", change=SLOW_FACTOR),
-            }[order]
+            return ORDER_PHRASES[order]
         act = self._act(words)
         if act is not None:
             return act
         stops = words and (words[0] in self.table["stop"] or any(word in self.table["never"] for word in words))
         if stops or (key and key in self.still):
             return Step("stop")
-        return self._order(words)
+        return self._styled_order(words) or self._order(words)
 
     def _act(self, words: Sequence[str]) -> Step | None:
         """The act of words, with its side, tempo and count."""
@@ -349,6 +360,17 @@ class Words:
             return None
         return self._gone(kinds, side, numbers[0] if numbers else None, pace)
 
+    def _styled_order(self, words: Sequence[str]) -> Step | None:
+        """The order of words of which some name a style, as in "limp backwards"; None for any other."""
+        roots = set(map(self.root, words))
+        goes = any(self.kinds.get(root) in self.gaits for root in roots)
+        for phrase, needs_gait, style in self.styles:
+            if phrase <= roots and (goes or not needs_gait):
+                rest = [word for word in words if self.root(word) not in phrase]
+                step = self._order(rest if goes else [*rest, self.gaits[0]])
+                return step and replace(step, style="" if style == NO_STYLE else style)
+        return None
+
     def _kinds_and_numbers(self, words: Iterable[str]) -> tuple[list[str], list[int]] | None:
         """The kinds of the words of an order, and its numbers; None for a word that is neither, nor tells a manner."""
         passed = frozenset((*self.table["slow"], *self.table["fast"], *self.table["loud"]))
@@ -367,10 +389,9 @@ class Words:
 
     def _gone(self, kinds: Sequence[str], side: str, number: int | None, pace: float) -> Step | None:
         """The order of kinds of words, a side, a number and a pace."""
-        # a gait by name; a jog is a slow run
         sign = -1.0 if side == "right" else 1.0
         pace *= JOG if "jog" in kinds else 1.0
-        gait = next((kind for kind in kinds if kind in self.gaits), "run" if "jog" in kinds else "")
+        gait = self._gait(kinds)
         steps = "step" in kinds
         degrees = 90.0 if number is None or steps else float(number)
         # no word of going: a turn
@@ -381,6 +402,12 @@ class Words:
         curve = sign * CURVE if "circle" in kinds else 0.0
         gone = Step("go", gait or self.gaits[0], pace=pace, way=way, aside=aside, curve=curve)
         return replace(gone, seconds=STEP * (number or 2)) if steps else gone
+
+    def _gait(self, kinds: Sequence[str]) -> str:
+        """The gait of kinds of words, "" for none: in "walk like a zombie" the later one of the figure's; a jog is a
+        slow run."""
+        named = [kind for kind in kinds if kind in self.gaits]
+        return max(named, key=self.gaits.index, default="run" if "jog" in kinds else "")
 
     def nearest(self, text: str) -> tuple[str, ...]:
         """The names that are most like a text that is not known."""

@@ -547,6 +547,25 @@ export const stepSettings = ranges({
   rests: { default: 0.5, low: 0, high: 1, whole: false },
 });
 
+// motet.steering.style_layer
+export const STYLE_LAYER = {
+  LEAST_STYLE: 0.01,
+} as const;
+
+// motet.steering.style_layer.StyleSettings
+export const styleSettings = ranges({
+  fades: { default: 0.18, low: 0.01, high: 10, whole: false },
+  sways: { default: 0.06, low: 0.01, high: 10, whole: false },
+});
+
+// motet.steering.styles
+export const STYLES = {
+  ARMS: ["leftUpperArm", "leftLowerArm", "leftHand", "rightUpperArm", "rightLowerArm", "rightHand"],
+  NO_STYLE: "none",
+  STEPS_OF_STYLE: 1000,
+  TURNED: ["hips", "spine", "chest", "upperChest", "neck", "head", "leftShoulder", "rightShoulder"],
+} as const;
+
 // motet.steering.targets
 export const TARGETS = {
   LARGEST_COMMAND: 1000000,

@@ -8,7 +8,6 @@ Acts are recordings as ``generate`` shows them, parts of which are chosen and jo
 
 import json
 import tomllib
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ from motet.motion.rotations import Array
 from motet.steering.model import SteerModel
 from motet.steering.repertoire import SEAM, STEPS_OF_UNIT, at_tempo, joined
 from motet_train.data.errors import DataError
+from motet_train.recipes.styles import as_written, phrases
 
 KEPT_COLUMNS = ("name", "also", "side", "limb")
 """What the document keeps of the table."""
@@ -72,11 +72,6 @@ class Maker:
         return part if start < stop else part[::-1]
 
 
-def as_written(act: motet.keyed.KeyedAct) -> motet.keyed.KeyedAct:
-    """An act at the speed, of the size and on the side that its keys say."""
-    return replace(act, speed=(1.0, 1.0), amplitude=(1.0, 1.0), mirrored=False)
-
-
 def continuous(numbers: Array) -> Array:
     """Frames (T, W) whose quaternions keep their signs from row to row."""
     quats = numbers[:, :-4].reshape(len(numbers), -1, 4)
@@ -102,7 +97,12 @@ def made(acts: Json, maker: Maker) -> Json:
         documents[act["name"]] = {key: act[key] for key in KEPT_COLUMNS if key in act} | more
     # all frames as one block of small differences
     frames = packed({"frames": differences(np.concatenate(rows))})
-    return {"words": words(acts["words"]), "acts": [*documents.values()], "steps": STEPS_OF_UNIT, **frames}
+    return {
+        "words": {**words(acts["words"]), "styles": phrases()},
+        "acts": [*documents.values()],
+        "steps": STEPS_OF_UNIT,
+        **frames,
+    }
 
 
 def arms_alone(act: Json, kept: Array) -> bool:
@@ -124,10 +124,11 @@ def words(texts: Json) -> Json:
     return lists
 
 
-def differences(numbers: Array) -> NDArray[np.int16]:
-    """Frames of acts, one after the other, as whole steps from row to row."""
+def differences(numbers: Array) -> NDArray[np.uint16]:
+    """Frames of acts, one after the other, as whole steps from row to row: 0, -1, 1, -2, 2 are 0, 1, 2, 3, 4."""
     whole = np.round(numbers * STEPS_OF_UNIT)
-    return np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]))).astype(np.int16)
+    steps = np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]))).astype(np.int16)
+    return ((steps << 1) ^ (steps >> 15)).view(np.uint16)
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ const KINDS = {
   u1: Uint8Array,
   i4: Int32Array,
   i2: Int16Array,
+  u2: Uint16Array,
   f2: Uint16Array,
 };
 

@@ -124,7 +124,9 @@ function addText(page: Page): void {
     if (text.value.trim()) reply(page.obey(text.value));
     text.select();
   };
-  element("known").append(...[...page.repertoire.entries.keys(), ...ORDERS].map((name) => new Option(name)));
+  const styles = page.net.model.styles.slice(1).map((name) => `walk ${name}`);
+  const known = [...page.repertoire.entries.keys(), ...ORDERS, ...styles];
+  element("known").append(...known.map((name) => new Option(name)));
   text.onkeydown = ({ key }) => {
     if (key === "Escape") element("canvas").focus();
   };

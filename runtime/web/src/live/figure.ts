@@ -107,6 +107,11 @@ export class Figure {
     this.steered.acting.request = { act, upper };
   }
 
+  /** The number of the style in which it goes from now on. */
+  set style(number: number) {
+    this.steered.style.wanted = number;
+  }
+
   /** What it does, and the seconds that are left of it. */
   get acting(): Doing | null {
     return doing(this.steered.acting, this.model.fps);

@@ -129,6 +129,11 @@ export class Page {
     }
   }
 
+  /** The number of the style in which figures go from now on. */
+  style(number: number, all: boolean): void {
+    for (const figure of all ? this.figures : [this.figures[0]!]) figure.style = number;
+  }
+
   /** End what figures do. */
   rest(all: boolean): void {
     for (const figure of all ? this.figures : [this.figures[0]!]) figure.act(null);

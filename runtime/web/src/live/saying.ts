@@ -3,7 +3,8 @@ import { fastest, usual } from "./crowd.js";
 import type { Page } from "./page.js";
 import { goTo, Order } from "./pilots.js";
 import { RADIANS } from "../motion/rotations.js";
-import { SAYING } from "../generated.js";
+import { SAYING, STYLES } from "../generated.js";
+import { paceOfStyle, styleNumber } from "../steering/styleLayer.js";
 import type { Reading, Step } from "../steering/spoken.js";
 
 export class Saying {
@@ -58,6 +59,7 @@ export class Saying {
     } else {
       const before = { gait: figure.wanted.gait, speed: Math.hypot(figure.wanted.x, figure.wanted.z) };
       const { gait, speed } = paceOf(step, before, page);
+      if (step.name) page.style(styleNumber(step.style || STYLES.NO_STYLE), this.all);
       const turn = step.aside ? 0 : step.way;
       const aside = step.aside ? step.way : 0;
       page.pilot = new Order(gait, speed, facing + RADIANS * turn, RADIANS * aside, RADIANS * step.curve);
@@ -82,13 +84,14 @@ function secondsOf(step: Step): number {
 
 /** The gait and the speed of a step, from those before it. */
 function paceOf(
-  { name, pace, change }: Step,
+  { name, style, pace, change }: Step,
   before: { gait: number; speed: number },
   { net }: Page,
 ): { gait: number; speed: number } {
   if (name) {
     const gait = net.gaits.indexOf(name);
-    return { gait, speed: pace * usual(net, gait) };
+    const ofStyle = paceOfStyle(styleNumber(style || STYLES.NO_STYLE));
+    return { gait, speed: pace * ofStyle * usual(net, gait) };
   }
   const { gait } = before;
   if (change === 1) return before;

@@ -13,6 +13,7 @@ import {
   reachSettings,
   steeringSettings,
   stepSettings,
+  styleSettings,
   terrainSettings,
   turnSettings,
 } from "../generated.js";
@@ -25,6 +26,7 @@ import { BONES } from "../figures/humanoid/bones.js";
 import { Matcher, type Tables } from "./matching.js";
 import { Model } from "../models/base.js";
 import { Steerer } from "./step.js";
+import { STYLE_NAMES } from "./styleLayer.js";
 
 export interface StartSettings {
   /** By default the first. */
@@ -44,11 +46,14 @@ export interface StartSettings {
 /** A figure that goes where it is told, in several gaits. */
 export class ControlModel extends Model {
   readonly gaits: readonly string[];
+  /** The styles in which figures go, and "none". */
+  readonly styles = STYLE_NAMES;
   readonly abilities: Gaits;
   readonly steerer: Steerer;
   readonly lock = this.tuned("foot_lock", footLockSettings);
   readonly steps = this.tuned("stepping", stepSettings);
   readonly acts = this.tuned("acting", actSettings);
+  readonly styling = this.tuned("style", styleSettings);
   readonly idle = this.tuned("idle", idleSettings);
   readonly look = this.tuned("look", lookSettings);
   readonly reach = this.tuned("reach", reachSettings);

@@ -18,7 +18,7 @@ interface GivenAct {
   mirror?: boolean;
 }
 
-/** The file: words, acts, and every other frame of all acts, each row the difference from the row before. */
+/** The file: words, acts, and every other frame of all acts, each row the difference from the row before, its sign the lowest bit. */
 export interface GivenActs extends Packed {
   words: WordTable;
   acts: GivenAct[];
@@ -68,7 +68,8 @@ export class Repertoire {
 
   static async of(file: GivenActs, model: ActModel): Promise<Repertoire> {
     const { frames } = await unpacked(file);
-    const rows = Float64Array.from(frames!);
+    // the sign is the lowest bit
+    const rows = Float64Array.from(frames!, (code) => (code >> 1) ^ -(code & 1));
     for (let at = ACTS.WIDTH; at < rows.length; at++) rows[at]! += rows[at - ACTS.WIDTH]!;
     const numbers = rows.map((value) => value / file.steps);
     return new Repertoire(model, file, numbers);

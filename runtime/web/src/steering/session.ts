@@ -16,6 +16,7 @@ import { about, product, type Quaternion, RADIANS, turnAt, type Vector, Y } from
 import { wrapped } from "../motion/springs.js";
 import { hasten, standing, type Steered, tell, tick } from "./steered.js";
 import { between, copyPose, newPose, type Played } from "./step.js";
+import { STYLE_NAMES, styleNumber } from "./styleLayer.js";
 import { checkedGround, type GroundHeight, newTerrain } from "./terrain.js";
 
 /** A pose as `posesOf` gives it, and where its figure is. */
@@ -49,6 +50,8 @@ export interface Told {
   facing?: ForAll<number>;
   /** Along x and z in m/s, such as from a gamepad's stick, in place of speed and direction; [0, 0] stops. */
   velocity?: Rows;
+  /** One of `model.styles`, such as "limping", in which they go and stand, at the same speed and on their ways; "none" ends it. */
+  style?: ForAll<string>;
 }
 
 /** How figures go to points. Angles are in degrees. */
@@ -119,8 +122,10 @@ export class ControlSession {
    * Set where the figures go from now on. A speed outside a gait's range is clamped and the console warned once, or
    * refused if the session is strict. ControlError for what does not fit; nothing changes then.
    */
-  control({ gait, speed, direction, facing, velocity }: Told): void {
+  control({ style, ...orders }: Told): void {
+    const { gait, speed, direction, facing, velocity } = orders;
     const gaits = gait === undefined ? undefined : this.gaits(gait);
+    const styles = style === undefined ? undefined : this.forEach("styles", style).map(styleNumber);
     const speeds = this.each("speed", speed);
     const directions = this.each("direction", direction);
     const facings = this.each("facing", facing);
@@ -136,7 +141,14 @@ export class ControlSession {
       if (directions) changes.direction = directions[at]! * RADIANS;
       return changed(command, changes);
     });
-    this.tell(commands);
+    // a style alone leaves them on their ways
+    if (Object.values(orders).some((value) => value !== undefined)) this.tell(commands);
+    styles?.forEach((number, at) => (this.state.figures[at]!.style.wanted = number));
+  }
+
+  /** The style of each figure, "none" of those that go as recorded. */
+  get styles(): string[] {
+    return this.state.figures.map(({ style }) => STYLE_NAMES[style.wanted]!);
   }
 
   private tell(commands: Command[]): void {
@@ -468,12 +480,17 @@ export class ControlSession {
   }
 
   private gaits(gaits: ForAll<string>): number[] {
-    const names = Array.isArray(gaits)
-      ? (gaits as string[])
-      : Array<string>(this.characters).fill(gaits as string);
-    if (names.length !== this.characters)
-      throw new ControlError(`${names.length} gaits do not fit ${this.characters} characters`);
-    return names.map((name) => this.model.abilities.number(name));
+    return this.forEach("gaits", gaits).map((name) => this.model.abilities.number(name));
+  }
+
+  /** A name for each figure, of one for all or one for each. */
+  private forEach(what: string, names: ForAll<string>): string[] {
+    const each = Array.isArray(names)
+      ? (names as string[])
+      : Array<string>(this.characters).fill(names as string);
+    if (each.length !== this.characters)
+      throw new ControlError(`${each.length} ${what} do not fit ${this.characters} characters`);
+    return each;
   }
 
   /** A number for each figure; none if none is given. */

@@ -1,5 +1,5 @@
 /* What a typed sentence asks a figure for: motet/steering/spoken.py, which says what each part is. */
-import { SPOKEN } from "../generated.js";
+import { SPOKEN, STYLES } from "../generated.js";
 import { clamp } from "../motion/springs.js";
 import { stem } from "../text/clauses.js";
 import { corrected } from "../text/spelling.js";
@@ -25,6 +25,7 @@ export type WordTable = Record<(typeof LISTS)[number] | "still", string[]> & {
   sides: Record<string, string[]>;
   orders: Record<string, string[]>;
   phrases: Record<string, string[]>;
+  styles: Record<string, string[]>;
 };
 
 /** A part of what is said. Angles are degrees to the left. */
@@ -34,6 +35,7 @@ export interface Step {
   side: string;
   tempo: number;
   count: number;
+  style: string;
   pace: number;
   change: number;
   way: number;
@@ -48,6 +50,7 @@ const PLAIN: Omit<Step, "kind"> = {
   side: "",
   tempo: 1,
   count: 1,
+  style: "",
   pace: 0,
   change: 1,
   way: 0,
@@ -104,7 +107,7 @@ function stepCaption(step: Step): string {
   return { stop: "stop", here: "come here", away: "go away" }[kind];
 }
 
-function wayCaption({ name, pace, change, way, aside, curve }: Step): string {
+function wayCaption({ name, style, pace, change, way, aside, curve }: Step): string {
   const words = name ? [name] : [];
   if (pace !== 0 && pace !== 1) words.push(pace < SPOKEN.JOG ? "slowly" : pace > 1 ? "fast" : "at a jog");
   if (change !== 1) words.push(change > 1 ? "faster" : "slower");
@@ -115,7 +118,15 @@ function wayCaption({ name, pace, change, way, aside, curve }: Step): string {
     words.push(degrees === 180 ? "turn around" : `turn ${way > 0 ? "left" : "right"}`);
     if (degrees !== 90 && degrees !== 180) words.push(`${degrees} degrees`);
   }
+  if (style) words.push(`(${style})`);
   return words.join(" ");
+}
+
+/** A phrase for a style: what its words share but for a gait, and whether it names one. */
+interface StylePhrase {
+  roots: string[];
+  namesGait: boolean;
+  style: string;
 }
 
 export class Words {
@@ -125,6 +136,7 @@ export class Words {
   private readonly orders = new Map<string, string>();
   private readonly still: Set<string>;
   private readonly kinds = new Map<string, string>();
+  private readonly styles: StylePhrase[];
   private readonly limbs: Set<string>;
   private readonly manner: Set<string>;
   private readonly known: string[];
@@ -149,6 +161,7 @@ export class Words {
       for (const word of words) this.kinds.set(stem(word), kind);
     }
     for (const gait of gaits) this.kinds.set(stem(gait), gait);
+    this.styles = this.stylePhrases();
     this.limbs = new Set([...this.acts.values()].flatMap(({ limbs }) => [...limbs]));
     const { slow, fast, loud, times, counts } = table;
     this.manner = new Set([...slow, ...fast, ...loud, ...times, ...Object.keys(counts)]);
@@ -168,8 +181,31 @@ export class Words {
     }
     yield* this.gaits;
     const phrases = [...this.acts.values()].flatMap((act) => act.phrases);
-    for (const phrase of [...phrases, ...table.still, ...Object.values(table.phrases).flat()])
-      yield* wordsOf(phrase);
+    const orders = Object.values(table.phrases).flat();
+    const styles = Object.values(table.styles).flat();
+    for (const phrase of [...phrases, ...table.still, ...orders, ...styles]) yield* wordsOf(phrase);
+  }
+
+  /** The phrases for styles, the longest first, without those that mean no more than a pace. */
+  private stylePhrases(): StylePhrase[] {
+    const { slow, fast } = this.table;
+    const passed = new Set([...this.kinds.keys(), ...[...slow, ...fast].map(stem)]);
+    const styles = new Map<string, string>();
+    for (const [style, texts] of Object.entries(this.table.styles)) {
+      for (const text of texts) styles.set(this.key(text), style);
+    }
+    const phrases: StylePhrase[] = [];
+    for (const [key, style] of styles) {
+      const roots = key.split(" ");
+      const others = roots.filter((root) => !this.isGait(root));
+      const namesGait = others.length < roots.length;
+      if (!roots.every((root) => passed.has(root))) phrases.push({ roots: others, namesGait, style });
+    }
+    return phrases.sort((a, b) => b.roots.length - a.roots.length);
+  }
+
+  private isGait(root: string): boolean {
+    return this.gaits.includes(this.kinds.get(root) ?? "");
   }
 
   /** What a phrase shares with others of the same words: their stems without idle ones, sorted. */
@@ -260,7 +296,7 @@ export class Words {
     const stops =
       words.length > 0 && (stop.includes(words[0]!) || words.some((word) => never.includes(word)));
     if (stops || (key && this.still.has(key))) return stepOf("stop");
-    return this.order(words);
+    return this.styledOrder(words) ?? this.order(words);
   }
 
   /** The act of words, with its side, tempo and count. */
@@ -342,6 +378,19 @@ export class Words {
     return Object.hasOwn(this.table.counts, word) ? this.table.counts[word]! : null;
   }
 
+  /** The order of words of which some name a style, as in "limp backwards"; null for any other. */
+  private styledOrder(words: readonly string[]): Step | null {
+    const spoken = words.map((word) => this.root(word));
+    const goes = spoken.some((root) => this.isGait(root));
+    for (const { roots, namesGait, style } of this.styles) {
+      if (!roots.every((root) => spoken.includes(root)) || (namesGait && !goes)) continue;
+      const rest = words.filter((word) => !roots.includes(this.root(word)));
+      const step = this.order(goes ? rest : [...rest, this.gaits[0]!]);
+      return step && { ...step, style: style === STYLES.NO_STYLE ? "" : style };
+    }
+    return null;
+  }
+
   /** The order of words to go, turn or change the pace; null for any other word among them. */
   private order(words: readonly string[]): Step | null {
     const side = this.side(words);
@@ -371,7 +420,8 @@ export class Words {
     if (kinds.length === 1 && has("turn") && !side) return null;
     const sign = side === "right" ? -1 : 1;
     const jogs = has("jog");
-    const gait = kinds.find((kind) => this.gaits.includes(kind)) ?? (jogs ? "run" : "");
+    // "walk like a zombie" is its gait
+    const gait = this.gaits.findLast(has) ?? (jogs ? "run" : "");
     if (!gait && !SPOKEN.GOING_KINDS.some(has)) {
       return stepOf("go", { way: sign * (has("around") ? 180 : (number ?? 90)) });
     }

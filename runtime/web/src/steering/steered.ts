@@ -12,12 +12,14 @@ import { idle, type Reach, reached } from "./reachLayer.js";
 import { breathed, kept, notYet, type Standing } from "./idle.js";
 import { newPose, type Played, type Steerer } from "./step.js";
 import { planOf } from "./stepping.js";
+import { noStyle, type Style, styled } from "./styleLayer.js";
 import { grounded, type GroundHeight, newTerrain, slowed, type Terrain } from "./terrain.js";
 import { type Joints, limited, newJoints } from "./turnLimit.js";
 
 export interface Steered {
   playback: Playback;
   acting: Acting;
+  style: Style;
   lock: Lock;
   terrain: Terrain;
   standing: Standing;
@@ -49,6 +51,7 @@ export function standing(steerer: Steerer, gait: number, place?: Ground, phase?:
   return {
     playback,
     acting: noAct(steerer, playback),
+    style: noStyle(),
     lock: newLock(),
     terrain: newTerrain(),
     standing: notYet(),
@@ -100,6 +103,7 @@ export function tick(
   if (holdFeet) kept(figure.standing, pose, playback, root, target, whole, settings, dt);
   laid(model, acting, pose, playback, root, changed);
   if (whole && !command.speed) stand(figure);
+  styled(figure.style, pose, whole, !!acting.playing, model.styling, dt);
   // feet held and on the ground
   const plan = whole
     ? null
