@@ -46,6 +46,7 @@ def folder(clone: Path) -> Path:
         motion = read_motion(ROOT / f"train/motet_train/data/cmu/{trial}.amc")
         for extension in ("amc", "bvh", "npz"):
             write_motion(clone / f"{name}.{extension}", motion)
+    (clone / "acts.toml").write_text(blocks(PAGES["docs/keyed.md"].read_text(), "toml")[0])
     (clone / "character.bvh").symlink_to(ROOT / "tests/runtime/skeletons/mixamo.bvh")
     return clone
 

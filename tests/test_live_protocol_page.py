@@ -76,9 +76,9 @@ def going(before: Message, after: Message) -> Any:
 
 
 def test_every_message_of_the_page_does_what_it_says() -> None:
-    run, velocity, style, start, put, push, go, look, act, _, reach = of_a_client()
-    kinds = [message["type"] for message in (run, velocity, style, start, put, push, go, look, act, reach)]
-    assert kinds == ["control", "control", "control", "start", "put", "push", "go_to", "look_at", "act", "reach"]
+    run, velocity, _, start, put, push, go, look, act, _, reach = of_a_client()
+    kinds = [message["type"] for message in (run, velocity, start, put, push, go, look, act, reach)]
+    assert kinds == ["control", "control", "start", "put", "push", "go_to", "look_at", "act", "reach"]
 
     async def scenario(tell: Tell, hello: Message) -> None:
         shown = of_the_server()["hello"]
@@ -86,7 +86,6 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         assert (hello["fps"], hello["gaits"]["walk"]) == (shown["fps"], shown["gaits"]["walk"])
         assert hello["bones"][:2] == shown["bones"]
         assert hello["joints"][0] == shown["joints"][0]
-        assert hello["styles"][:2] == shown["styles"]
 
         await tell(run)
         first, second = await tell(run), await tell(run)
@@ -98,12 +97,6 @@ def test_every_message_of_the_page_does_what_it_says() -> None:
         await tell(velocity)
         first, second = await tell(velocity), await tell(velocity)
         np.testing.assert_allclose(going(first, second), velocity["velocity"], atol=0.3)
-
-        sad = await tell(style)
-        np.testing.assert_allclose(going(second, sad), velocity["velocity"], atol=0.3)
-        head = hello["bones"].index("head")
-        down = [frame["characters"][0]["rotations"][head][0] for frame in (second, sad)]
-        assert down[1] > down[0] + 0.1
 
         frame = await tell(start, 0)
         assert len(frame["characters"]) == start["characters"]
@@ -163,6 +156,22 @@ def test_the_page_names_all_that_a_client_may_say() -> None:
 def test_the_page_names_all_that_may_happen() -> None:
     (listed,) = re.findall(r'Kinds are (".*?")\.', PAGE.replace("\n", " "))
     assert re.findall(r'"(.*?)"', listed) == list(get_args(Happening))
+
+
+def test_a_style_of_the_page_is_gone_in() -> None:
+    _, velocity, style, *_ = of_a_client()
+    assert style == {"type": "control", "style": "sad"}
+
+    async def scenario(tell: Tell, hello: Message) -> None:
+        assert hello["styles"][:2] == of_the_server()["hello"]["styles"]
+        plain = await tell(velocity)
+        sad = await tell(style)
+        np.testing.assert_allclose(going(plain, sad), velocity["velocity"], atol=0.3)
+        head = hello["bones"].index("head")
+        down = [frame["characters"][0]["rotations"][head][0] for frame in (plain, sad)]
+        assert down[1] > down[0] + 0.1
+
+    with_server(scenario)
 
 
 def test_a_note_and_an_error_are_as_the_page_says() -> None:

@@ -1,5 +1,6 @@
 """Sentences of acts that nobody recorded: laid by their key poses over a figure that stands."""
 
+import json
 import tomllib
 import warnings
 from pathlib import Path
@@ -10,11 +11,12 @@ from command_line import run
 
 import motet
 import motet.keyed
-from motet.errors import TextWarning, collected
+from motet.errors import ArgumentError, TextError, TextWarning, collected
 from motet.figures.humanoid import HUMANOID
-from motet.generate.keyed_acts import STANDS, act_named, act_within, without_subject
+from motet.generate.act_index import SHIPPED_ACTS
+from motet.generate.keyed_acts import STANDS
 from motet.keyed.shipped import LIBRARY, TEXTS
-from motet.motion.kinematics import global_transforms
+from motet.motion.kinematics import global_transforms, positions
 
 OTHER_TEXTS = tomllib.loads((LIBRARY / "says.toml").read_text(encoding="utf-8"))[TEXTS]
 
@@ -41,7 +43,7 @@ def model() -> motet.CodesModel:
     ],
 )
 def test_an_act_is_named_by_all_words_and_no_others(words: str, name: str | None) -> None:
-    named = act_named(words.split())
+    named = SHIPPED_ACTS.named(words.split())
     assert (named and named.act.name) == name
 
 
@@ -61,7 +63,7 @@ def test_an_act_is_named_by_all_words_and_no_others(words: str, name: str | None
     ],
 )
 def test_who_acts_and_in_which_manner_names_no_act(words: str, left: str) -> None:
-    assert without_subject(words.split()) == left.split()
+    assert SHIPPED_ACTS.without_subject(words.split()) == left.split()
 
 
 def test_whoever_does_it_an_act_is_shown(model: motet.CodesModel) -> None:
@@ -72,8 +74,8 @@ def test_whoever_does_it_an_act_is_shown(model: motet.CodesModel) -> None:
 
 
 def test_a_side_is_that_of_the_hand() -> None:
-    right = act_named(["wave", "right"])
-    left = act_named(["wave", "left"])
+    right = SHIPPED_ACTS.named(["wave", "right"])
+    left = SHIPPED_ACTS.named(["wave", "left"])
     assert right is not None
     assert set(right.act.keys[0].hands) == {"right_hand"}
     assert left is not None
@@ -159,8 +161,8 @@ def test_a_sentence_may_say_more_than_an_act(
 
 
 def test_what_is_recorded_comes_before_a_part_of_an_act(model: motet.CodesModel) -> None:
-    assert act_within(["run", "to", "the", "door"]) is None
-    assert act_within(["puts", "hands", "on", "the", "thighs"]) is None  # "put hands up" has another particle
+    assert SHIPPED_ACTS.within(["run", "to", "the", "door"]) is None
+    assert SHIPPED_ACTS.within(["puts", "hands", "on", "the", "thighs"]) is None  # "put hands up" has another particle
     assert "box" in model.likeliest("a person lifts a box").action
 
 
@@ -423,3 +425,67 @@ def test_a_participle_is_done_at_the_same_time(model: motet.CodesModel) -> None:
     assert walk.action == "clap"
     places = global_transforms(walk.motion)[1][:, 0]
     assert places[-1, 2] - places[0, 2] < -1.5
+
+
+ACTS = """
+[frobnicate]
+says = ["frobnicate", "do the frob"]
+
+[[frobnicate.key]]
+at = 0.5
+hold = 1
+left_hand = { to = "top of head" }
+
+[raise_hand]
+says = ["wave"]
+
+[[raise_hand.key]]
+at = 0.5
+hold = 1
+right_hand = { to = "above" }
+"""
+
+
+def test_acts_of_a_caller_are_generated_as_those_that_ship(tmp_path: Path, model: motet.CodesModel) -> None:
+    (tmp_path / "acts.toml").write_text(ACTS)
+    acts = motet.keyed.read(tmp_path / "acts.toml")
+    knows = model.with_acts(acts)
+    for text, shown in {
+        "the elf frobnicates": ["frobnicate"],
+        "a person does the frob": ["frobnicate"],
+        "she walks and then frobnicates": ["a person walks forward", "frobnicate"],
+        # in place of the recordings, and of the act that ships
+        "a person waves": ["wave"],
+    }.items():
+        story = knows.story([text])
+        assert [passage.action for passage in story.passages] == shown
+        assert not any(passage.lacking for passage in story.passages)
+    # a hand is on the head, and above it, where the keys have them
+    heights = [joint_heights(knows, text) for text in ("frobnicate", "wave")]
+    assert heights[0]["leftHand"] > heights[0]["head"]
+    assert heights[1]["rightHand"] > heights[1]["head"] + 0.2
+    # the model itself knows none of them
+    with pytest.raises(TextError, match="knows no word of 'frobnicate'"):
+        model.unknown("frobnicate")
+    with pytest.raises(ArgumentError, match="expected acts by name"):
+        model.with_acts(["frobnicate"])  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="expected an act by key poses"):
+        model.with_acts({"frobnicate": "top of head"})  # type: ignore[dict-item]
+
+
+def joint_heights(model: motet.CodesModel, text: str) -> dict[str, float]:
+    """The height of each joint in the middle of what is shown for a text."""
+    motion = model.story([text]).motion
+    heights = positions(motion)[len(motion) // 2, :, 1]
+    return dict(zip(motion.skeleton.names, heights.tolist(), strict=True))
+
+
+def test_the_command_knows_acts_of_a_file(tmp_path: Path) -> None:
+    (tmp_path / "acts.toml").write_text(ACTS)
+    options = ["--acts", str(tmp_path / "acts.toml"), "--json", "-o", str(tmp_path / "out.bvh")]
+    (row,) = json.loads(run("generate", "the elf frobnicates", *options).stdout)
+    assert row["hypotheses"][0]["passages"][0]["action"] == "frobnicate"
+    (tmp_path / "acts.toml").write_text("[frobnicate]\n")
+    refused = run("generate", "frobnicate", *options)
+    assert refused.exit_code == 2
+    assert "acts.toml, line 1" in refused.stderr

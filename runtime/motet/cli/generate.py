@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import click
 
+import motet.keyed
 from motet.bundle.graph import SessionOptions
 from motet.cli.options import Tries, bar, bundle_option, json_option, naming, noted, seed_option, session_options
 from motet.cli.writing import Output, out_option, places, size, write_options
@@ -50,6 +51,7 @@ from motet.text.clauses import Passage
 @click.option("--loop", is_flag=True, help="Write only a seamless loop.")
 @click.option("--whole", is_flag=True, help="Do not split texts that ask for several things in a row.")
 @click.option("--numbers/--no-numbers", default=True, help="Turn, go and repeat as much as texts say. [default: yes]")
+@click.option("--acts", type=click.Path(path_type=Path), help="Know acts by key poses of this TOML file, too.")
 @click.option("--strict", is_flag=True, help="Fail on a text that the model knows only in part.")
 @write_options
 @session_options
@@ -62,6 +64,7 @@ def generate(
     output: Output,
     story: bool,
     after: Path | None,
+    acts: Path | None,
     no_plant: bool,
     loop: bool,
     as_json: bool,
@@ -75,12 +78,14 @@ def generate(
     With --story the texts become one motion, each taking over from the one before.
     """
     output.check(out)
-    by_codes = story or after is not None or settings["stand"] is not None
+    by_codes = story or after is not None or acts is not None or settings["stand"] is not None
     settings = {key: value for key, value in settings.items() if value is not None}
     tries = Tries()
     model = load_as(CodesModel if by_codes else GenerateModel, bundle, session)
+    if acts is not None:
+        model = cast(CodesModel, model).with_acts(motet.keyed.read(acts))
     requests = _usable(tries, model, texts, settings["numbers"])
-    if by_codes:
+    if story or after is not None or "stand" in settings:
         generated = _stories(tries, cast(CodesModel, model), requests, story, after, **settings)
     else:
         generated = _motions(tries, model, requests, **settings)

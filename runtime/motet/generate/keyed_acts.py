@@ -2,23 +2,18 @@
 figure that stands, walks, or does anything else."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import chain
-from typing import NamedTuple
 
 import numpy as np
 
 from motet.errors import TextError
 from motet.keyed.acts import ACT_FPS, KeyedAct
 from motet.keyed.keys import held_longer, mirrored_keys
-from motet.keyed.shipped import says, shipped
 from motet.motion.rotations import Array
 from motet.representation.contract import MotionContract
 from motet.text.clauses import FUNCTION_WORDS, Shown, stem
-from motet.text.numeric_phrases import PACE_PHRASES, Kind, quantities_of
-from motet.text.vocabulary import NUMBER_WORDS
+from motet.text.numeric_phrases import Kind, quantities_of
 
 STANDS = "a person stands still"
 """The sentence of a figure that stands."""
@@ -182,81 +177,6 @@ class NamedAct:
         return shown
 
 
-class Order(NamedTuple):
-    """A sentence of an act, with its stems, and the function words that it cannot do without: "put" is not "put up"."""
-
-    name: str
-    sentence: str
-    stems: frozenset[str]
-    particles: frozenset[str]
-
-    def fit(self, words: Sequence[str]) -> tuple[int, int, int, str, str]:
-        """Rises with how much it says of a sentence's words: in stems, in words in their order, in others."""
-        of_order = self.sentence.split()
-        following = iter(map(stem, words))
-        in_order = all(stem(word) in following for word in of_order) * len(of_order)
-        return len(self.stems), in_order, len(set(words).intersection(of_order)), self.name, self.sentence
-
-
-def act_named(words: Iterable[str], times: float | None = None) -> NamedAct | None:
-    """The act that lower-case words name, None where there is none: all of them are words of its sentences, but for a
-    side, and one of its sentences has no others. times: how often it is to be done, where the words say it."""
-    words = list(words)
-    stems = stems_of(words)
-    if not stems - BOTH_SIDES <= _stems_of_acts():  # most sentences have a word that no act has
-        return None
-    orders = [order for order in _orders_in(words, stems) if not stems - _stems_of_act(order.name) - BOTH_SIDES]
-    # acts of one side are not those of the other
-    of_sides = [order for order in orders if stems <= _stems_of_act(order.name) or shipped(order.name).mirrored]
-    if not of_sides:
-        return None
-    return _adapted(max(of_sides, key=lambda order: order.fit(words)), stems, times)
-
-
-def act_within(words: Sequence[str], times: float | None = None) -> NamedAct | None:
-    """The act of which a sentence, in lower-case words without its subject, has an order beside other words, the first
-    of them its verb; that which leaves out the fewest of these. None where there is none."""
-    stems = stems_of(words)
-    # "gives a big thumbs up" has its act in the words after a verb that names none
-    names_none = bool(words) and stem(words[0]) in FILLER_VERBS
-    orders = list(_orders_in(words, stems if names_none else stems_of(words[:1])))
-    if not orders:
-        return None
-    lacking = {}
-    for name in {order.name for order in orders}:
-        of_act = _stems_of_act(name) | (BOTH_SIDES if shipped(name).mirrored else set())
-        lacking[name] = tuple(word for word in words if stems_of([word]) - of_act)
-    best = max(orders, key=lambda order: (-len(lacking[order.name]), *order.fit(words)))
-    return replace(_adapted(best, stems, times), lacking=lacking[best.name])
-
-
-def _orders_in(words: Sequence[str], stems: Iterable[str]) -> Iterator[Order]:
-    """The orders with one of some stems whose words are all among some words."""
-    of_words = stems_of(words)
-    orders: dict[str, Order] = {}
-    for a_stem in stems:
-        orders |= {order.sentence: order for order in _orders().get(a_stem, ())}
-    for order in orders.values():
-        if order.stems <= of_words and order.particles <= set(words):
-            yield order
-
-
-def _adapted(order: Order, stems: frozenset[str], times: float | None) -> NamedAct:
-    """The act of an order on the side that some stems name, as often as it is to be done."""
-    act = shipped(order.name)
-    count = int(times or 0)
-    sides = stems & BOTH_SIDES - order.stems
-    for side in sides:
-        if len(sides) == 1 and f"{order.name} {side}" in says():  # point left is not to point with the left hand
-            return NamedAct(shipped(f"{order.name} {side}"), order.sentence, count)
-    # acts of either hand are written for the right one
-    if act.mirrored and len(sides) == 1:
-        act = replace(act, keys=mirrored_keys(act.keys) if "left" in sides else act.keys, mirrored=False)
-    if count and act.repeat:
-        act = replace(act, repeat=replace(act.repeat, times=(count, count)))
-    return NamedAct(act, order.sentence, count)
-
-
 def counted(sentence: str) -> tuple[str, Mapping[Kind, float]]:
     """A sentence without how often and how long it says that something is done, and these numbers, "times" and
     "seconds"; itself and none where it says neither, or another number, too."""
@@ -269,60 +189,6 @@ def counted(sentence: str) -> tuple[str, Mapping[Kind, float]]:
     return sentence, {}
 
 
-def without_subject(words: Sequence[str]) -> list[str]:
-    """Lower-case words without who acts and in which manner: of "the elf claps its hands happily" claps its hands.
-
-    A subject has up to :data:`LONGEST_SUBJECT` words, before a verb that ends in -s or -ing; without an article none of
-    them is a word of acts. A manner is an adverb that is neither a pace nor a word of acts.
-    """
-    of_acts = _stems_of_acts()
-    for count in range(1, min(LONGEST_SUBJECT, len(words) - 1) + 1):
-        is_subject = words[0] in ARTICLES or stems_of(words[:count]).isdisjoint(of_acts)
-        is_verb = stem(words[count]) in verbs() | FILLER_VERBS and words[count].endswith(("s", "ing"))
-        if is_subject and is_verb:
-            words = words[count:]
-            break
-    return [word for word in words if not word.endswith("ly") or PACE_PHRASES.search(word) or stem(word) in of_acts]
-
-
-@cache
-def _stems_of_acts() -> frozenset[str]:
-    """The stems of all words of all acts."""
-    return frozenset(_orders())
-
-
-@cache
-def _stems_of_act(name: str) -> frozenset[str]:
-    """The stems of all words of an act."""
-    return frozenset[str]().union(*map(stems_of, map(_words_of, says()[name])))
-
-
-def _words_of(sentence: str) -> list[str]:
-    """The words of an act's sentence, its numbers in digits, as sentences have them when they are read."""
-    return [str(NUMBER_WORDS.get(word, word)) for word in sentence.split()]
-
-
 def stems_of(words: Iterable[str]) -> frozenset[str]:
     """The stems of words that name an act."""
     return frozenset(stem(word) for word in words if word not in FILLER_WORDS) - FILLER_VERBS
-
-
-@cache
-def verbs() -> frozenset[str]:
-    """The stems of the first words of all orders, which say what is done."""
-    first_words = [sentence.split()[0] for sentence in chain.from_iterable(says().values())]
-    return stems_of(first_words) - BODY_STEMS
-
-
-@cache
-def _orders() -> Mapping[str, Sequence[Order]]:
-    """The sentences of all acts by each of their stems."""
-    orders: dict[str, list[Order]] = {}
-    for name, sentences in says().items():
-        for sentence in sentences:
-            words = _words_of(sentence)
-            particles = FUNCTION_WORDS.intersection(words) - ARTICLES
-            order = Order(name, " ".join(words), stems_of(words), particles)
-            for of_sentence in order.stems:
-                orders.setdefault(of_sentence, []).append(order)
-    return orders

@@ -4,19 +4,21 @@ and in parts."""
 import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from itertools import chain
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motet.bundle.fields import Fields
 from motet.bundle.graph import Floats
-from motet.errors import BundleError, TextError, TextWarning, warn
+from motet.errors import BundleError, TextError, TextWarning, needs, warn
 from motet.figures.humanoid import HUMANOID
+from motet.generate.act_index import SHIPPED_ACTS, ActIndex
 from motet.generate.base import FamiliaritySettings, GenerateModel, Understood
 from motet.generate.commands import Commands
 from motet.generate.keyed_acts import (
@@ -29,13 +31,10 @@ from motet.generate.keyed_acts import (
     STANDING,
     TOGETHER,
     NamedAct,
-    act_named,
-    act_within,
     counted,
     stems_of,
-    without_subject,
 )
-from motet.generate.keyed_acts import verbs as keyed_verbs
+from motet.keyed.acts import KeyedAct
 from motet.models.language import texts_of
 from motet.text.clauses import (
     ADDRESSEE,
@@ -76,10 +75,25 @@ class SentenceModel(GenerateModel):
         commands = source.list_of_fields("commands") if "commands" in self.manifest.source else []
         self._commands = Commands.of(commands, self.vocabulary.rules, self.sizes["A"], self.vocabulary.meant)
         self._familiar = self.settings(FamiliaritySettings)
+        self._know(SHIPPED_ACTS)
+        self._read_actions(source.list_of_fields("actions"))
+
+    def _know(self, acts: ActIndex) -> None:
+        """Read sentences by an index of acts."""
+        self._acts = acts
         # a reading needs the act and the context of each part of a sentence several times
         self._keyed = lru_cache(maxsize=256)(self._keyed_act)
         self._context = lru_cache(maxsize=256)(self._context_of)
-        self._read_actions(source.list_of_fields("actions"))
+
+    def with_acts(self, acts: Mapping[str, KeyedAct]) -> Self:
+        """A model that also knows acts by key poses of the caller's, such as those of :func:`motet.keyed.read`: a
+        sentence that names several means these. The present one stays as it is. ArgumentError for another value."""
+        needs(acts, Mapping, "acts by name")
+        for act in acts.values():
+            needs(act, KeyedAct, "an act by key poses")
+        model = copy(self)
+        model._know(ActIndex(acts))
+        return model
 
     def unknown(self, sentence: str) -> list[str]:
         """See :meth:`motet.models.language.LanguageModel.unknown`; none where an act by key poses is named, whose words
@@ -175,7 +189,7 @@ class SentenceModel(GenerateModel):
         check_length(sentence)
         if len(self.vocabulary.rules.words(sentence)) > MAX_WORDS:
             self.vocabulary.encode(sentence)  # refuses it
-        if self.contract.skeleton != HUMANOID or sentence in self._sentences:
+        if self.contract.skeleton != HUMANOID or self._is_recorded(sentence):
             return None
         text, amounts = counted(sentence)
         if amounts.keys() != {"seconds"}:
@@ -183,6 +197,13 @@ class SentenceModel(GenerateModel):
         text = HELD.sub("", text)
         act = None if text in self._sentences else self._keyed_by_hand(text)
         return replace(act, seconds=amounts["seconds"]) if act and not act.is_other_text else None
+
+    def _is_recorded(self, sentence: str) -> bool:
+        """Whether a sentence is one of a recorded action, and names no act of the caller's."""
+        if sentence not in self._sentences:
+            return False
+        words = self._acts.without_subject(self.vocabulary.rules.words(sentence))
+        return not self._acts.is_of_caller(self._acts.named(words))
 
     def _keyed_at_pace(self, sentence: str) -> NamedAct | None:
         """The act of a sentence that does not say how long it lasts; in its pace, if that is no part of the act."""
@@ -218,14 +239,14 @@ class SentenceModel(GenerateModel):
     def _keyed_usual(self, sentence: str) -> NamedAct | None:
         """The act of a sentence with neither: :meth:`_keyed_act`."""
         words = self.vocabulary.rules.words(sentence)
-        act = self._keyed_counted(sentence) or act_named(words)
+        act = self._keyed_counted(sentence) or self._acts.named(words)
         if act is None:
-            words = without_subject(words)
+            words = self._acts.without_subject(words)
             sentence = " ".join(words)
-            act = act_named(words)
+            act = self._acts.named(words)
         if act is None:
             return self._keyed_over(sentence) or self._keyed_within(sentence)
-        if act.is_small or act.times or act.is_other_text:
+        if act.is_small or act.times or act.is_other_text or self._acts.is_of_caller(act):
             return act
         if self._commands.act(sentence) is not None and not self._commands.is_instead(sentence):
             return None
@@ -243,12 +264,12 @@ class SentenceModel(GenerateModel):
             return None
         leaves_out = self._leaves_out(sentence)
         for act_clause, below in (clauses, clauses[::-1]):
-            words = without_subject(act_clause.split())
-            named = act_named(words)
+            words = self._acts.without_subject(act_clause.split())
+            named = self._acts.named(words)
             # a recorded action has all words: it gives way to an act and a command that are said so
             if not (leaves_out or (named and self._commands.act(below) is not None)):
                 continue
-            act = named or act_within(words)
+            act = named or self._acts.within(words)
             laid_over = self._laid_over(act, below) if act else None
             if laid_over is not None:
                 return laid_over
@@ -263,7 +284,7 @@ class SentenceModel(GenerateModel):
         words = below.split()
         if SUBJECT.sub("", below).split()[0] in ARTICLES:  # "wakes up with a start"
             return None
-        legs = act_named(without_subject(words))
+        legs = self._acts.named(self._acts.without_subject(words))
         if legs and not (legs.leaves(*LEGS) or legs.is_other_text):
             return replace(act, legs=legs)
         is_limb = stems_of(words) <= BOTH_SIDES | LIMB_STEMS
@@ -281,7 +302,7 @@ class SentenceModel(GenerateModel):
         one where it lacks a word of the order."""
         text, amounts = counted(sentence)
         words = self.vocabulary.rules.words(text)
-        act = act_within(words, amounts.get("times")) if words else None
+        act = self._acts.within(words, amounts.get("times")) if words else None
         if act is None or act.is_other_text:
             return None
         if self._knows_none(text):
@@ -303,7 +324,7 @@ class SentenceModel(GenerateModel):
         if times is None:
             return None
         words = self.vocabulary.rules.words(text)
-        named = act_named(words, times) or act_named(without_subject(words), times)
+        named = self._acts.named(words, times) or self._acts.named(self._acts.without_subject(words), times)
         # One that cannot be repeated gives way to a command's, which can.
         if named and not named.act.repeat and self._commands.act(text) is not None:
             return None
@@ -341,7 +362,7 @@ class SentenceModel(GenerateModel):
     def _parts_of(self, sentence: str) -> list[str]:
         """The parts of a sentence before verbs of recorded actions and commands, or, if one of them is then an act by
         key poses, before the verbs of these, too."""
-        with_keyed = parts_of(sentence, self._verbs | keyed_verbs())
+        with_keyed = parts_of(sentence, self._verbs | self._acts.verbs)
         return with_keyed if any(map(self._keyed, with_keyed)) else parts_of(sentence, self._verbs)
 
     def _shown_at_once(self, sentence: str, parts: Sequence[str]) -> bool:
@@ -350,11 +371,12 @@ class SentenceModel(GenerateModel):
         shown = self.likeliest(sentence)
         if shown.lacking or (shown.confidence or 0.0) < self._familiar.confident:
             return False
+        acts = [act for act in map(self._keyed, parts) if act]
         if whole := self._keyed(sentence):
-            acts = [act.act for act in map(self._keyed, parts) if act]
-            return not whole.is_other_text and all(act == acts[0] for act in acts)
+            return not whole.is_other_text and all(act.act == acts[0].act for act in acts)
+        # recordings show no act of the caller's
         verbs = set(map(first_verb, parts))
-        if len(verbs) < len(parts):
+        if len(verbs) < len(parts) or any(map(self._acts.is_of_caller, acts)):
             return False
         if not self._share_numbers(sentence, parts):
             return False

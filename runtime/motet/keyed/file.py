@@ -40,12 +40,15 @@ def read(file: str | Path) -> dict[str, KeyedAct]:
     """The acts of a TOML file by name. FormatError, with the line, for one that cannot be read or understood."""
     path = Path(file)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise FormatError(path, f"a file of acts has at most {LARGEST_FILE} bytes")
-        text = path.read_text(encoding="utf-8")
-        tables = tomllib.loads(text)
+        with path.open("rb") as opened:
+            data = opened.read(LARGEST_FILE + 1)
     except OSError as error:
         raise FormatError(path, f"cannot be read: {error.strerror or error}") from error
+    if len(data) > LARGEST_FILE:
+        raise FormatError(path, f"a file of acts has at most {LARGEST_FILE} bytes")
+    try:
+        text = data.decode()
+        tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise FormatError(path, f"not TOML: {error}") from error
     if not tables or len(tables) > MOST_ACTS:

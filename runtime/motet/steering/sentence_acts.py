@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 from motet.errors import TextError, TextWarning, collected, each_once, warn
 from motet.steering.acts import Act
 from motet.text.clauses import Shown
-from motet.text.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
     from motet.steering.model import SteerModel
@@ -23,9 +22,8 @@ REMEMBERED_ACTS = 256
 class SentenceModel(Protocol):
     """A model that makes motions for sentences, such as a :class:`motet.GenerateModel`."""
 
-    @property
-    def vocabulary(self) -> Vocabulary:
-        """The words that it knows."""
+    def unknown(self, sentence: str) -> list[str]:
+        """The words that it does not know; TextError where that is all."""
 
     def check(self, sentence: str, *, lacking: bool = True) -> None:
         """TextError for a sentence that it does not know; ``lacking``: or whose action leaves out a word."""
@@ -70,7 +68,7 @@ class SaidActs:
 
     def _known(self, sentence: str) -> str:
         """A sentence that the model knows: the given one, or that order in the third person."""
-        self.words.vocabulary.encode(sentence)  # an order without words is none, though "a person" is known
+        self.words.unknown(sentence)  # an order without words is none, though "a person" is known
         try:
             self.words.check(sentence, lacking=False)
         except TextError:
