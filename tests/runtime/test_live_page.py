@@ -13,7 +13,7 @@ from browser import CHROMIUM, Browser
 import motet
 from motet.draw.page import source
 from motet.errors import BundleError, ControlError, OutputError
-from motet.figures.humanoid import T_POSE
+from motet.figures.humanoid import BONES, T_POSE
 from motet.live.page import live_body, net_data
 from motet.steering.model import SteerModel
 
@@ -130,6 +130,20 @@ def test_keys_steer_the_figure(page: Browser) -> None:
     assert np.hypot(*stopped.going) < 0.02
     assert np.hypot(*(later.place - stopped.place)) < 0.2  # it shifts its weight
     assert page.errors == []
+
+
+def test_a_sentence_lets_the_figure_go_in_a_style(page: Browser) -> None:
+    page.value("motet.state.pause = true")
+    chest = BONES.index("chest")
+    held = f"[...motet.figures[0].pose.rotations.slice({4 * chest}, {4 * chest + 4})]"
+    bends = []
+    for said, read in (("walk", "walk"), ("walk like an old man", "walk (old)"), ("walk normally", "walk")):
+        assert page.value(f"motet.obey({said!r})") == read
+        ticks(page, 60)
+        bends.append(page.value(held)[0])
+    assert bends[1] > max(bends[0], bends[2]) + 0.05
+    page.value("motet.obey('stop')")
+    ticks(page, 60)
 
 
 RUNS = """new Promise((done) => {
