@@ -429,7 +429,7 @@ def test_a_participle_is_done_at_the_same_time(model: motet.CodesModel) -> None:
 
 ACTS = """
 [frobnicate]
-says = ["frobnicate", "do the frob"]
+says = ["Frobnicate!", "do the frob", "..."]
 
 [[frobnicate.key]]
 at = 0.5
@@ -451,9 +451,9 @@ def test_acts_of_a_caller_are_generated_as_those_that_ship(tmp_path: Path, model
     acts = motet.keyed.read(tmp_path / "acts.toml")
     knows = model.with_acts(acts)
     for text, shown in {
-        "the elf frobnicates": ["frobnicate"],
-        "a person does the frob": ["frobnicate"],
-        "she walks and then frobnicates": ["a person walks forward", "frobnicate"],
+        "the elf frobnicates": ["Frobnicate!"],
+        "a person does the frob": ["Frobnicate!"],
+        "she walks and then frobnicates": ["a person walks forward", "Frobnicate!"],
         # in place of the recordings, and of the act that ships
         "a person waves": ["wave"],
     }.items():
@@ -484,7 +484,7 @@ def test_the_command_knows_acts_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "acts.toml").write_text(ACTS)
     options = ["--acts", str(tmp_path / "acts.toml"), "--json", "-o", str(tmp_path / "out.bvh")]
     (row,) = json.loads(run("generate", "the elf frobnicates", *options).stdout)
-    assert row["hypotheses"][0]["passages"][0]["action"] == "frobnicate"
+    assert row["hypotheses"][0]["passages"][0]["action"] == "Frobnicate!"
     (tmp_path / "acts.toml").write_text("[frobnicate]\n")
     refused = run("generate", "frobnicate", *options)
     assert refused.exit_code == 2

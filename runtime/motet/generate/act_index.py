@@ -20,7 +20,7 @@ from motet.keyed.keys import mirrored_keys
 from motet.keyed.shipped import says, shipped
 from motet.text.clauses import FUNCTION_WORDS, stem
 from motet.text.numeric_phrases import PACE_PHRASES
-from motet.text.vocabulary import NUMBER_WORDS
+from motet.text.vocabulary import NEW_MODEL_RULES, NUMBER_WORDS
 
 
 class Order(NamedTuple):
@@ -47,9 +47,12 @@ class ActIndex:
 
     @cached_property
     def sentences(self) -> Mapping[str, tuple[str, ...]]:
-        """The name of each act, and each other text -> its sentences, in lower case."""
-        of_caller = {name: tuple(map(str.lower, act.says)) for name, act in self.of_caller.items()}
-        return {**says(), **of_caller}
+        """The name of each act, and each other text -> its sentences, in lower case and without marks."""
+        sentences = dict(says())
+        for name, act in self.of_caller.items():
+            plain = (" ".join(NEW_MODEL_RULES.words(text)) for text in act.says)
+            sentences[name] = tuple(filter(None, plain))
+        return sentences
 
     def act(self, name: str) -> KeyedAct:
         """An act by its name; KeyError for an unknown one."""
