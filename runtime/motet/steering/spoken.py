@@ -8,7 +8,7 @@ are offered.
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from itertools import chain
 from typing import Any
 
@@ -155,12 +155,17 @@ class Words:
             kinds |= dict.fromkeys(map(stem, words), kind)
         return kinds | {stem(gait): gait for gait in self.gaits}
 
+    @cached_property
+    def style_keys(self) -> dict[str, str]:
+        """Key -> style, of the phrases of each style."""
+        return self._keyed(self.table["styles"])
+
     def _styles(self) -> list[tuple[frozenset[str], bool, str]]:
         """Of each phrase for a style, the longest first, what its words share but for a gait, whether it names one, and
         the style; without those that mean no more than a pace."""
         passed = {*self.kinds, *map(stem, (*self.table["slow"], *self.table["fast"]))}
         styles = list[tuple[frozenset[str], bool, str]]()
-        for key, name in self._keyed(self.table["styles"]).items():
+        for key, name in self.style_keys.items():
             roots = frozenset(key.split())
             gaits = frozenset(root for root in roots if self.kinds.get(root) in self.gaits)
             if not roots <= passed:
@@ -204,7 +209,7 @@ class Words:
         words = [self._mended(word, mended) for word in words if word not in self.table["everyone"]]
         steps = list[Step]()
         for clause in self._clauses(words):
-            part = self._together(clause)
+            part = self._other_side(clause, steps) or self._together(clause)
             if isinstance(part, str):
                 return Reading(unknown=part, nearest=self.nearest(part), everyone=everyone)
             steps += part
@@ -232,20 +237,45 @@ class Words:
             mended[word] = read_as
         return read_as or word
 
+    def _other_side(self, words: Sequence[str], steps: Sequence[Step]) -> list[Step]:
+        """The last of steps once more on the side that words are alone with: "wave with your left hand, then the
+        right one"; none for other words."""
+        meant = [word for word in self._without_sides(words) if word not in self.idle and word != "one"]
+        side = self._side(words)
+        if not side or not steps or not self.limbs.issuperset(meant):
+            return []
+        last = steps[-1]
+        is_sided = last.kind == "act" and self.acts[last.name].side
+        return [replace(last, side=side, together=False)] if is_sided else []
+
     def _together(self, words: Sequence[str]) -> list[Step] | str:
-        """The steps of words that are done at once, "A and B"; what of them is not known."""
-        whole = self._one(words)
-        if whole is not None:
-            return [whole]
+        """The steps of words that are done at once, "A and B", but for acts, of which one follows the other; what of
+        them is not known."""
         parts = [part for part in _split(words, self.table["both"]) if part]
         steps = list[Step]()
+        if self._stops_first(parts):
+            steps.append(Step("stop"))
+            parts = parts[1:]
+        else:
+            whole = self._one(words)
+            if whole is not None:
+                return [whole]
         while parts:
             step, count = self._longest(parts)
             if step is None:
                 return " ".join(parts[0])
-            steps.append(replace(step, together=bool(steps)))
+            kinds = {step.kind, *(before.kind for before in steps[-1:])}
+            steps.append(replace(step, together=bool(steps) and "stop" not in kinds and kinds != {"act"}))
             parts = parts[count:]
         return steps
+
+    def _stops_first(self, parts: Sequence[Sequence[str]]) -> bool:
+        """Whether parts begin with a stop, and go on with something else than what is stopped: "stop and wave" is no
+        "stop walking and waving"."""
+        meant = [[word for word in part if word not in self.idle] for part in parts[:2]]
+        if len(meant) < 2 or not all(meant):
+            return False
+        return meant[0][0] in self.table["stop"] and not meant[1][0].endswith("ing")
 
     def _longest(self, parts: Sequence[Sequence[str]]) -> tuple[Step | None, int]:
         """The step of as many parts as make sense together, as in "look left and right", and how many these are."""
@@ -262,7 +292,8 @@ class Words:
         order = self.orders.get(key)
         if order is not None:
             return ORDER_PHRASES[order]
-        act = self._act(words)
+        # "march forward" is a style, not the act on the spot
+        act = None if key in self.style_keys and key not in self.by_key else self._act(words)
         if act is not None:
             return act
         stops = words and (words[0] in self.table["stop"] or any(word in self.table["never"] for word in words))
@@ -371,12 +402,13 @@ class Words:
                 return step and replace(step, style="" if style == NO_STYLE else style)
         return None
 
-    def _kinds_and_numbers(self, words: Iterable[str]) -> tuple[list[str], list[int]] | None:
+    def _kinds_and_numbers(self, words: Sequence[str]) -> tuple[list[str], list[int]] | None:
         """The kinds of the words of an order, and its numbers; None for a word that is neither, nor tells a manner."""
         passed = frozenset((*self.table["slow"], *self.table["fast"], *self.table["loud"]))
         kinds = list[str]()
         numbers = list[int]()
-        for word in words:
+        timeless, count = self._without_times(words)
+        for word in timeless:
             kind = self.kinds.get(stem(word))
             number = self._number(word)
             if kind is not None:
@@ -385,6 +417,10 @@ class Words:
                 numbers.append(number)
             elif word not in passed:
                 return None
+        # twice is two steps, or twice as many degrees
+        if count != 1:
+            usual = 1 if "step" in kinds else 90
+            numbers = [count * number for number in numbers or [usual]]
         return kinds, numbers
 
     def _gone(self, kinds: Sequence[str], side: str, number: int | None, pace: float) -> Step | None:

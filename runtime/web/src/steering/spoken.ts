@@ -136,6 +136,7 @@ export class Words {
   private readonly orders = new Map<string, string>();
   private readonly still: Set<string>;
   private readonly kinds = new Map<string, string>();
+  private readonly styleKeys = new Map<string, string>();
   private readonly styles: StylePhrase[];
   private readonly limbs: Set<string>;
   private readonly manner: Set<string>;
@@ -190,12 +191,11 @@ export class Words {
   private stylePhrases(): StylePhrase[] {
     const { slow, fast } = this.table;
     const passed = new Set([...this.kinds.keys(), ...[...slow, ...fast].map(stem)]);
-    const styles = new Map<string, string>();
     for (const [style, texts] of Object.entries(this.table.styles)) {
-      for (const text of texts) styles.set(this.key(text), style);
+      for (const text of texts) this.styleKeys.set(this.key(text), style);
     }
     const phrases: StylePhrase[] = [];
-    for (const [key, style] of styles) {
+    for (const [key, style] of this.styleKeys) {
       const roots = key.split(" ");
       const others = roots.filter((root) => !this.isGait(root));
       const namesGait = others.length < roots.length;
@@ -232,7 +232,8 @@ export class Words {
     const nothing = { steps: [], unknown: "", everyone, mended: {} };
     const steps: Step[] = [];
     for (const clause of this.clauses(words)) {
-      const part = this.together(clause);
+      const other = this.otherSide(clause, steps);
+      const part = other.length ? other : this.together(clause);
       if (typeof part === "string") return { ...nothing, unknown: part, nearest: this.nearest(part) };
       steps.push(...part);
     }
@@ -260,19 +261,43 @@ export class Words {
     return readAs || word;
   }
 
-  /** The steps of words that are done at once, "A and B"; what of them is not known. */
+  /** The last of steps once more on the side that words are alone with; none for other words. */
+  private otherSide(words: readonly string[], steps: readonly Step[]): Step[] {
+    const meant = this.withoutSides(words).filter((word) => !this.idle.has(word) && word !== "one");
+    const side = this.side(words);
+    const last = steps.at(-1);
+    if (!side || !last || !meant.every((word) => this.limbs.has(word))) return [];
+    const isSided = last.kind === "act" && this.acts.get(last.name)!.side;
+    return isSided ? [{ ...last, side, together: false }] : [];
+  }
+
+  /** The steps of words that are done at once, "A and B", but for acts, of which one follows the other; what of them is not known. */
   private together(words: readonly string[]): Step[] | string {
-    const whole = this.step(words);
-    if (whole) return [whole];
     let parts = split(words, this.table.both).filter((part) => part.length);
     const steps: Step[] = [];
+    if (this.stopsFirst(parts)) {
+      steps.push(stepOf("stop"));
+      parts = parts.slice(1);
+    } else {
+      const whole = this.step(words);
+      if (whole) return [whole];
+    }
     while (parts.length) {
       const [step, count] = this.longest(parts);
       if (!step) return parts[0]!.join(" ");
-      steps.push({ ...step, together: steps.length > 0 });
+      const kinds = [step.kind, ...steps.slice(-1).map(({ kind }) => kind)];
+      const follows = kinds.includes("stop") || kinds.every((kind) => kind === "act");
+      steps.push({ ...step, together: steps.length > 0 && !follows });
       parts = parts.slice(count);
     }
     return steps;
+  }
+
+  /** Whether parts begin with a stop, and go on with something else than what is stopped. */
+  private stopsFirst(parts: readonly string[][]): boolean {
+    const [first, second] = parts.slice(0, 2).map((part) => part.filter((word) => !this.idle.has(word)));
+    if (!first?.length || !second?.length) return false;
+    return this.table.stop.includes(first[0]!) && !second[0]!.endsWith("ing");
   }
 
   /** The step of as many parts as make sense together, as in "look left and right", and how many these are. */
@@ -290,7 +315,8 @@ export class Words {
     const key = this.key(words);
     const order = this.orders.get(key);
     if (order !== undefined) return ORDERS[order]!;
-    const act = this.act(words);
+    // "march forward" is a style, not the act on the spot
+    const act = this.styleKeys.has(key) && !this.byKey.has(key) ? null : this.act(words);
     if (act) return act;
     const { stop, never } = this.table;
     const stops =
@@ -397,13 +423,19 @@ export class Words {
     const pace = this.tempo(words);
     const passed = [...this.table.slow, ...this.table.fast, ...this.table.loud];
     const kinds: string[] = [];
-    const numbers: number[] = [];
-    for (const word of this.withoutSides(words)) {
+    let numbers: number[] = [];
+    const [timeless, count] = this.withoutTimes(words);
+    for (const word of this.withoutSides(timeless)) {
       const kind = this.kinds.get(stem(word));
       const number = this.number(word);
       if (kind !== undefined) kinds.push(kind);
       else if (number !== null) numbers.push(number);
       else if (!passed.includes(word)) return null;
+    }
+    // twice is two steps, or twice as many degrees
+    if (count !== 1) {
+      const usual = kinds.includes("step") ? 1 : 90;
+      numbers = (numbers.length ? numbers : [usual]).map((value) => count * value);
     }
     const hasUnit = ["turn", "degrees", "step"].some((kind) => kinds.includes(kind));
     if (numbers.length > (hasUnit ? 1 : 0)) return null;
