@@ -248,9 +248,9 @@ class SteerModel(ControlModel):
         return words_for(tuple(gait for gait in self.gaits if self.usual[gait])).read(text)
 
     def act_said(self, sentence: str) -> tuple[Act, Shown] | None:
-        """The act that a sentence names, and what it is shown as; None for any other sentence."""
+        """The act that a sentence names in all its words, and what it is shown as; None for any other sentence."""
         steps = self.read_said(sentence).steps
-        if len(steps) != 1 or steps[0].kind != "act":
+        if len(steps) != 1 or steps[0].kind != "act" or steps[0].lacking:
             return None
         (step,) = steps
         return self.act_named(step.name, step.side, step.tempo, step.count), Shown(step.caption, (), 1.0)

@@ -36,6 +36,13 @@ CURVE = 50.0
 OFFERED = 3
 """Names that are nearest to what is not known."""
 
+# fmt: off
+WORD_LISTS = (
+    "idle", "everyone", "plural", "stop", "never", "slow", "fast", "loud", "then", "both", "times", "where", "articles",
+)
+# fmt: on
+"""Names of the lists of words of the table."""
+
 SHORTEST_MENDED = 4
 """Letters of the shortest word whose spelling is mended."""
 
@@ -48,7 +55,8 @@ class Step:
     side: of the act, "left" or "right", "" for that in which it is shown. tempo: of the act. count: how often it is
     done. style: in which it goes, "" for as recorded. pace: of the usual speed of that, 0 for the present speed.
     change: of the present speed. way: degrees to the left of the facing. aside: whether the facing stays. curve:
-    degrees a second to the left. seconds: that it lasts, 0 where it stays. together: with the step before it.
+    degrees a second to the left. seconds: that it lasts, 0 where it stays. together: with the step before it. lacking:
+    words that it leaves out, which say where.
     """
 
     kind: str
@@ -64,6 +72,7 @@ class Step:
     curve: float = 0.0
     seconds: float = 0.0
     together: bool = False
+    lacking: str = ""
 
     @property
     def caption(self) -> str:
@@ -72,6 +81,7 @@ class Step:
             details = [self.side] if self.side else []
             details += ["slowly"] if self.tempo < 1 else ["fast"] if self.tempo > 1 else []
             details += [] if self.count == 1 else ["twice"] if self.count == 2 else [f"{self.count} times"]
+            details += [f"without '{self.lacking}'"] if self.lacking else []
             return f"{self.name} ({', '.join(details)})" if details else self.name
         return {"stop": "stop", "here": "come here", "away": "go away"}.get(self.kind) or self._way_caption()
 
@@ -90,6 +100,7 @@ class Step:
             words.append("turn around" if abs(self.way) == 180 else f"turn {side}")
             words += [] if abs(self.way) in (90, 180) else [f"{abs(self.way):g} degrees"]
         words += [f"({self.style})"] if self.style else []
+        words += [f"(without '{self.lacking}')"] if self.lacking else []
         return " ".join(words)
 
 
@@ -180,7 +191,7 @@ class Words:
         return keyed
 
     def _all_words(self) -> Iterator[str]:
-        for name in ("idle", "everyone", "plural", "stop", "never", "slow", "fast", "loud", "then", "both", "times"):
+        for name in WORD_LISTS:
             yield from self.table[name]
         for group in ("counts", "sides", "orders"):
             for name, words in self.table[group].items():
@@ -272,18 +283,21 @@ class Words:
     def _stops_first(self, parts: Sequence[Sequence[str]]) -> bool:
         """Whether parts begin with a stop, and go on with something else than what is stopped: "stop and wave" is no
         "stop walking and waving"."""
-        meant = [[word for word in part if word not in self.idle] for part in parts[:2]]
-        if len(meant) < 2 or not all(meant):
+        first_words = list[str]()
+        for part in parts[:2]:
+            first_words += [word for word in part if word not in self.idle][:1]
+        if len(first_words) < 2:
             return False
-        return meant[0][0] in self.table["stop"] and not meant[1][0].endswith("ing")
+        return first_words[0] in self.table["stop"] and not first_words[1].endswith("ing")
 
     def _longest(self, parts: Sequence[Sequence[str]]) -> tuple[Step | None, int]:
-        """The step of as many parts as make sense together, as in "look left and right", and how many these are."""
+        """The step of as many parts as make sense together, as in "look left and right", or of the first one without
+        its place; and how many these are."""
         for count in range(len(parts), 0, -1):
             step = self._one(list(chain(*parts[:count])))
             if step is not None:
                 return step, count
-        return None, 0
+        return self._gone_somewhere(parts[0]), 1
 
     def _one(self, all_words: Sequence[str]) -> Step | None:
         """The step of words; None where they are not known."""
@@ -300,6 +314,17 @@ class Words:
         if stops or (key and key in self.still):
             return Step("stop")
         return self._styled_order(words) or self._order(words)
+
+    def _gone_somewhere(self, all_words: Sequence[str]) -> Step | None:
+        """The act or order of words before a place, which it leaves out, as in "limp to the door"; None for others."""
+        for at, word in enumerate(all_words[1:-1], start=1):
+            if word in self.table["where"] and all_words[at + 1] in self.table["articles"]:
+                paces = (*self.table["slow"], *self.table["fast"])
+                place = [after for after in all_words[at:] if after not in paces]
+                order = [*all_words[:at], *(after for after in all_words[at:] if after in paces)]
+                step = self._one(order)
+                return replace(step, lacking=" ".join(place)) if step and step.name else None
+        return None
 
     def _act(self, words: Sequence[str]) -> Step | None:
         """The act of words, with its side, tempo and count."""

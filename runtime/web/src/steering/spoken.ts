@@ -17,6 +17,8 @@ const LISTS = [
   "then",
   "both",
   "times",
+  "where",
+  "articles",
 ] as const;
 
 /** The words of the file of the repertoire. */
@@ -43,6 +45,7 @@ export interface Step {
   curve: number;
   seconds: number;
   together: boolean;
+  lacking: string;
 }
 
 const PLAIN: Omit<Step, "kind"> = {
@@ -58,6 +61,7 @@ const PLAIN: Omit<Step, "kind"> = {
   curve: 0,
   seconds: 0,
   together: false,
+  lacking: "",
 };
 
 const stepOf = (kind: Step["kind"], parts: Partial<Step> = {}): Step => ({ ...PLAIN, kind, ...parts });
@@ -96,18 +100,19 @@ export function captionOf({ steps, unknown, nearest, mended }: Reading): string 
 }
 
 function stepCaption(step: Step): string {
-  const { kind, name, side, tempo, count } = step;
+  const { kind, name, side, tempo, count, lacking } = step;
   if (kind === "act") {
     const details = side ? [side] : [];
     if (tempo !== 1) details.push(tempo < 1 ? "slowly" : "fast");
     if (count !== 1) details.push(count === 2 ? "twice" : `${count} times`);
+    if (lacking) details.push(`without '${lacking}'`);
     return details.length ? `${name} (${details.join(", ")})` : name;
   }
   if (kind === "go") return wayCaption(step);
   return { stop: "stop", here: "come here", away: "go away" }[kind];
 }
 
-function wayCaption({ name, style, pace, change, way, aside, curve }: Step): string {
+function wayCaption({ name, style, pace, change, way, aside, curve, lacking }: Step): string {
   const words = name ? [name] : [];
   if (pace !== 0 && pace !== 1) words.push(pace < SPOKEN.JOG ? "slowly" : pace > 1 ? "fast" : "at a jog");
   if (change !== 1) words.push(change > 1 ? "faster" : "slower");
@@ -119,6 +124,7 @@ function wayCaption({ name, style, pace, change, way, aside, curve }: Step): str
     if (degrees !== 90 && degrees !== 180) words.push(`${degrees} degrees`);
   }
   if (style) words.push(`(${style})`);
+  if (lacking) words.push(`(without '${lacking}')`);
   return words.join(" ");
 }
 
@@ -300,13 +306,13 @@ export class Words {
     return this.table.stop.includes(first[0]!) && !second[0]!.endsWith("ing");
   }
 
-  /** The step of as many parts as make sense together, as in "look left and right", and how many these are. */
+  /** The step of as many parts as make sense together, as in "look left and right", or of the first without its place; and how many. */
   private longest(parts: readonly string[][]): [step: Step | null, count: number] {
     for (let count = parts.length; count > 0; count--) {
       const step = this.step(parts.slice(0, count).flat());
       if (step) return [step, count];
     }
-    return [null, 0];
+    return [this.goneSomewhere(parts[0]!), 1];
   }
 
   /** The step of words; null where they are not known. */
@@ -323,6 +329,19 @@ export class Words {
       words.length > 0 && (stop.includes(words[0]!) || words.some((word) => never.includes(word)));
     if (stops || (key && this.still.has(key))) return stepOf("stop");
     return this.styledOrder(words) ?? this.order(words);
+  }
+
+  /** The act or order of words before a place, which it leaves out, as in "limp to the door"; null for any other. */
+  private goneSomewhere(all: readonly string[]): Step | null {
+    const { where, articles } = this.table;
+    const at = all.findIndex(
+      (word, i) => i > 0 && where.includes(word) && articles.includes(all[i + 1] ?? ""),
+    );
+    if (at < 0 || at + 1 === all.length) return null;
+    const isPace = (word: string) => this.table.slow.includes(word) || this.table.fast.includes(word);
+    const place = all.slice(at).filter((word) => !isPace(word));
+    const step = this.step([...all.slice(0, at), ...all.slice(at).filter(isPace)]);
+    return step?.name ? { ...step, lacking: place.join(" ") } : null;
   }
 
   /** The act of words, with its side, tempo and count. */
