@@ -68,6 +68,8 @@ ORACLE = {
     "march forward": "walk (marching)",
     "march": "march",
     "run away": "go away",
+    "gallop like a horse": "run (without 'like a horse')",
+    "walk like a duck": "walk (penguin)",
     "limp to the door": "walk (limping) (without 'to the door')",
     "sneak past the guard slowly, then wave": "sneak (slowly, without 'past the guard'), then wave",
     "stroll to the chair and sit down": "walk (without 'to the chair') and sit down",
