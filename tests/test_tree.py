@@ -97,7 +97,7 @@ CEILINGS = {
     "motet.representation": 9_350,
     "motet.search": 3_600,
     "motet.serve": 16_800,
-    "motet.steering": 61_100,
+    "motet.steering": 61_300,
     "motet.text": 6_300,
     "motet_export": 12_400,
     "motet_train": 9_300,

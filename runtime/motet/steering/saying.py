@@ -22,6 +22,9 @@ GOING_SECONDS = 3.0
 TURN_SECONDS = 1.5
 """Seconds that a turn, a change of pace or a stop lasts before the next step."""
 
+SECONDS_OF_DEGREE = 0.008
+"""And more for each degree of a turn."""
+
 NEARER_DISTANCE = 2.5
 """Metres that a figure comes towards the camera of a page."""
 
@@ -101,7 +104,8 @@ def go(step: Step, session: "SteerSession") -> None:
 
 def _go(step: Step, session: "SteerSession") -> None:
     model = session.model
-    facing = session.places[:, 2]
+    # from where they are to face, even if they have not come to it yet
+    facing = np.degrees(session.target[:, 2])
     facing = facing if step.aside else facing + step.way
     direction = facing + step.way if step.aside else facing
     speeds = np.hypot(*session.target[:, :2].T)
@@ -148,4 +152,6 @@ def _seconds(step: Step) -> float:
     """How long a step lasts before the next one."""
     if step.seconds:
         return step.seconds
-    return GOING_SECONDS if step.kind == "go" and step.name else TURN_SECONDS
+    if step.kind == "go" and step.name:
+        return GOING_SECONDS
+    return TURN_SECONDS + SECONDS_OF_DEGREE * abs(step.way)

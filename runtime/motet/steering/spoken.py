@@ -39,6 +39,7 @@ OFFERED = 3
 # fmt: off
 WORD_LISTS = (
     "idle", "everyone", "plural", "stop", "never", "slow", "fast", "loud", "then", "both", "times", "where", "articles",
+    "compared",
 )
 # fmt: on
 """Names of the lists of words of the table."""
@@ -73,6 +74,11 @@ class Step:
     seconds: float = 0.0
     together: bool = False
     lacking: str = ""
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether it turns on the spot."""
+        return self.kind == "go" and not self.name and self.way != 0
 
     @property
     def caption(self) -> str:
@@ -275,8 +281,7 @@ class Words:
             step, count = self._longest(parts)
             if step is None:
                 return " ".join(parts[0])
-            kinds = {step.kind, *(before.kind for before in steps[-1:])}
-            steps.append(replace(step, together=bool(steps) and "stop" not in kinds and kinds != {"act"}))
+            steps.append(replace(step, together=bool(steps) and _is_done_with(step, steps[-1])))
             parts = parts[count:]
         return steps
 
@@ -316,9 +321,10 @@ class Words:
         return self._styled_order(words) or self._order(words)
 
     def _gone_somewhere(self, all_words: Sequence[str]) -> Step | None:
-        """The act or order of words before a place, which it leaves out, as in "limp to the door"; None for others."""
+        """The act or order of words before a place or a comparison, which it leaves out, as in "limp to the door"."""
         for at, word in enumerate(all_words[1:-1], start=1):
-            if word in self.table["where"] and all_words[at + 1] in self.table["articles"]:
+            is_compared = word in self.table["compared"]
+            if is_compared or (word in self.table["where"] and all_words[at + 1] in self.table["articles"]):
                 paces = (*self.table["slow"], *self.table["fast"])
                 place = [after for after in all_words[at:] if after not in paces]
                 order = [*all_words[:at], *(after for after in all_words[at:] if after in paces)]
@@ -488,6 +494,15 @@ class Words:
     def _meant(self, phrase: str) -> list[str]:
         """The words of a phrase that count."""
         return [word for word in words_of(phrase) if word not in self.idle]
+
+
+def _is_done_with(step: Step, before: Step) -> bool:
+    """Whether a step is done together with the one before it: an act with what goes somewhere, and no turn."""
+    if "stop" in (before.kind, step.kind):
+        return False
+    if step.kind == "act":
+        return before.kind != "act" and not before.is_turn
+    return before.kind != "act" or (step.kind == "go" and not step.is_turn)
 
 
 def _way(kinds: Sequence[str], side: str, degrees: float) -> tuple[float, bool]:

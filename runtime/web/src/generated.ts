@@ -476,6 +476,7 @@ export const REPERTOIRE = {
 export const SAYING = {
   GOING_SECONDS: 3,
   NEARER_DISTANCE: 2.5,
+  SECONDS_OF_DEGREE: 0.008,
   TURN_SECONDS: 1.5,
 } as const;
 

@@ -62,6 +62,8 @@ export class Saying {
       if (step.name) page.style(styleNumber(step.style || STYLES.NO_STYLE), this.all);
       const turn = step.aside ? 0 : step.way;
       const aside = step.aside ? step.way : 0;
+      // from where it is to face, even if it has not come to it yet
+      const { facing } = figure.wanted;
       page.pilot = new Order(gait, speed, facing + RADIANS * turn, RADIANS * aside, RADIANS * step.curve);
     }
   }
@@ -79,7 +81,8 @@ export class Saying {
 /** How long a step lasts before the next one. */
 function secondsOf(step: Step): number {
   if (step.seconds) return step.seconds;
-  return step.kind === "go" && step.name ? SAYING.GOING_SECONDS : SAYING.TURN_SECONDS;
+  if (step.kind === "go" && step.name) return SAYING.GOING_SECONDS;
+  return SAYING.TURN_SECONDS + SAYING.SECONDS_OF_DEGREE * Math.abs(step.way);
 }
 
 /** The gait and the speed of a step, from those before it. */

@@ -19,6 +19,7 @@ const LISTS = [
   "times",
   "where",
   "articles",
+  "compared",
 ] as const;
 
 /** The words of the file of the repertoire. */
@@ -291,9 +292,8 @@ export class Words {
     while (parts.length) {
       const [step, count] = this.longest(parts);
       if (!step) return parts[0]!.join(" ");
-      const kinds = [step.kind, ...steps.slice(-1).map(({ kind }) => kind)];
-      const follows = kinds.includes("stop") || kinds.every((kind) => kind === "act");
-      steps.push({ ...step, together: steps.length > 0 && !follows });
+      const before = steps.at(-1);
+      steps.push({ ...step, together: !!before && isDoneWith(step, before) });
       parts = parts.slice(count);
     }
     return steps;
@@ -331,12 +331,13 @@ export class Words {
     return this.styledOrder(words) ?? this.order(words);
   }
 
-  /** The act or order of words before a place, which it leaves out, as in "limp to the door"; null for any other. */
+  /** The act or order of words before a place or a comparison, which it leaves out, as in "limp to the door". */
   private goneSomewhere(all: readonly string[]): Step | null {
-    const { where, articles } = this.table;
-    const at = all.findIndex(
-      (word, i) => i > 0 && where.includes(word) && articles.includes(all[i + 1] ?? ""),
-    );
+    const { where, articles, compared } = this.table;
+    const at = all.findIndex((word, i) => {
+      const isPlace = where.includes(word) && articles.includes(all[i + 1] ?? "");
+      return i > 0 && (isPlace || compared.includes(word));
+    });
     if (at < 0 || at + 1 === all.length) return null;
     const isPace = (word: string) => this.table.slow.includes(word) || this.table.fast.includes(word);
     const place = all.slice(at).filter((word) => !isPace(word));
@@ -503,6 +504,17 @@ export class Words {
     scores.sort((a, b) => b.best - a.best || a.at - b.at);
     return scores.slice(0, SPOKEN.OFFERED).map(({ name }) => name);
   }
+}
+
+/** Whether a step is done together with the one before it: an act with what goes somewhere, and no turn. */
+function isDoneWith(step: Step, before: Step): boolean {
+  if (before.kind === "stop" || step.kind === "stop") return false;
+  if (step.kind === "act") return before.kind !== "act" && !isTurn(before);
+  return before.kind !== "act" || (step.kind === "go" && !isTurn(step));
+}
+
+function isTurn({ kind, name, way }: Step): boolean {
+  return kind === "go" && !name && way !== 0;
 }
 
 /** Degrees to the left, and whether the facing stays, of kinds of words and a side. */
