@@ -306,6 +306,9 @@ class _Preparing(StoreWriter):
             raise DataError(f"{error}{hint}") from error
 
 
+KEYED = "KEYED"
+"""Who shows the clips that nobody performed, acts by key poses: the beginning of their names, up to "_"."""
+
 SPLITS = ("trial", "subject", "none")
 """The ways to divide motions, see :func:`split`."""
 
@@ -379,13 +382,15 @@ def matches(name: str, patterns: str) -> bool:
 
 
 def _without(entries: Sequence[Entry], seed: int, patterns: str) -> Split:
-    """The split whose test part are the clips that match; validation are other people, and training is the rest."""
+    """The split whose test part are the clips that match; validation are other people, and training is the rest, with
+    what nobody performed."""
     test = [index for index, entry in enumerate(entries) if matches(entry.name, patterns)]
     rest = [index for index, entry in enumerate(entries) if not matches(entry.name, patterns)]
     if not test or not rest:
         raise DataError(f"{len(test)} of {len(entries)} motions match {patterns}: some must, and some must not")
-    # the rest by people, all but validation to train on
-    parts = split([entries[index] for index in rest], seed, "subject")
-    train = sorted(rest[place] for place in (*parts.train, *parts.test))
-    validation = [rest[place] for place in parts.validation]
+    # the rest by people, all but validation to train on; clips by rule change nothing of who these are
+    performed = [index for index in rest if entries[index].subject.partition("_")[0] != KEYED]
+    parts = split([entries[index] for index in performed], seed, "subject")
+    validation = [performed[place] for place in parts.validation]
+    train = sorted(set(rest).difference(validation))
     return Split(tuple(train), tuple(validation), tuple(test))

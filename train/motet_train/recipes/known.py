@@ -24,7 +24,7 @@ from motet_train.data.batches import Examples, Views
 from motet_train.data.errors import DataError
 from motet_train.data.kinds import KIND_PATTERNS, Shown, careful, named, shown_by
 from motet_train.data.sentences import Actions, actions_of
-from motet_train.data.store import Store
+from motet_train.data.store import KEYED, Store
 from motet_train.models.discriminant import discriminate
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
 from motet_train.models.known_motions import KnownMotions, KnownMotionsConfig
@@ -60,9 +60,6 @@ RECIPES = {"default": DEFAULT}
 
 TRIED = "tried.npz"
 """File of a run: the answers about held-out people from which their probability was learned."""
-
-KEYED = "KEYED"
-"""Who shows the clips that nobody performed, acts by key poses: the beginning of their names, up to "_"."""
 
 TURNING = r"(?<!in )\b(?:turn|veer|swerv|curv|corner|bend|angl|circl|spin|rotat|pivot|diagonal|head|cut|chang|off to)"
 """Beginnings of words for a path that is not straight."""
