@@ -11,9 +11,8 @@ from trainings import done, refused
 from motet.models.describe import DescribeModel
 from motet.models.nearest_neighbour import NOTHING
 from motet.text.vocabulary import NEW_MODEL_RULES
-from motet_train.data.store import INDEX, Store
+from motet_train.data.store import INDEX, KEYED, Store
 from motet_train.evaluate.language.actions import error_by_chance
-from motet_train.data.store import KEYED
 from motet_train.runs import Run
 
 NETS = "[model]\nencoder_units = [4, 4]\ndecoder_units = [6, 6]\nembedding = 4\n"
