@@ -71,7 +71,7 @@ class ActIndex:
             return None
         of_sides = []
         for order in self._orders_in(words, stems):
-            others = stems - self._stems_of_act(order.name)
+            others = stems - self._stems_of_acts[order.name]
             # acts of one side are not those of the other
             if not others or (others <= BOTH_SIDES and self.act(order.name).mirrored):
                 of_sides.append(order)
@@ -90,7 +90,7 @@ class ActIndex:
             return None
         lacking = {}
         for name in {order.name for order in orders}:
-            of_act = self._stems_of_act(name) | (BOTH_SIDES if self.act(name).mirrored else set())
+            of_act = self._stems_of_acts[name] | (BOTH_SIDES if self.act(name).mirrored else set())
             lacking[name] = tuple(word for word in words if stems_of([word]) - of_act)
         best = max(orders, key=lambda order: (-len(lacking[order.name]), *order.fit(words)))
         return replace(self._adapted(best, stems, times), lacking=lacking[best.name])
@@ -141,9 +141,13 @@ class ActIndex:
         """The stems of all words of all acts."""
         return frozenset(self._orders)
 
-    def _stems_of_act(self, name: str) -> frozenset[str]:
-        """The stems of all words of an act."""
-        return frozenset[str]().union(*map(stems_of, map(_words_of, self.sentences[name])))
+    @cached_property
+    def _stems_of_acts(self) -> Mapping[str, frozenset[str]]:
+        """The stems of all words of each act."""
+        stems: dict[str, frozenset[str]] = {}
+        for order in chain.from_iterable(self._orders.values()):
+            stems[order.name] = stems.get(order.name, frozenset()) | order.stems
+        return stems
 
     @cached_property
     def verbs(self) -> frozenset[str]:
