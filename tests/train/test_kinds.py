@@ -12,7 +12,7 @@ from motet_train.data.batches import Views
 from motet_train.data.disguise import Disguise, seen_as
 from motet_train.data.errors import DataError
 from motet_train.data.kinds import KIND_PATTERNS, careful, named, shown_by
-from motet_train.data.store import Entry, split
+from motet_train.data.store import KEYED, Entry, split
 from motet_train.evaluate.language.actions import calibration_error
 from motet_train.models.discriminant import discriminate
 from motet_train.models.joint_embedding import JointEmbedding, JointEmbeddingConfig
@@ -88,6 +88,11 @@ def test_clips_of_a_pattern_are_kept_back() -> None:
     assert people[0].isdisjoint(people[1])
     assert "B" not in people[0] | people[1]
     assert {entries[i].subject for i in split(entries, 0, "B_*,C_0").test} == {"B", "C"}
+    # what nobody performed is trained on, and the same people are for validation with it as without
+    keyed = [Entry(f"{KEYED}_{take}", KEYED, ("waves",), ((0, 9),)) for take in range(100)]
+    with_keyed = split([*entries, *keyed], 0, "B_*")
+    assert (with_keyed.validation, with_keyed.test) == (parts.validation, parts.test)
+    assert set(with_keyed.train) == {*parts.train, *range(24, 124)}
     with pytest.raises(DataError, match="0 of 24 motions match"):
         split(entries, 0, "X_*")
 
