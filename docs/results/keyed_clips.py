@@ -1,5 +1,5 @@
-"""Clips of the acts by key poses that ship, with a table of sentences, for the training of search:
-`python docs/results/keyed_clips.py FOLDER`; with `--describe` three draws of each act that describe knows."""
+"""Clips of the acts by key poses that describe knows, three draws of each, with a table of sentences, for its training:
+`python docs/results/keyed_clips.py FOLDER`."""
 
 import csv
 import sys
@@ -76,18 +76,18 @@ def order_of(act: motet.keyed.KeyedAct, draw: int) -> str:
     return f"{order} {BASE_SECONDS + 3 * bool(draw)}s"
 
 
-def main(folder: Path, describe: bool) -> None:
+def main(folder: Path) -> None:
     """Write the clips, and the table beside them."""
     folder.mkdir()
     model = motet.load_as(motet.SteerModel, "control")
     bases: dict[str, motet.Motion] = {}
     rows = [("clip", "description", "sentence", "pool")]
     for name, act in motet.keyed.ours().items():
-        if describe and name in UNKNOWN:
+        if name in UNKNOWN:
             continue
         texts = sentences(name, act.says)
         kept = len(texts) - 2 if len(texts) > 8 else len(texts)
-        for draw in range(len(STANDS) if describe else 1):
+        for draw in range(len(STANDS)):
             order = order_of(act, draw)
             if order not in bases:
                 base = model.run(order)
@@ -102,4 +102,4 @@ def main(folder: Path, describe: bool) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), "--describe" in sys.argv)
+    main(Path(sys.argv[1]))

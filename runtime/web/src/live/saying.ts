@@ -59,7 +59,7 @@ export class Saying {
     } else {
       const before = { gait: figure.wanted.gait, speed: Math.hypot(figure.wanted.x, figure.wanted.z) };
       const { gait, speed } = paceOf(step, before, page);
-      if (step.name) page.style(styleNumber(step.style || STYLES.NO_STYLE), this.all);
+      if (step.name) page.style(styleOf(step), this.all);
       const turn = step.aside ? 0 : step.way;
       const aside = step.aside ? step.way : 0;
       // from where it is to face, even if it has not come to it yet
@@ -85,16 +85,21 @@ function secondsOf(step: Step): number {
   return SAYING.TURN_SECONDS + SAYING.SECONDS_OF_DEGREE * Math.abs(step.way);
 }
 
+/** The number of the style of a step. */
+function styleOf({ style }: Step): number {
+  return styleNumber(style || STYLES.NO_STYLE);
+}
+
 /** The gait and the speed of a step, from those before it. */
 function paceOf(
-  { name, style, pace, change }: Step,
+  step: Step,
   before: { gait: number; speed: number },
   { net }: Page,
 ): { gait: number; speed: number } {
+  const { name, pace, change } = step;
   if (name) {
     const gait = net.gaits.indexOf(name);
-    const ofStyle = paceOfStyle(styleNumber(style || STYLES.NO_STYLE));
-    return { gait, speed: pace * ofStyle * usual(net, gait) };
+    return { gait, speed: pace * paceOfStyle(styleOf(step)) * usual(net, gait) };
   }
   const { gait } = before;
   if (change === 1) return before;
